@@ -35,6 +35,7 @@ from gaplab.api.routes import (
     replay_figures,
     replays,
     reports,
+    robots,
     samples,
     sensitivity,
     specs,
@@ -97,6 +98,7 @@ MODULES = (
     replays,
     sensitivity,
     catalogue,
+    robots,
     health,
     metrics,
 )

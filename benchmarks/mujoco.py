@@ -12,7 +12,7 @@ from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.mujoco import MuJoCo
-from gaplab.services.engines.mujoco.scene import MuJoCoScene, _in_force
+from gaplab.services.engines.mujoco.scene import MuJoCoScene
 
 ROBOT = Quadruped()
 MANY = 96
@@ -46,15 +46,15 @@ def bare(threads: int) -> Callable[[], int]:
     engine = MuJoCo(MuJoCo.Options(threads=threads))
     scene: MuJoCoScene = engine._scenes[ROBOT.world.kind]
     motions = [open_loop(ROBOT.motion(genome)) for genome in genomes(MANY)]
-    steps = int(scene._steps(motions[0].observe_s)[-1])
-    controls = scene._controls(motions, steps)
-    start = np.tile(scene._start, (MANY, 1))
-    models = scene._painted([ROBOT.world.material]) * MANY
+    steps = int(scene.steps(motions[0].observe_s)[-1])
+    controls = scene.controls.of(motions, steps, [None])
+    start = np.tile(scene.states.start, (MANY, 1))
+    models = [prepared.model for prepared in scene.models[[ROBOT.world]]] * MANY
     pool = library.Rollout(nthread=threads if threads > 1 else 0)
 
     def work() -> int:
-        with _in_force(scene._mujoco, *scene._callbacks):
-            pool.rollout(models, scene._datas, start, controls, control_spec=mjtState.mjSTATE_QFRC_APPLIED.value)
+        with scene.pool.in_force():
+            pool.rollout(models, scene.pool.datas, start, controls, control_spec=mjtState.mjSTATE_QFRC_APPLIED.value)
         return MANY
 
     return work

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pybullet
@@ -51,13 +52,15 @@ def through_simulate(parameters: Parameters, engine: Engine | None = None, count
 def bare() -> Callable[[], int]:
     """Return work: `stepSimulation` in a loop, with motor commands at pulse edges only."""
     robot = Quadruped()
-    scene = PyBulletScene(pybullet, robot.world)
+    dynamic = robot.world.material.dynamic_friction
+    world = replace(robot.world, material=replace(robot.world.material, static_friction=dynamic))
+    scene = PyBulletScene(pybullet, world)
     motions = [open_loop(robot.motion(genome)) for genome in genomes()]
 
     def work() -> int:
         for motion in motions:
             commands, steps = edges(motion, robot.world.time_step_s)
-            scene.start(robot.world.material, robot.world.material.dynamic_friction)
+            scene.start(world)
             for step in range(steps):
                 for actuator, target in commands.get(step, ()):
                     scene.command(actuator, target)

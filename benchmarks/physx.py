@@ -26,7 +26,7 @@ def bare() -> Callable[[], int]:
     world = ROBOT.world
     scene = PhysX()._scenes[world]
     system, joints, start = scene._system, scene.robot.motors, scene._initial
-    scene.start(world.material)
+    scene.start(world)
     plans = [edges(open_loop(ROBOT.motion(genome)), world.time_step_s) for genome in genomes()]
 
     def work() -> int:

@@ -19,7 +19,9 @@ from gaplab.api.process.local_service import start_service
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import import_archive
 from gaplab.services.core.loop import repetition
+from gaplab.services.core.robots import robots
 from gaplab.services.experiments.submission import submit_experiment, submit_study
+from gaplab.services.replay.portraits import portrait
 from gaplab.services.running.execution import claim, record_all
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.lease import Pulse
@@ -130,8 +132,19 @@ def take(page: Page, view: View, path: Path) -> None:
         picture.convert("RGB").quantize(256).save(path, optimize=True)
 
 
+def paint_robots() -> None:
+    """Store the pictures of the robots, which the service paints."""
+    for name, robot in robots.items():
+        if (world := robot().world).bodies:
+            for dark in (False, True):
+                path = FOLDER / f"{name}-{'dark' if dark else 'light'}.png"
+                path.write_bytes(portrait(world, dark, 640))
+                print(f"Wrote {path}.")  # noqa: T201
+
+
 def main() -> None:
     """Take every picture in light and in dark."""
+    paint_robots()
     browser = Chromium()
     try:
         with prepared() as (url, ids):

@@ -10,6 +10,8 @@ from gaplab.schemas.base import EngineName, Frozen, Id, RobotName, Statistic, Un
 Position = tuple[float, float, float]
 Orientation = tuple[float, float, float, float]
 Interval = tuple[float, float]
+ShapeKind = Literal["box", "sphere", "capsule", "cylinder", "hull", "plane"]
+ShapeRole = Literal["trunk", "limb", "foot", "ground"]
 
 
 class ControllerKind(StrEnum):
@@ -23,15 +25,24 @@ class Shape(Frozen):
     """A part of the robot, or the ground, in the frame of the body that carries it.
 
     Sizes are in metres. A box has its three edges. A sphere has its radius. A capsule along z has its radius and the
-    distance between the centres of its ends. A plane, with normal z, has none.
+    distance between the centres of its ends, and a cylinder along z its radius and its length. A convex hull, which has
+    vertices and faces, and a plane, with normal z, have none.
     """
 
-    kind: Literal["box", "sphere", "capsule", "plane"]
+    kind: ShapeKind
     size_m: tuple[float, ...] = Field(examples=[(0.3, 0.2, 0.06)])
     position_m: Position = Field(default=(0.0, 0.0, 0.0), description="position of the centre")
     orientation: Orientation = Field(default=(0.0, 0.0, 0.0, 1.0), description="quaternion x, y, z, w")
-    role: Literal["trunk", "limb", "foot", "ground"] = Field(description="role, which determines the colour")
+    role: ShapeRole = Field(
+        description="role, which determines the colour; the trunk is the body whose motion fitness rates"
+    )
     body: int | None = Field(default=None, description="index of the body in `bodies`; null: fixed")
+    vertices_m: tuple[Position, ...] = Field(default=(), description="vertices of a hull, in its own frame")
+    faces: tuple[tuple[int, ...], ...] = Field(
+        default=(),
+        description="faces of a hull: indices of `vertices_m`, anticlockwise as seen from outside",
+        examples=[((0, 1, 2),)],
+    )
 
 
 class ReplayWorld(Frozen):
@@ -45,13 +56,18 @@ class ReplayWorld(Frozen):
     orientations: tuple[tuple[float, ...], ...] = Field(
         default=(), description="by frame: x, y, z, w of each body in turn"
     )
-    heights_m: tuple[float, ...] = Field(default=(), description="height of the base, by frame")
+    slope_rad: float = Field(
+        default=0.0, description="angle by which the ground, the plane z = 0, rises along x: gravity is turned by it"
+    )
+    heights_m: tuple[float, ...] = Field(default=(), description="height of the observed body, by frame")
     speeds_m_s: tuple[float, ...] = Field(
         default=(),
-        description="speed of the base towards its final position, by frame, averaged over 0.2 s",
+        description="speed of the observed body towards its final position, by frame, averaged over 0.2 s",
     )
     contacts: tuple[tuple[Interval, ...], ...] = Field(
-        default=(), description="by foot: intervals in s during which it is less than 2 mm above the ground"
+        default=(),
+        description="by foot: intervals in s during which it is less than 2 mm above the ground; empty: unknown, "
+        "as the engine tells no joint angles",
     )
 
 
@@ -74,6 +90,16 @@ class ReplayReadings(Frozen):
     )
 
 
+class Framing(Frozen):
+    """How a robot is seen, so that a large one and a small one fill a picture alike."""
+
+    scale: float = Field(
+        default=1.0,
+        description="lengths in the picture, like the camera's distance, relative to those of the quadruped",
+    )
+    height_m: float = Field(default=0.12, description="height that the camera looks at")
+
+
 class Replay(Frozen):
     """One controller in its simulator and in reality, from the same start."""
 
@@ -88,8 +114,11 @@ class Replay(Frozen):
         description="names of the bodies, the base first", examples=[("trunk", "front_left_shin")]
     )
     feet: tuple[str, ...] = Field(
-        description="bodies other than the base that collide with the ground", examples=[("front left",)]
+        description="up to eight outer bodies that collide with the ground; the base is none",
+        examples=[("front left",)],
     )
+    observed: int = Field(default=0, description="index in `bodies` of the body whose motion fitness rates")
+    framing: Framing = Framing()
     times_s: tuple[float, ...] = Field(description="times of the frames, up to 20 s", examples=[(0.0, 0.02)])
     counted_s: Interval = Field(description="interval in which movement counts for fitness", examples=[(0.5, 3.0)])
     simulation: ReplayWorld | None = Field(description="null: the controller evolved in reality itself")

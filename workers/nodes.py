@@ -13,7 +13,9 @@ import ray
 from ray.exceptions import RayError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
+from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.provenance import Provenance
+from gaplab.services.core import robot_library
 from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.plugins import folders
 from gaplab.services.plugins.contents import Contents
@@ -30,22 +32,30 @@ ANSWER_S = 60.0
 PLUGIN = "plug-in "
 """Begins the names of external plug-ins among versions."""
 
+ROBOT = "robot "
+"""Begins the names of robot files, whose texts are among versions."""
+
 log = logging.getLogger("gaplab.supervisor")
 
 
 def with_plugins(shared: Versions, under: Provenance, spec: Mapping[str, Any]) -> Versions:
-    """Return the versions that a process must have to work on a spec: the shared ones and those of its plug-ins.
+    """Return what a process must have to work on a spec: the shared versions, those of its plug-ins, and robot files.
 
     Args:
         shared: versions of gaplab and its libraries.
         under: the provenance under which the work was claimed.
         spec: of the experiment, or of the sensitivity check.
     """
-    return shared | _prefixed(named_versions(under, spec))
+    files = robot_library.needed_by(PluginRef.model_validate(spec["robot"]))
+    return (
+        shared | _prefixed(named_versions(under, spec)) | {f"{ROBOT}{place}": text for place, text in enumerate(files)}
+    )
 
 
 def check_here(expected: Versions) -> None:
-    """Check that this process has the expected versions. It imports plug-ins again that were edited since.
+    """Check that this process has the expected versions, and learn the robot files that came with them.
+
+    It imports plug-ins again that were edited since.
 
     Raises:
         ClusterUnusable: it lacks versions of gaplab or its libraries; the message says which.
@@ -55,6 +65,7 @@ def check_here(expected: Versions) -> None:
     folders.find()
     imported.contents()
     _compare(platform.node(), versions(), _shared(expected))
+    robot_library.learn(text for name, text in expected.items() if name.startswith(ROBOT))
     wanted = {name.removeprefix(PLUGIN): text for name, text in expected.items() if name.startswith(PLUGIN)}
     if wanted and _different(imported.contents(), wanted) and (different := _different(imported.renewed(), wanted)):
         raise PluginDiffers(different, wanted)
@@ -94,7 +105,7 @@ def _prefixed(plugins: Versions) -> Versions:
 
 
 def _shared(expected: Versions) -> Versions:
-    return {name: text for name, text in expected.items() if not name.startswith(PLUGIN)}
+    return {name: text for name, text in expected.items() if not name.startswith((PLUGIN, ROBOT))}
 
 
 def _different(contents: Contents, wanted: Versions) -> dict[str, str]:

@@ -9,6 +9,7 @@ Programs import it from `gaplab`.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Self
 
 import httpx2
@@ -29,6 +30,7 @@ from gaplab.api.clients.submission import Submission
 from gaplab.api.clients.tables import Tables
 from gaplab.api.clients.watcher import Watcher
 from gaplab.schemas.plugin import Catalogue
+from gaplab.schemas.robots import RobotRead
 
 
 class Client:
@@ -79,13 +81,13 @@ class Client:
         self.archive, self.unarchive, self.delete = keeping.archive, keeping.unarchive, keeping.delete
         self.views, self.save_view, self.delete_view = keeping.views, keeping.save_view, keeping.delete_view
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
-        self.compare, self.diff, self.curve = results.compare, results.diff, tables.curve
-        self.misfit, self.misfit_csv, self.samples = results.misfit, results.misfit_csv, tables.samples
+        self.compare, self.diff, self.curve, self.samples = results.compare, results.diff, tables.curve, tables.samples
+        self.misfit, self.misfit_csv, self.figure_kinds = results.misfit, results.misfit_csv, figures.kinds
         self.simulators, self.predictions, self.readings = tables.simulators, tables.predictions, tables.readings
-        self.figure, self.figure_kinds, self.verdict = figures.draw, figures.kinds, reports.verdict
-        self.report, self.take_home, self.replay = reports.save, reports.take_home, replays.replay
-        self.export, self.import_, self.events = archives.export, archives.import_, event_log.events
-        self.watch, self.wait, self.video, self.requests = watcher.watch, watcher.wait, replays.video, bench.requests
+        self.figure, self.verdict, self.events = figures.draw, reports.verdict, event_log.events
+        self.report, self.take_home, self.robot_picture = reports.save, reports.take_home, replays.robot_picture
+        self.export, self.import_, self.requests = archives.export, archives.import_, bench.requests
+        self.watch, self.wait, self.replay, self.video = watcher.watch, watcher.wait, replays.replay, replays.video
 
     def __enter__(self) -> Self:
         return self
@@ -104,6 +106,20 @@ class Client:
                 return True
         except (ServiceError, ServiceUnreachable):
             return False
+
+    def add_robot(self, file: str | Path) -> RobotRead:
+        """Store a robot file, which `gaplab robot import` writes; specs name the robot by its name from then on."""
+        return self._connection.change(
+            RobotRead,
+            "POST",
+            "/robots",
+            content=[Path(file).read_bytes()],
+            headers={"Content-Type": "application/json"},
+        )
+
+    def robots(self) -> tuple[RobotRead, ...]:
+        """Return the robots from files, by name, the newest of a name first."""
+        return self._connection.get(tuple[RobotRead, ...], "/robots")
 
     def catalogue(self) -> Catalogue:
         """Return the plug-ins of the service."""

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from threading import Event, Thread
 from typing import Any
 
@@ -48,14 +49,22 @@ class TakenRequest:
 
     Attributes:
         request: the request, as it was taken.
-        motion: the motion to run.
         answered: the service's answer, once it is told.
     """
 
-    def __init__(self, driving: "Driving", request: RequestRead, motion: DriverMotion) -> None:
-        self.request, self.motion = request, motion
+    def __init__(self, driving: "Driving", request: RequestRead) -> None:
+        self.request = request
         self.answered: AnswerRead | None = None
         self._driving = driving
+
+    @cached_property
+    def motion(self) -> DriverMotion:
+        """The motion to run.
+
+        Raises:
+            ServiceError: the controller observes while it acts, so it has no motion: run its genome on the robot.
+        """
+        return self._driving.motion(self.request)
 
     @property
     def id(self) -> str:
@@ -127,7 +136,7 @@ class Driving:
             with self._held(request):
                 task = None
                 try:
-                    task = TakenRequest(self, request, self._motion(request))
+                    task = TakenRequest(self, request)
                     yield task
                 finally:
                     if task is None or task.answered is None:
@@ -182,7 +191,8 @@ class Driving:
         body = {"operator": self._operator, "lease_s": self._lease_s}
         return self._connection.post(RequestRead, f"/requests/{segment(request.id)}/take", body)
 
-    def _motion(self, request: RequestRead) -> DriverMotion:
+    def motion(self, request: RequestRead) -> DriverMotion:
+        """Return the motion that a request asks for."""
         found = json.loads(self._connection.get_bytes(f"/requests/{segment(request.id)}/motion", format="json"))
         return DriverMotion(
             actuators=tuple(found["actuators"]),

@@ -38,3 +38,18 @@ class Replays:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
         return path
+
+    def robot_picture(self, name: str, file: str | Path, *, theme: str = "light", width: int = 640) -> Path:
+        """Write a picture of a robot of the catalogue, as it stands at the start, into a PNG file.
+
+        Args:
+            name: name of the robot.
+            file: file to write; missing folders are created.
+            theme: `light` or `dark`.
+            width: width in pixels; the height is three quarters of it.
+        """
+        path = Path(file)
+        content = self._connection.get_bytes(f"/catalogue/robots/{segment(name)}/picture", theme=theme, width=width)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        return path

@@ -11,7 +11,7 @@ from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, lines_of
 # isort: off
 from gaplab.api.commands import service, submission, events, records, keeping, differences, figures  # noqa: F401
 from gaplab.api.commands import reports, replays, comparisons, life_cycle, bench, driving  # noqa: F401
-from gaplab.api.commands import archives, reruns, catalogue, plugins, tokens, help  # noqa: A004, F401
+from gaplab.api.commands import archives, reruns, catalogue, plugins, robots, tokens, help  # noqa: A004, F401
 
 # isort: on
 from gaplab.api.commands.app import app as app

@@ -29,7 +29,11 @@ _TAG = re.compile(r'(?:W/)?"(\d{1,9})\.[0-9a-f]+"')
 
 def tagged(request: Request, answer: BaseModel, edits: int = 0) -> Response:
     """Return the answer with its tag, or 304 without a body if `If-None-Match` has that tag or `*`."""
-    response = JSONResponse(answer.model_dump(mode="json"))
+    return tagged_response(request, JSONResponse(answer.model_dump(mode="json")), edits)
+
+
+def tagged_response(request: Request, response: Response, edits: int = 0) -> Response:
+    """Return a response with its tag, as `tagged` does."""
     tag = f'"{edits}.{sha256(response.body).hexdigest()[:16]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
     known = _listed(request.headers.get("if-none-match", "")) if request.method == "GET" else []

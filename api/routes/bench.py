@@ -101,10 +101,10 @@ def read_request(id: Id, store: StoreDep) -> RequestRead:
     "/{id}/motion",
     summary="Read the motion to run",
     response_class=Response,
-    responses={**_MOTION, **documented(404, 422)},
+    responses={**_MOTION, **documented(404, 409, 422)},
 )
 def read_motion(id: Id, query: Annotated[MotionQuery, Query()], store: StoreDep) -> Response:
-    """Return the targets of the actuators over time."""
+    """Return the targets of the actuators over time; 409 for a controller that observes the robot while it acts."""
     media_type, ending = _MOTIONS[query.format]
     return attachment(motions.request_motion(store, id, query.format), media_type, f"motion-{id}.{ending}")
 

@@ -15,6 +15,7 @@ from gaplab.services.store.queries.archives import REPETITION_ID
 from gaplab.services.store.tables import Column, Kind
 
 EXPORTED = (
+    "robot",
     "provenance",
     "study",
     "experiment",
@@ -46,7 +47,11 @@ LEFT_OUT: Mapping[str, str] = {
 }
 """Tables that are left out, each with the reason."""
 
+ONLY_IF_USED = {"robot"}
+"""Tables that an archive has only if its experiments use a row; earlier versions read the others."""
+
 COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
+    "robot": {"created_at": "says when one service got the file"},
     "study": {
         "archived_at": "hides it in the lists of one service",
         "webhook": "is an address of one person, and may be a secret",

@@ -5,12 +5,16 @@ from collections.abc import Mapping
 from pydantic import ValidationError
 
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives.checking import Row
 from gaplab.services.archives.columns import EXPERIMENT, REPETITION
 from gaplab.services.archives.opening import OpenedArchive
-from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.core import robot_library
+from gaplab.services.core.errors import InvalidArchive, InvalidSpec
+from gaplab.services.core.robot_files import read_robot_file
+from gaplab.services.core.robot_library import IMPORTED, label_of
 from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import spec_as_stored
 from gaplab.services.core.strategies import strategies
@@ -31,6 +35,7 @@ def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
         InvalidArchive: a spec is invalid, or the archive has other experiments than its manifest states.
     """
     manifest, experiments = opened.manifest, dict[str, Row]()
+    _learn_robots(opened)
     for row in opened.rows("experiment"):
         if len(experiments) == MOST_EXPERIMENTS:
             raise InvalidArchive(f"it has more than {MOST_EXPERIMENTS} experiments")
@@ -46,6 +51,18 @@ def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
     return experiments
 
 
+def _learn_robots(opened: OpenedArchive) -> None:
+    """Check and remember the robot files of an archive, which its specs name."""
+    for row in opened.rows("robot"):
+        try:
+            file = read_robot_file(row["text"])
+        except InvalidSpec as error:
+            raise InvalidArchive(f"the robot {row['name']!r} is invalid: {error}"[:300]) from error
+        if (file.sha256, file.name, file.text) != (row["sha256"], row["name"], row["text"]):
+            raise InvalidArchive(f"the robot {row['name']!r} has another hash or name than its file")
+        robot_library.learn([file.text])
+
+
 def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
     """Refuse a row that belongs to no experiment, or exceeds the size of its experiment.
 
@@ -54,7 +71,7 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
     """
     if table in {"study", "experiment"}:
         _check_tags(table, row)
-    if table == "study":
+    if table in {"study", "robot"}:
         return
     if table == "provenance":
         _check_provenance(row)
@@ -104,7 +121,7 @@ def _checked_spec(row: Row) -> Row:
         raise InvalidArchive(f"{place} is not a spec") from error
     names = [each.name for each in spec.tunables]
     wrong = [name for name in (*truth, *names) if plain_name(name) not in tunables]
-    wrong += [] if spec.robot.name in robots else [spec.robot.name]
+    wrong += [] if _is_known(spec.robot) else [label_of(spec.robot)]
     if wrong or len(set(names)) < len(names) or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names plug-ins that are not installed here: {', '.join(wrong)[:200]}"
         raise InvalidArchive(msg)
@@ -114,6 +131,11 @@ def _checked_spec(row: Row) -> Row:
     stored = _fields_of(given, spec.model_dump(mode="json"))
     reality = _fields_of(given["reality"], stored["reality"])
     return stored | {"reality": reality | {"parameters": truth | reality["parameters"]}}
+
+
+def _is_known(robot: PluginRef) -> bool:
+    """Return whether a robot is installed here, or its file is in the archive or stored here."""
+    return robot.name in robots and (robot.name != IMPORTED or bool(robot_library.needed_by(robot)))
 
 
 def _fields_of(given: Row, checked: Row) -> Row:

@@ -155,7 +155,7 @@ def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetim
     row = dict(row)
     if table == "experiment":
         row["spec"] = experiments[row["id"]]["spec"]
-    goes_on = table not in {"study", "provenance"} and _is_physical(experiments[_owner(table, row)])
+    goes_on = table not in {"study", "provenance", "robot"} and _is_physical(experiments[_owner(table, row)])
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:
         row |= {"state": _resting(State(row["state"]))} if goes_on else {"state": State.CANCELLED, "ended_at": now}
     if table == "attempt" and row.get("ended_at") is None:

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 
 from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.schemas.curves import Curve
-from gaplab.services.archives.columns import EXPORTED, columns_of
+from gaplab.services.archives.columns import EXPORTED, ONLY_IF_USED, columns_of
 from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, Row, member_of, write
 from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
@@ -81,7 +81,8 @@ def _export(
             for table in EXPORTED:
                 with TemporaryFile() as part:
                     count = write(table, _rows(session, table, study, ids, hidden), part)
-                    members[member_of(table)] = _add(archive, member_of(table), part, count)
+                    if count or table not in ONLY_IF_USED:
+                        members[member_of(table)] = _add(archive, member_of(table), part, count)
             points = TypeAdapter(tuple[Curve, ...]).dump_json(curves.curves_of(session, ids))
             members[CURVES] = _add(archive, CURVES, BytesIO(points), len(ids))
             members[SPEC] = _add(archive, SPEC, BytesIO(_spec(session, study, owners, hidden)), 0)

@@ -6,6 +6,7 @@ from gaplab.schemas.measurements import Table
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.measured_values import readings_violations, unit_violations
+from gaplab.services.core.robot_library import label_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.queries import attachments
 from gaplab.services.store.session import Session
@@ -47,7 +48,7 @@ def check_attachments(session: Session, hashes: Sequence[str]) -> None:
 
 
 def _violations(spec: ResolvedSpec, values: Sequence[float] | None, unit: str | None, own: str) -> Iterator[Violation]:
-    yield from unit_violations(spec.robot.name, unit, own)
+    yield from unit_violations(label_of(spec.robot), unit, own)
     if values is not None and len(values) != spec.reality.repeats:
         wanted = spec.reality.repeats
         message = f"the experiment asks for {wanted} value{'' if wanted == 1 else 's'} a measurement, not {len(values)}"

@@ -9,8 +9,11 @@ import yaml
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.errors import Conflict
+from gaplab.services.core.motions import Loop, Motion
+from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.world import PDMotor
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import requests
@@ -29,6 +32,7 @@ def request_motion(session: Session, id_: str, form: MotionFormat) -> str:
     Raises:
         NotFound: the request does not exist.
         InvalidSpec: the robot is not installed here.
+        Conflict: the motion cannot be written in this form.
     """
     row, repetition = requests.get(session, id_)
     experiment = session.get_one(ExperimentRow, repetition.experiment_id)
@@ -36,14 +40,48 @@ def request_motion(session: Session, id_: str, form: MotionFormat) -> str:
 
 
 def written(spec: ResolvedSpec, genome: FloatArray, form: MotionFormat) -> str:
-    """Return the motion of a genome `(g,)` as text."""
+    """Return the motion of a genome `(g,)` as text.
+
+    Raises:
+        Conflict: the motion cannot be written in this form.
+    """
     robot = robot_of(spec)
     motion, names = robot.motion(genome), [joint.name for joint in robot.world.actuators]
+    if isinstance(motion, Loop):
+        raise Conflict(
+            "the controller observes the robot while it acts, so no targets are known in advance; run the controller "
+            "itself, with the genome, on the robot"
+        )
     if form == "csv":
         return _csv(motion, names)
     if form == "json":
         return json.dumps(_plain(motion, names), indent=1) + "\n"
+    _refuse_other_than_positions(robot)
     return _ros2(motion, names)
+
+
+def forms_of(robot: Robot, genome: FloatArray) -> tuple[MotionFormat, ...]:
+    """Return the forms in which the motion of a genome `(g,)` can be written."""
+    if not robot.world.actuators or isinstance(robot.motion(genome), Loop):
+        return ()
+    return ("csv", "json") if _others(robot) else ("csv", "json", "ros2")
+
+
+def _refuse_other_than_positions(robot: Robot) -> None:
+    if others := _others(robot):
+        raise Conflict(
+            f"a JointTrajectory has positions, and these motors follow others: {', '.join(others)}; take csv"
+        )
+
+
+def _others(robot: Robot) -> list[str]:
+    """Return the actuators whose targets are velocities or torques, with what they follow."""
+    motors = [(joint.name, joint.motor) for joint in robot.world.actuators]
+    return [
+        f"{name} ({motor.follows})"
+        for name, motor in motors
+        if isinstance(motor, PDMotor) and motor.follows != "position"
+    ]
 
 
 def _plain(motion: Motion, names: list[str]) -> dict[str, Any]:

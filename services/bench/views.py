@@ -14,6 +14,7 @@ from gaplab.schemas.measurements import (
 from gaplab.schemas.traces import TraceRead
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.repeats import mean
+from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.clock import moment
@@ -64,7 +65,7 @@ def _view(
         repetition=number,
         iteration=row.iteration,
         kind=row.kind,
-        robot=spec.robot.name,
+        robot=label_of(spec.robot),
         unit=robot_of(spec).unit,
         bench=row.bench,
         repeats=spec.reality.repeats,

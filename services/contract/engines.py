@@ -16,7 +16,7 @@ Plugin = type[Engine]
 
 def pairs(plugin: Plugin) -> Iterator[tuple[Engine, Robot]]:
     """Yield a new engine with each robot that it runs."""
-    for robot in (each() for each in robots.values()):
+    for robot in (each.example() for each in robots.values()):
         if plugin.runs(robot.world):
             yield plugin(), robot
 
@@ -39,9 +39,9 @@ def repeats_itself(plugin: Plugin) -> None:
         first = flat(engine, robot)
         flat(engine, robot, replace(robot.world, material=Material(0.3, 0.1, 0.5)))
         same = np.array_equal(first, flat(engine, robot), equal_nan=True)
-        assert same, f"a repeated rollout of the {robot.name} differs"
+        assert same, f"a repeated rollout of the {robot.label} differs"
         fresh = np.array_equal(first, flat(type(engine)(), robot), equal_nan=True)
-        assert fresh, f"a rollout of the {robot.name} differs in a new engine"
+        assert fresh, f"a rollout of the {robot.label} differs in a new engine"
 
 
 def observes_a_pose_at_each_time(plugin: Plugin) -> None:
@@ -50,10 +50,10 @@ def observes_a_pose_at_each_time(plugin: Plugin) -> None:
         motion = robot.motion(robot.known)
         trajectory, count = engine.rollout(robot.world, motion), len(motion.observe_s)
         shapes = np.shape(trajectory.positions_m), np.shape(trajectory.orientations)
-        assert shapes == ((count, 3), (count, 4)), f"for {count} times of the {robot.name} its shapes are {shapes}"
+        assert shapes == ((count, 3), (count, 4)), f"for {count} times of the {robot.label} its shapes are {shapes}"
         assert np.array_equal(trajectory.times_s, motion.observe_s), "its times are not those of `observe_s`"
         finite = np.isfinite(trajectory.positions_m).all()
-        assert finite, f"the known genome of the {robot.name} has positions that are not finite"
+        assert finite, f"the known genome of the {robot.label} has positions that are not finite"
 
 
 def runs_many_as_each(plugin: Plugin) -> None:
@@ -66,13 +66,13 @@ def runs_many_as_each(plugin: Plugin) -> None:
             for column, world in enumerate(worlds):
                 alone = engine.rollout(world, motion).positions_m
                 same = np.array_equal(many.positions_m[row, column], alone, equal_nan=True)
-                assert same, f"of many rollouts of the {robot.name}, one differs from the same alone"
+                assert same, f"of many rollouts of the {robot.label}, one differs from the same alone"
 
 
 def honours_what_it_says(plugin: Plugin) -> None:
     """Changes its trajectories with the coefficients that it honours, and with no others."""
     for name, value in (("static_friction", 1.37), ("dynamic_friction", 0.41), ("restitution", 0.53)):
-        changed = [robot.name for engine, robot in pairs(plugin) if _changes(engine, robot, **{name: value})]
+        changed = [robot.label for engine, robot in pairs(plugin) if _changes(engine, robot, **{name: value})]
         if f"material.{name}" in plugin.honours:
             assert changed, f"`honours` has material.{name}, which changes no trajectory"
         else:

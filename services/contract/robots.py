@@ -11,14 +11,14 @@ Plugin = type[Robot]
 
 def names_an_engine_that_runs_it(plugin: Plugin) -> None:
     """Names an engine that can run it."""
-    robot = plugin()
+    robot = plugin.example()
     assert robot.engine in engines, f"its engine {robot.engine!r} is none of {', '.join(engines)}"
     assert engines[robot.engine].runs(robot.world), f"its engine {robot.engine!r} cannot run its world"
 
 
 def has_its_known_genome_in_its_space(plugin: Plugin) -> None:
     """Has a known genome within the bounds of its space."""
-    robot = plugin()
+    robot = plugin.example()
     known, size = np.asarray(robot.known), robot.space.size
     assert known.shape == (size,), f"its known genome has the shape {known.shape}, its space {size} genes"
     inside = bool(np.all((known >= robot.space.lower) & (known <= robot.space.upper)))
@@ -27,7 +27,7 @@ def has_its_known_genome_in_its_space(plugin: Plugin) -> None:
 
 def drives_every_actuator(plugin: Plugin) -> None:
     """Describes motions with targets for every actuator, all observed at the same times."""
-    robot = plugin()
+    robot = plugin.example()
     motions = [robot.motion(genome) for genome in robot.space.draw(20, np.random.default_rng(0))]
     actuators = len(robot.world.actuators) or 1
     same = all(np.array_equal(motion.observe_s, motions[0].observe_s) for motion in motions)
@@ -43,7 +43,7 @@ def drives_every_actuator(plugin: Plugin) -> None:
 
 def rates_many_trajectories_as_each(plugin: Plugin) -> None:
     """Returns for many trajectories at once the fitness of each."""
-    robot = plugin()
+    robot = plugin.example()
     observe_s = robot.motion(robot.known).observe_s
     positions_m = np.random.default_rng(0).normal(size=(4, 5, len(observe_s), 3))
     upright = np.broadcast_to([0.0, 0, 0, 1], (*positions_m.shape[:3], 4))
@@ -57,7 +57,7 @@ def rates_many_trajectories_as_each(plugin: Plugin) -> None:
 
 def has_no_fitness_of_failed_physics(plugin: Plugin) -> None:
     """Returns nan for a trajectory of nan."""
-    robot = plugin()
+    robot = plugin.example()
     observe_s = robot.motion(robot.known).observe_s
     nothing = Trajectory(observe_s, np.full((len(observe_s), 3), np.nan), np.full((len(observe_s), 4), np.nan))
     fitness = float(robot.fitness(nothing))

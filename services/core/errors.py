@@ -15,6 +15,7 @@
     │   └── StoreDamaged         its file is damaged
     ├── SupervisorUnavailable   the supervisor hangs, or ends again and again
     ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
+    ├── InvalidRobot         a URDF or MJCF has what a World has no place for, or what no rigid body has
     ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
     │   └── RayGone              Ray died or stands still; only a new process gets another
@@ -133,6 +134,18 @@ class SupervisorUnavailable(GaplabError):
 
 class InvalidArchive(GaplabError):
     """The file is not a valid archive; the message says where."""
+
+
+class InvalidRobot(GaplabError):
+    """A robot's URDF or MJCF cannot be imported, or tuned values cannot be written into it.
+
+    Attributes:
+        reasons: a sentence each.
+    """
+
+    def __init__(self, reasons: Iterable[str]) -> None:
+        self.reasons = tuple(reasons)
+        super().__init__("; ".join(self.reasons))
 
 
 class Unsupported(GaplabError):

@@ -52,8 +52,8 @@ def _of_hull(mass_kg: float, points: FloatArray) -> Inertia:
     centroid = (volumes[:, None] * sums).sum(axis=0) / 4 / volumes.sum()
     second = np.einsum("f,fi,fj->ij", volumes, sums, sums) + np.einsum("f,fvi,fvj->ij", volumes, corners, corners)
     spread = second / 20 / volumes.sum() - np.outer(centroid, centroid)
-    moments, axes = np.linalg.eigh(mass_kg * (np.trace(spread) * np.eye(3) - spread))
-    x, y, z = moments.tolist()
+    moments, axes = np.linalg.eigh(np.trace(spread) * np.eye(3) - spread)  # of 1 kg: a mass must not turn them
+    x, y, z = (mass_kg * moments).tolist()
     return Inertia((x, y, z), _turn_of(axes))
 
 

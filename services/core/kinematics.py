@@ -4,8 +4,6 @@ They are used as the engine returns them. scipy's `Rotation` would normalise the
 bodies by 1e-8, and refuses the nan of failed physics.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
@@ -28,7 +26,8 @@ def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple
     positions = np.empty((len(poses), len(places), 3))
     orientations = np.empty((len(poses), len(places), 4))
     positions[:, 0], orientations[:, 0] = poses[:, :3], poses[:, 3:]
-    for joint, angles in _outwards(world, angles_rad):
+    for number in _outwards(world):
+        joint, angles = world.joints[number], angles_rad[:, number]
         parent, child = places[joint.parent], places[joint.child]
         frame = positions[:, parent], orientations[:, parent]
         positions[:, child], orientations[:, child] = _carried(joint, *frame, angles)
@@ -61,16 +60,18 @@ def observes_base(world: World) -> bool:
     return not world.observed or world.observed == world.bodies[0].name
 
 
-def _outwards(world: World, angles_rad: FloatArray) -> Iterator[tuple[Joint, FloatArray]]:
-    """Yield joints with their angles `(k,)`, each after the joint of its parent."""
+def _outwards(world: World) -> tuple[int, ...]:
+    """Return the numbers of the joints, each after the joint of its parent, and else in the world's order."""
     placed = {world.bodies[0].name}
-    left = list(zip(world.joints, angles_rad.T, strict=True))
+    order: list[int] = []
+    left = list(enumerate(world.joints))
     while left:
-        for joint, angles in left:
+        for number, joint in left:
             if joint.parent in placed:
                 placed.add(joint.child)
-                yield joint, angles
-        left = [pair for pair in left if pair[0].child not in placed]
+                order.append(number)
+        left = [pair for pair in left if pair[1].child not in placed]
+    return tuple(order)
 
 
 def _carried(joint: Joint, position: FloatArray, turn: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -136,16 +137,26 @@ def about(axis: FloatArray, angles_rad: FloatArray) -> FloatArray:
 def product(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return `(..., 4)`: rotation `first`, followed by `second` within the rotated frame."""
     (v, w), (u, s) = (first[..., :3], first[..., 3:]), (second[..., :3], second[..., 3:])
-    return np.concatenate([w * u + s * v + np.cross(v, u), w * s - np.sum(v * u, axis=-1, keepdims=True)], axis=-1)
+    return np.concatenate([w * u + s * v + _cross(v, u), w * s - np.sum(v * u, axis=-1, keepdims=True)], axis=-1)
 
 
 def rotated(rotations: FloatArray, vector: FloatArray) -> FloatArray:
     """Return `(..., 3)`: vectors `(..., 3)` rotated by `(..., 4)`."""
     v, w = rotations[..., :3], rotations[..., 3:]
-    across = 2 * np.cross(v, vector)
-    return np.asarray(vector + w * across + np.cross(v, across))
+    across = 2 * _cross(v, vector)
+    return np.asarray(vector + w * across + _cross(v, across))
 
 
 def inverse(rotations: FloatArray) -> FloatArray:
     """Return `(..., 4)`: the rotations back."""
     return np.asarray(rotations * np.array([-1.0, -1.0, -1.0, 1.0]))
+
+
+def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return `(..., 3)`: cross products, to the bit as numpy's, in a third of its time for few vectors."""
+    x, y, z = first[..., 0], first[..., 1], first[..., 2]
+    u, v, w = second[..., 0], second[..., 1], second[..., 2]
+    ahead = y * w - z * v
+    found = np.empty((*ahead.shape, 3))
+    found[..., 0], found[..., 1], found[..., 2] = ahead, z * u - x * w, x * v - y * u
+    return found

@@ -10,8 +10,8 @@ from gaplab.services.core.space import Space
 
 def sample_violations(sample: KnownSample, robot: Robot) -> Iterator[Violation]:
     """Yield what is wrong with a sample from before an experiment."""
-    yield from _genome_violations(sample.genome, robot.name, robot.space)
-    yield from unit_violations(robot.name, sample.unit, robot.unit)
+    yield from _genome_violations(sample.genome, robot.label, robot.space)
+    yield from unit_violations(robot.label, sample.unit, robot.unit)
     if sample.readings is not None:
         yield from readings_violations(sample.readings, len(sample.values), robot.sensors)
 

@@ -1,4 +1,11 @@
-"""The law of a PD motor: four constants for a rollout, and a torque in each step that compiled code can compute too."""
+"""The law of a PD motor: four constants for a rollout, and a torque in each step that compiled code can compute too.
+
+A joint whose motor gives the torque t ends a step of length h at the speed c + h w t, where w is its inverse inertia,
+and c is its coasting speed, that without its motor. With these, the formulas of PDMotor are solved for t:
+
+- position: (kp (u - q - h c) - kd c) / (1 + h (kd + h kp) w),
+- velocity: kd (u - c) / (1 + h kd w).
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,7 +17,7 @@ STIFFNESS, DAMPING, FEED, STRONGEST = 0, 1, 2, 3
 
 
 class PDLaw(NamedTuple):
-    """The torque of a PDMotor: stiffness (u - q) - damping v + feed u, limited to ± strongest.
+    """The torque of a PDMotor: stiffness (u - q) - damping c + feed u, limited to ± strongest.
 
     Attributes:
         stiffness: N·m/rad; N/m for a joint that slides, and likewise below.
@@ -26,12 +33,11 @@ class PDLaw(NamedTuple):
 
 
 def pd_law(motor: PDMotor, inverse_inertia: float, step_s: float) -> PDLaw:
-    """Return the law of a motor, whose formulas are those of PDMotor.
+    """Return the law of a motor.
 
     Args:
         motor: motor.
-        inverse_inertia: acceleration of the joint by torque at the start of a rollout, all other joints and the base
-            free: its place in the diagonal of the inverse of the inertia matrix, with armatures, 1/(kg m²).
+        inverse_inertia: acceleration of the joint by torque, 1/(kg m²): see `inverse_inertias`.
         step_s: time step.
     """
     kp, kd, strongest = motor.kp, motor.kd, motor.max_torque_nm
@@ -44,17 +50,18 @@ def pd_law(motor: PDMotor, inverse_inertia: float, step_s: float) -> PDLaw:
     return PDLaw(kp / divisor, (kd + step_s * kp) / divisor, 0.0, strongest)
 
 
-def pd_torque(target: float, angle: float, speed: float, law: Sequence[float], at: int = 0) -> float:
+def pd_torque(target: float, angle: float, coasting: float, law: Sequence[float], at: int = 0) -> float:
     """Return the torque of a motor in a step; nan if any number is nan.
 
     Args:
         target: its target.
         angle: of its joint at the start of the step.
-        speed: likewise.
+        coasting: speed of its joint at the end of the step without the motor; the speed at its start, if all else that
+            moves the joint is unknown, makes the motor give way by more than load / kp.
         law: constants of a PDLaw, `(≥ at + 4,)`.
         at: index of the first.
     """
-    asked = law[at + STIFFNESS] * (target - angle) - law[at + DAMPING] * speed + law[at + FEED] * target
+    asked = law[at + STIFFNESS] * (target - angle) - law[at + DAMPING] * coasting + law[at + FEED] * target
     if asked > law[at + STRONGEST]:
         return law[at + STRONGEST]
     if asked < -law[at + STRONGEST]:

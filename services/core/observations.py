@@ -2,15 +2,18 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m, inverse, rotated
+from gaplab.services.core.clearances import Clearances
+from gaplab.services.core.kinematics import TOUCHING_M, inverse, rotated
 from gaplab.services.core.world import Body, Noise, World
 
 AXES = ("x", "y", "z")
+WORLDS_KEPT = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +96,12 @@ def _tilt(world: World, bearing: Bearing) -> FloatArray:
 
 
 def _contacts(world: World, bearing: Bearing) -> FloatArray:
-    positions, orientations = body_poses(world, bearing.poses, bearing.angles_rad)
-    places = {body.name: place for place, body in enumerate(world.bodies)}
-    touching = np.empty((len(bearing.poses), len(feet(world))))
-    for column, foot in enumerate(feet(world)):
-        place = places[foot.name]
-        touching[:, column] = clearances_m(foot, positions[:, place], orientations[:, place]) < TOUCHING_M
-    return touching
+    return (_clearances(world)(bearing.poses, bearing.angles_rad) < TOUCHING_M).astype(float)
+
+
+@lru_cache(maxsize=WORLDS_KEPT)
+def _clearances(world: World) -> Clearances:
+    return Clearances(world, feet(world))
 
 
 _GROUPS: Mapping[str, _Group] = MappingProxyType(

@@ -1,7 +1,9 @@
 """Shapes of bodies, and their places. SI units; lengths of boxes are full edges, not halves."""
 
-from dataclasses import dataclass
-from typing import TypeAlias
+from dataclasses import dataclass, field
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -20,6 +22,7 @@ class Box:
     """A cuboid with edges `size_m`."""
 
     size_m: Vector
+    kind: Literal["box"] = field(default="box", kw_only=True, repr=False)
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class Sphere:
     """A ball."""
 
     radius_m: float
+    kind: Literal["sphere"] = field(default="sphere", kw_only=True, repr=False)
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,7 @@ class Capsule:
 
     radius_m: float
     length_m: float
+    kind: Literal["capsule"] = field(default="capsule", kw_only=True, repr=False)
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,7 @@ class Cylinder:
 
     radius_m: float
     length_m: float
+    kind: Literal["cylinder"] = field(default="cylinder", kw_only=True, repr=False)
 
 
 @dataclass(frozen=True)
@@ -50,9 +56,11 @@ class Hull:
     """The convex hull of points, of which there are at most `MOST_VERTICES`."""
 
     points_m: tuple[Vector, ...]
+    kind: Literal["hull"] = field(default="hull", kw_only=True, repr=False)
 
 
-Shape: TypeAlias = Box | Sphere | Capsule | Cylinder | Hull
+Shape: TypeAlias = Annotated[Box | Sphere | Capsule | Cylinder | Hull, Field(discriminator="kind")]
+"""A solid shape; its `kind` says in a robot file which it is."""
 
 
 @dataclass(frozen=True)

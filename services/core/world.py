@@ -87,14 +87,14 @@ class Motor:
 class PDMotor:
     """A motor whose torque follows from its target; for a joint that slides, N in place of N·m and m in place of rad.
 
-    With target u, angle q, speed v, time step h, and the inverse inertia w that the joint has at the start of a
-    rollout, its torque is the one that would act at the end of the step if the joint moved alone:
+    With target u, and the angle q and the speed v that the joint has at the end of a time step, its torque is
 
-    - position: (kp (u - q - h v) - kd v) / (1 + h (kd + h kp) w),
-    - velocity: kd (u - v) / (1 + h kd w),
+    - position: kp (u - q) - kd v,
+    - velocity: kd (u - v),
     - torque: u,
 
-    each limited to ± `max_torque_nm`. Source: gaplab; a linearly implicit Euler step of one joint.
+    each limited to ± `max_torque_nm`. Engines solve for the end of the step as far as they can: such a motor is stable
+    at any strength, and gives way by load / kp. Source: gaplab; a linearly implicit Euler step.
 
     Attributes:
         follows: what its target is.

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Loop, Motion, Trajectory
+from gaplab.services.core.motions import Loop, Motion, Trajectory, open_loop
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import Engine
 
@@ -38,7 +38,7 @@ class Analytic(Engine):
         """Return all glides at once."""
         materials = [each.material for each in worlds]
         coefficients = np.array([(each.static_friction, each.dynamic_friction, each.restitution) for each in materials])
-        targets = np.array([_first_target(motion) for motion in motions])
+        targets = np.array([open_loop(motion).targets[0, 0] for motion in motions])
         times_s = motions[0].observe_s
         positions_m = np.zeros((len(motions), len(worlds), len(times_s), 3))
         positions_m[..., 0] = speed(targets[:, None], *coefficients.T)[..., None] * times_s
@@ -58,9 +58,3 @@ def speed(
 
 def _bump(distance: FloatArray) -> FloatArray:
     return np.asarray(np.exp(-(distance**2)))
-
-
-def _first_target(motion: Motion | Loop) -> float:
-    if isinstance(motion, Loop):
-        raise TypeError("the engine 'analytic' closes no loops: choose a controller that acts in advance")
-    return float(motion.targets[0, 0])

@@ -10,6 +10,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
+from gaplab.services.experiments.stored_robots import with_stored_robot
 from gaplab.services.settings import Limits
 from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts
@@ -35,7 +36,8 @@ def estimate(
         InvalidSpec: the spec is invalid; the error has every violation, as on submission.
         StoreUnavailable: the database cannot be used now.
     """
-    resolved = resolve_study(spec) if isinstance(spec, StudySpec) else (resolve_experiment(spec),)
+    meant = with_stored_robot(store, spec)
+    resolved = resolve_study(meant) if isinstance(meant, StudySpec) else (resolve_experiment(meant),)
     check_extent(resolved, limits)
     with store.reading() as session:
         measured = _measured(costs.latest(session, LATEST))

@@ -1,5 +1,6 @@
 """The catalogue: everything that specs can name."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 
 from gaplab.schemas.plugin import BudgetRead, Catalogue, PluginRead
@@ -7,6 +8,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tasks import tasks
@@ -18,11 +20,16 @@ from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.specs.presets import PRESETS
 
 
-def catalogue() -> Catalogue:
-    """Return every plug-in of every kind, by name, and the named budgets."""
+def catalogue(stored: Sequence[PluginRead] = ()) -> Catalogue:
+    """Return every plug-in of every kind, by name, and the named budgets.
+
+    Args:
+        stored: entries of the stored robots, which specs name as they do plug-ins.
+    """
+    own = [robot for robot in robots.describe() if robot.name != IMPORTED]
     return Catalogue(
         strategies=strategies.describe(),
-        robots=tuple(map(_with_engine_of_here, robots.describe())),
+        robots=(*map(_with_engine_of_here, own), *stored),
         engines=engines.describe(),
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),

@@ -1,15 +1,16 @@
 """Pictures of a replay: both worlds side by side, seen by one camera that follows the robot, as on the page."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from gaplab.schemas.replays import Replay, ReplayWorld, Shape
+from gaplab.schemas.replays import Framing, Replay, ReplayWorld, Shape
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import product, rotated
-from gaplab.services.replay.painting import Camera, Solid, paint
+from gaplab.services.replay.painting import Camera, Colour, Scenery, Solid, paint
+from gaplab.services.replay.polyhedra import Polyhedron, box, cylinder, polyhedron
 
 TURN_RAD, RISE_RAD, DISTANCE_M = -1.0, 0.35, 1.25
 """Where the page's camera begins."""
@@ -17,7 +18,6 @@ TURN_RAD, RISE_RAD, DISTANCE_M = -1.0, 0.35, 1.25
 APART = 2.2
 """Metres of distance for each metre between a base and the point between both."""
 
-TARGET_HEIGHT_M = 0.12
 SMOOTHING = 12
 """Frames to each side over which the path of the camera is averaged."""
 
@@ -25,13 +25,34 @@ BAR = 0.12
 """Height of the titles, as a share of the height of a world."""
 
 INK, PAPER = (34, 34, 34), (255, 255, 255)
-COLOURS = {
-    "trunk": (0, 114, 178),
-    "limb": (123, 135, 148),
-    "foot": (240, 196, 138),
-    "foot on the ground": (213, 94, 0),
-}
-"""The light colours of the page."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Light or dark colours of the page: by role, and those behind the robot."""
+
+    colours: Mapping[str, Colour]
+    scenery: Scenery
+
+
+LIGHT = Look(
+    {
+        "trunk": (0, 114, 178),
+        "limb": (123, 135, 148),
+        "foot": (240, 196, 138),
+        "foot on the ground": (213, 94, 0),
+    },
+    Scenery(),
+)
+DARK = Look(
+    {
+        "trunk": (86, 180, 233),
+        "limb": (152, 164, 179),
+        "foot": (138, 106, 60),
+        "foot on the ground": (255, 154, 61),
+    },
+    Scenery(floor=(29.0, 36.0, 45.0), other=(39.0, 48.0, 59.0), sky=(18.0, 22.0, 28.0), shadow=0.45),
+)
 
 
 @dataclass(frozen=True)
@@ -63,10 +84,11 @@ def pictures(replay: Replay, *, every: int, width_px: int) -> Iterator[Image.Ima
     size = (width_px // max(1, len(worlds)), round(width_px / 3 / 2) * 2)
     paths = [world.path for world in worlds]
     for frame in range(0, len(replay.times_s) if worlds else 0, every):
-        camera = _camera([path[frame] for path in paths], size)
+        bases = [path[frame] for path in paths]
         whole = Image.new("RGB", (size[0] * len(worlds), size[1] + _bar(size)), PAPER)
         for place, world in enumerate(worlds):
             solids = _solids(world, frame, replay.times_s[frame])
+            camera = camera_at(bases, size, replay.framing, world.world.slope_rad)
             whole.paste(paint(solids, camera), (place * size[0], _bar(size)))
             _write(whole, world.title, (place * size[0] + 8, 0), size)
         _write(whole, f"{replay.times_s[frame]:.2f} s", (8, size[1] - _bar(size) // 2), size)
@@ -88,13 +110,21 @@ def _worlds(replay: Replay) -> list[_Moving]:
     ]
 
 
-def _camera(bases: list[FloatArray], size: tuple[int, int]) -> Camera:
+def camera_at(bases: list[FloatArray], size: tuple[int, int], framing: Framing, slope_rad: float) -> Camera:
+    """Return the page's camera at its beginning, which sees all robots.
+
+    Args:
+        bases: `(2,)` each: where the robots are.
+        size: width and height of the picture in pixels.
+        framing: how large the robots are.
+        slope_rad: slope of the ground.
+    """
     middle = np.mean(bases, axis=0)
-    distance = DISTANCE_M + APART * max(float(np.linalg.norm(base - middle)) for base in bases)
-    target = np.array([*middle, TARGET_HEIGHT_M])
+    distance = DISTANCE_M * framing.scale + APART * max(float(np.linalg.norm(base - middle)) for base in bases)
+    target = np.array([*middle, framing.height_m])
     level = distance * np.cos(RISE_RAD)
     away = np.array([level * np.cos(TURN_RAD), level * np.sin(TURN_RAD), distance * np.sin(RISE_RAD)])
-    return Camera(target + away, target, size)
+    return Camera(target + away, target, size, scale=framing.scale, slope_rad=slope_rad)
 
 
 def _solids(world: _Moving, frame: int, time_s: float) -> list[Solid]:
@@ -104,18 +134,43 @@ def _solids(world: _Moving, frame: int, time_s: float) -> list[Solid]:
         for foot, intervals in zip(feet, world.world.contacts, strict=False)
         if any(begin <= time_s < end for begin, end in intervals)
     }
-    return [_solid(world, shape, frame, down) for shape in world.world.shapes if shape.kind != "plane"]
+    positions, orientations = world.positions[frame], world.orientations[frame]
+    return [
+        solid(shape, positions, orientations, colour_of(shape, down))
+        for shape in world.world.shapes
+        if shape.kind != "plane"
+    ]
 
 
-def _solid(world: _Moving, shape: Shape, frame: int, down: set[int | None]) -> Solid:
+def colour_of(shape: Shape, down: Collection[int | None], look: Look = LIGHT) -> Colour:
+    """Return the colour of a shape, given the feet on the ground."""
+    return look.colours["foot on the ground" if shape.role == "foot" and shape.body in down else shape.role]
+
+
+def solid(shape: Shape, positions: FloatArray, orientations: FloatArray, colour: Colour) -> Solid:
+    """Return what is painted of a shape.
+
+    Args:
+        shape: the shape; no plane.
+        positions: `(bodies, 3)`: positions of the bodies.
+        orientations: `(bodies, 4)`: orientations of the bodies.
+        colour: its colour.
+    """
     position, turn = np.array(shape.position_m), np.array(shape.orientation)
     if shape.body is not None:
-        body = world.orientations[frame, shape.body]
-        position = world.positions[frame, shape.body] + rotated(body, position)
+        body = orientations[shape.body]
+        position = positions[shape.body] + rotated(body, position)
         turn = product(body, turn)
-    role = "foot on the ground" if shape.role == "foot" and shape.body in down else shape.role
-    axes = np.stack([rotated(turn, axis) for axis in np.eye(3)])
-    return Solid(shape.kind, shape.size_m, position, axes, COLOURS[role])
+    return Solid(_body(shape), position, np.stack([rotated(turn, axis) for axis in np.eye(3)]), colour)
+
+
+def _body(shape: Shape) -> Polyhedron | tuple[float, float]:
+    if shape.kind == "hull":
+        return polyhedron(shape.vertices_m, shape.faces)
+    if shape.kind == "box":
+        return box((shape.size_m[0], shape.size_m[1], shape.size_m[2]))
+    radius, length = (*shape.size_m, 0.0)[:2]
+    return cylinder(radius, length) if shape.kind == "cylinder" else (radius, length)
 
 
 def _bar(size: tuple[int, int]) -> int:

@@ -7,11 +7,10 @@ from time import monotonic
 import numpy as np
 
 from gaplab.schemas.predictions import Prediction, Predictions
-from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins.external import imported_files
-from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
+from gaplab.services.replay.sent_specs import SentSpec, received, sent
 from gaplab.services.specs.assembly import edits_of, engine_of, refuse_missing
 from gaplab.services.specs.robots import robot_of, unit
 from gaplab.services.specs.simulation import Simulation
@@ -71,7 +70,7 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
     unknown.sort(key=lambda each: (each.iteration, each.repetition))
     if unknown:
         refuse_missing(spec)
-        pairs = process.call(predict, spec.model_dump_json(), unknown[:MOST_AT_ONCE], seconds)
+        pairs = process.call(predict, sent(spec), unknown[:MOST_AT_ONCE], seconds)
         for sample, pair in zip(unknown, pairs, strict=False):
             process.answers.keep(_key(place, sample), pair, SIZE_BYTES)
     items = _items(place, samples, process.answers)
@@ -84,18 +83,17 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
     )
 
 
-def predict(spec: str, samples: Sequence[TunedSample], seconds: float) -> list[Pair]:
+def predict(spec: SentSpec, samples: Sequence[TunedSample], seconds: float) -> list[Pair]:
     """Return the fitness of samples before and after tuning: of the first one, and of as many others as time permits.
 
     It is computed with the plug-ins as their files are now.
 
     Args:
-        spec: resolved spec, as JSON.
+        spec: resolved spec.
         samples: samples, with the simulators before and after them.
         seconds: time limit.
     """
-    imported.renewed()
-    read = ResolvedSpec.model_validate_json(spec)
+    read = received(spec)
     robot = robot_of(read)
     simulate = Simulation(robot, engine_of(read.engine), edits_of(ref.name for ref in read.tunables))
     found: list[Pair] = []

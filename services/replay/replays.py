@@ -6,10 +6,12 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import ControllerKind, Replay
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
+from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import ReplayChoice, ReplayRequest, compute_replay
+from gaplab.services.replay.sent_specs import sent
 from gaplab.services.specs.assembly import refuse_missing
 from gaplab.services.specs.hardware import is_computed
 from gaplab.services.specs.resolution import is_direct, takes_samples
@@ -56,7 +58,7 @@ def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choic
 
 def _refuse_impossible(row: ExperimentRow, spec: ResolvedSpec, choice: ReplayChoice) -> None:
     if not robot_of(spec).world.bodies:
-        message = f"the robot {spec.robot.name!r} has no body, so it has no motion to replay"
+        message = f"the robot {label_of(spec.robot)!r} has no body, so it has no motion to replay"
         raise InvalidSpec([Violation("id", row.id, message, "an experiment with a robot that has a body")])
     first = 1 if choice.kind is ControllerKind.SAMPLE else 0
     _refuse_outside("repetition", choice.repetition, 0, row.spec["repetitions"])
@@ -81,7 +83,7 @@ def _request(session: Session, row: ExperimentRow, spec: ResolvedSpec, choice: R
     return ReplayRequest(
         experiment=row.id,
         choice=choice,
-        spec=spec.model_dump_json(),
+        spec=sent(spec),
         genome=tuple(found.genome),
         simulator=simulator,
         parameters=None if simulator is None else _best(session, row.id, choice.repetition, simulator),

@@ -1,18 +1,17 @@
 """The rollouts of a replay: one controller in its simulator and in reality."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gaplab.schemas.replays import ControllerKind, Interval, Replay, ReplayReadings, ReplayWorld
-from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.replays import ControllerKind, Framing, Interval, Replay, ReplayReadings, ReplayWorld
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
 from gaplab.services.core.motions import Recording
 from gaplab.services.core.robots.base import Robot, Sensors
 from gaplab.services.core.world import World
-from gaplab.services.plugins.watching import imported
-from gaplab.services.replay.shapes import feet_of, labels, shapes_of
+from gaplab.services.replay.sent_specs import SentSpec, received
+from gaplab.services.replay.shapes import extent_of, feet_of, framing_of, labels, observed_of, shapes_of
 from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
@@ -50,7 +49,7 @@ class ReplayRequest:
     Attributes:
         experiment: id of the experiment.
         choice: choice of the controller.
-        spec: resolved spec, as JSON.
+        spec: resolved spec.
         genome: genome of the controller.
         simulator: the iteration of the simulator; None if the controller evolved in reality itself.
         parameters: parameters of the simulator.
@@ -62,7 +61,7 @@ class ReplayRequest:
 
     experiment: str
     choice: ReplayChoice
-    spec: str
+    spec: SentSpec
     genome: tuple[float, ...]
     simulator: int | None
     parameters: tuple[float, ...] | None
@@ -78,8 +77,7 @@ def compute_replay(request: ReplayRequest) -> bytes:
     Raises:
         EngineUnavailable: the library of an engine is not installed.
     """
-    imported.renewed()
-    spec, choice = ResolvedSpec.model_validate_json(request.spec), request.choice
+    spec, choice = received(request.spec), request.choice
     robot = robot_of(spec)
     genome = np.array(request.genome)
     observed = robot.motion(genome).observe_s
@@ -100,10 +98,12 @@ def compute_replay(request: ReplayRequest) -> bytes:
         iteration=choice.iteration,
         kind=choice.kind,
         simulator=request.simulator,
-        robot=robot.name,
+        robot=robot.label,
         unit=robot.unit,
         bodies=tuple(body.name for body in robot.world.bodies),
         feet=labels(robot.world),
+        observed=observed_of(robot.world),
+        framing=_framing(simulation, reality),
         times_s=tuple(times.tolist()),
         counted_s=(float(observed[0]), float(observed[-1])),
         simulation=simulation,
@@ -138,33 +138,48 @@ def _values(sensors: Sensors, readings: FloatArray) -> tuple[tuple[float | None,
 
 def _shown(robot: Robot, engine: str, world: World, recording: Recording, recorded: float | None) -> ReplayWorld:
     fitness = float(robot.fitness(recording.trajectory))
+    found = ReplayWorld(
+        engine=engine, fitness=None, recorded=recorded, shapes=shapes_of(world), slope_rad=world.slope_rad
+    )
     if not np.isfinite(fitness) or not np.all(np.isfinite(recording.poses)):
-        return ReplayWorld(engine=engine, fitness=None, recorded=recorded, shapes=shapes_of(world))
+        return found
     told = recording.angles_rad is not None
     bare = world if told else _base_alone(world)
     angles = recording.angles_rad if told else np.zeros((len(recording.times_s), 0))
     positions, orientations = body_poses(bare, recording.poses, np.asarray(angles))
-    return ReplayWorld(
-        engine=engine,
-        fitness=fitness,
-        recorded=recorded,
-        shapes=shapes_of(bare),
-        positions_m=_rows(positions, 3),
-        orientations=_rows(orientations, 4),
-        heights_m=tuple(_rounded(recording.poses[:, 2], 3).tolist()),
-        speeds_m_s=tuple(_rounded(_speeds(recording), 3).tolist()),
-        contacts=tuple(_contacts(bare, foot, positions, orientations, recording.times_s) for foot in feet_of(bare)),
+    followed = positions[:, observed_of(bare)]
+    return found.model_copy(
+        update={
+            "fitness": fitness,
+            "shapes": shapes_of(bare),
+            "positions_m": _rows(positions, 3),
+            "orientations": _rows(orientations, 4),
+            "heights_m": tuple(_rounded(followed[:, 2], 3).tolist()),
+            "speeds_m_s": tuple(_rounded(_speeds(recording, followed), 3).tolist()),
+            "contacts": tuple(
+                _contacts(bare, foot, positions, orientations, recording.times_s) for foot in feet_of(bare)
+            ),
+        }
     )
 
 
+def _framing(*worlds: ReplayWorld | None) -> Framing:
+    """Return the framing of the first world with a motion, at its start."""
+    for world in worlds:
+        if world is not None and world.positions_m:
+            positions = np.array(world.positions_m[0]).reshape(-1, 3)
+            return framing_of(*extent_of(world.shapes, positions, np.array(world.orientations[0]).reshape(-1, 4)))
+    return Framing()
+
+
 def _base_alone(world: World) -> World:
-    return World(bodies=world.bodies[:1], material=world.material, start_height_m=world.start_height_m)
+    return replace(world, bodies=world.bodies[:1], joints=(), observed="", origin=None, edits=frozenset())
 
 
-def _speeds(recording: Recording) -> FloatArray:
-    """Return the speed of the base over ground, `(frames,)` in m/s, in the direction of the whole motion."""
+def _speeds(recording: Recording, positions: FloatArray) -> FloatArray:
+    """Return the speed of positions `(frames, 3)` over ground, `(frames,)` in m/s, towards the end of the motion."""
     travelled = recording.trajectory.positions_m[-1, :2] - recording.trajectory.positions_m[0, :2]
-    way = recording.poses[:, :2] @ (travelled / max(float(np.linalg.norm(travelled)), 1e-12))
+    way = positions[:, :2] @ (travelled / max(float(np.linalg.norm(travelled)), 1e-12))
     frames = np.arange(len(way))
     before, after = np.maximum(frames - AROUND_FRAMES, 0), np.minimum(frames + AROUND_FRAMES, len(way) - 1)
     return np.asarray(

@@ -1,19 +1,51 @@
-"""The shapes that draw a World: its bodies, the struts between joints and distant bodies, and the ground."""
+"""The shapes that draw a World: the parts of its bodies, struts to bodies far from their joints, and the ground."""
 
 import numpy as np
 
-from gaplab.schemas.replays import Orientation, Position, Shape
+from gaplab.schemas.replays import Framing, Orientation, Position, Shape, ShapeKind, ShapeRole
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.shapes import Box
-from gaplab.services.core.world import Body, World
+from gaplab.services.core.kinematics import rotated
+from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Vector
+from gaplab.services.core.shapes import Shape as Solid
+from gaplab.services.core.world import World
+from gaplab.services.replay.polyhedra import SIGNS, Face, hull_faces
 
 SLENDER = 0.4
-"""Radius of a strut, as a factor of the radius of its body."""
+"""Radius of a strut, as a factor of the radius of its part."""
+
+MOST_FEET = 8
+"""Largest number of feet of which a replay tells the contacts."""
+
+USUAL_SIZE_M = 0.75
+"""Diagonal of the box round a robot that the camera sees from its usual distance; the quadruped has 0.6."""
+
+LOOKED_AT_M = 0.12
+"""Least height that the camera looks at from there."""
+
+
+def observed_of(world: World) -> int:
+    """Return the index of the body whose motion fitness rates."""
+    names = [body.name for body in world.bodies]
+    return names.index(world.observed) if world.observed else 0
 
 
 def feet_of(world: World) -> tuple[int, ...]:
-    """Return the indices of the feet: all bodies that collide with the ground, except the base."""
-    return tuple(place for place, body in enumerate(world.bodies) if place and body.collides)
+    """Return the indices of the feet: bodies that collide with the ground and carry no other such body.
+
+    The base is none. If only one body of a robot that moves would be left, as in a snake, all bodies that collide are
+    feet; of more than `MOST_FEET`, some are taken at equal distances in the list of bodies.
+    """
+    names = [body.name for body in world.bodies]
+    parents = {names.index(joint.child): names.index(joint.parent) for joint in world.joints}
+    touching = [place for place, body in enumerate(world.bodies) if place and body.touches]
+    carrying: set[int] = set()
+    for place in touching:
+        while (place := parents.get(place, 0)) and place not in carrying:
+            carrying.add(place)
+    outer = [place for place in touching if place not in carrying]
+    feet = outer if len(outer) > 1 or world.fixed else touching
+    chosen = np.linspace(0, len(feet) - 1, min(len(feet), MOST_FEET)).round().astype(int)
+    return tuple(feet[place] for place in chosen)
 
 
 def labels(world: World) -> tuple[str, ...]:
@@ -27,33 +59,115 @@ def labels(world: World) -> tuple[str, ...]:
 def shapes_of(world: World) -> tuple[Shape, ...]:
     """Return all visible shapes of a world."""
     ground = Shape(body=None, kind="plane", size_m=(), role="ground")
-    return (ground, *(shape for place in range(len(world.bodies)) for shape in _shapes(world, place)))
+    feet, observed = set(feet_of(world)), observed_of(world) if world.bodies else None
+    found = [ground]
+    for place, body in enumerate(world.bodies):
+        if place and (strut := _strut(place, body.parts)):
+            found.append(strut)
+        own: ShapeRole = "trunk" if place == observed else "limb"
+        found += [_shape(place, part, "foot" if place in feet and part.collides else own) for part in body.parts]
+    return tuple(found)
 
 
-def _shapes(world: World, place: int) -> tuple[Shape, ...]:
-    body = world.bodies[place]
-    box = isinstance(body.shape, Box)
-    own = Shape(
+def extent_of(
+    shapes: tuple[Shape, ...], positions: FloatArray, orientations: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the greatest coordinates `(3,)` of a robot; 0 for one without shapes.
+
+    Args:
+        shapes: shapes of its world.
+        positions: `(bodies, 3)`: positions of the bodies.
+        orientations: `(bodies, 4)`: their orientations.
+    """
+    clouds = [np.zeros((0, 3))]
+    for shape in shapes:
+        if shape.body is not None:
+            places = rotated(np.array(shape.orientation), _outline(shape)) + shape.position_m
+            clouds.append(positions[shape.body] + rotated(orientations[shape.body], places))
+    points = np.concatenate(clouds)
+    return (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
+
+
+def framing_of(low: FloatArray, high: FloatArray) -> Framing:
+    """Return from how far away a robot with this extent is seen: a large one and a small one fill a picture alike.
+
+    The scale is a power of 2, so that the squares of the ground keep round sizes.
+    """
+    size = max(float(np.linalg.norm(high - low)), 1e-3)
+    scale = float(2.0 ** np.round(np.log2(size / USUAL_SIZE_M)))
+    return Framing(scale=scale, height_m=round(max(LOOKED_AT_M * scale, float(low[2] + high[2]) / 2), 4))
+
+
+def _outline(shape: Shape) -> FloatArray:
+    """Return points `(n, 3)` of a shape's frame between which it is, closely enough to frame it."""
+    if shape.kind == "hull":
+        return np.array(shape.vertices_m)
+    if shape.kind == "box":
+        return np.asarray(np.array(SIGNS) * np.array(shape.size_m))
+    radius, length, round_end = shape.size_m[0], (*shape.size_m, 0.0)[1], shape.kind != "cylinder"
+    return np.asarray(np.array(SIGNS) * np.array([2 * radius, 2 * radius, length + 2 * radius * round_end]))
+
+
+def _shape(place: int, part: Part, role: ShapeRole) -> Shape:
+    kind, size = _kind_and_size(part.shape)
+    vertices, faces = _rounded_hull(part.shape) if isinstance(part.shape, Hull) else ((), ())
+    return Shape(
         body=place,
-        kind="box" if box else "sphere",
-        size_m=body.shape.size_m if isinstance(body.shape, Box) else (body.shape.radius_m,),
-        position_m=body.center_m,
-        role="trunk" if place == 0 else "foot" if body.collides else "limb",
+        kind=kind,
+        size_m=size,
+        position_m=part.center_m,
+        orientation=part.turn,
+        role=role,
+        vertices_m=vertices,
+        faces=faces,
     )
-    away = np.array(body.center_m)
-    if place == 0 or np.linalg.norm(away) <= 1.001 * _reach(body):
-        return (own,)
-    return (_strut(place, away, SLENDER * _reach(body)), own)
 
 
-def _reach(body: Body) -> float:
-    return max(body.shape.size_m) / 2 if isinstance(body.shape, Box) else body.shape.radius_m
+def _kind_and_size(solid: Solid) -> tuple[ShapeKind, tuple[float, ...]]:
+    match solid:
+        case Box():
+            return "box", solid.size_m
+        case Capsule():
+            return "capsule", (solid.radius_m, solid.length_m)
+        case Cylinder():
+            return "cylinder", (solid.radius_m, solid.length_m)
+        case Hull():
+            return "hull", ()
+        case _:
+            return "sphere", (solid.radius_m,)
 
 
-def _strut(place: int, away: FloatArray, radius_m: float) -> Shape:
-    middle: Position = tuple((away / 2).tolist())
-    size = (radius_m, float(np.linalg.norm(away)))
-    return Shape(body=place, kind="capsule", size_m=size, position_m=middle, orientation=_from_z(away), role="limb")
+def _rounded_hull(hull: Hull) -> tuple[tuple[Vector, ...], tuple[Face, ...]]:
+    """Return corners, rounded to 0.01 mm, and faces of a hull."""
+    vertices, faces = hull_faces(hull.points_m)
+    return tuple((round(x, 5), round(y, 5), round(z, 5)) for x, y, z in vertices), faces
+
+
+def _strut(place: int, parts: tuple[Part, ...]) -> Shape | None:
+    """Return a strut from the joint to the nearest part of a body; None if a part is at the joint."""
+    away = [np.array(part.center_m) for part in parts]
+    gaps = [float(np.linalg.norm(to)) - 1.001 * _reach(part.shape)[0] for to, part in zip(away, parts, strict=True)]
+    if not gaps or min(gaps) <= 0:
+        return None
+    nearest = gaps.index(min(gaps))
+    along, radius = away[nearest], SLENDER * _reach(parts[nearest].shape)[1]
+    middle: Position = tuple((along / 2).tolist())
+    size = (radius, float(np.linalg.norm(along)))
+    return Shape(body=place, kind="capsule", size_m=size, position_m=middle, orientation=_from_z(along), role="limb")
+
+
+def _reach(solid: Solid) -> tuple[float, float]:
+    """Return how far a solid reaches from its centre at most, and its radius as that of a strut follows from it."""
+    match solid:
+        case Box():
+            return max(solid.size_m) / 2, max(solid.size_m) / 2
+        case Capsule() | Cylinder():
+            return solid.length_m / 2 + solid.radius_m, solid.radius_m
+        case Hull():
+            points = np.array(solid.points_m)
+            return float(np.linalg.norm(points, axis=1).max()), float(np.ptp(points, axis=0).min()) / 2
+        case _:
+            return solid.radius_m, solid.radius_m
 
 
 def _from_z(away: FloatArray) -> Orientation:

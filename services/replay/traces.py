@@ -8,7 +8,6 @@ import numpy as np
 
 from gaplab.schemas.measurements import MeasurementSpec
 from gaplab.schemas.records import MeasurementKind
-from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.traces import AlignedTrace, TracesRead, TracesSpec
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
@@ -17,8 +16,8 @@ from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.trace_tables import read_trace
 from gaplab.services.core.traces import TooShort, Trace, align, from_start
-from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.process import RolloutProcess
+from gaplab.services.replay.sent_specs import SentSpec, received, sent
 from gaplab.services.specs.assembly import edits_of, engine_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
@@ -44,7 +43,7 @@ class Expected:
         until_s: length of the motion.
     """
 
-    spec: str
+    spec: SentSpec
     genome: tuple[float, ...]
     parameters: tuple[float, ...]
     until_s: float
@@ -73,7 +72,7 @@ def evaluate_traces(store: Store, process: RolloutProcess, request: str, spec: T
         raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
     robot, traces = robot_of(resolved), [read_trace(*table) for table in tables]
     until_s = max([float(robot.motion(frozen(genome)).observe_s[-1]), *robot.sensors.times_s.tolist()])
-    wanted = Expected(resolved.model_dump_json(), genome, tuple(simulators[0]), until_s)
+    wanted = Expected(sent(resolved), genome, tuple(simulators[0]), until_s)
     expected = _trace_of(*process.call(expected_motion, wanted))
     return _evaluated(robot, frozen(genome), traces, expected, spec)
 
@@ -87,8 +86,7 @@ def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec
 
 def expected_motion(wanted: Expected) -> tuple[FloatArray, FloatArray]:
     """Return times `(k,)` and poses `(k, 7)` of a controller in a simulator; nan if the physics failed."""
-    imported.renewed()
-    spec, genome = ResolvedSpec.model_validate_json(wanted.spec), np.array(wanted.genome)
+    spec, genome = received(wanted.spec), np.array(wanted.genome)
     robot = robot_of(spec)
     end_s = min(wanted.until_s, float(robot.motion(genome).observe_s[-1]))
     times = np.unique(np.append(np.arange(int(end_s * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S, end_s))
@@ -137,7 +135,7 @@ def _evaluated(
             continue
         values.append(float(robot.fitness(from_start(trace, found.lag_s, observe_s))))
         if not isfinite(values[-1]):
-            message = f"the {robot.name} computes no finite fitness from this trace"
+            message = f"the {robot.label} computes no finite fitness from this trace"
             violations.append(Violation(f"/traces/{place}", digest, message))
         if sensors.size:
             seen = robot.sense(from_start(trace, found.lag_s, sensors.times_s))

@@ -25,7 +25,7 @@ def outcome_report(outcome: ExperimentOutcome) -> Report:
         Section("Provenance", tables.provenance(outcome.facts) or (Paragraph("Its versions are not stored."),)),
         Section("How to compute it again", tuple(Paragraph(sentence) for sentence in instructions(experiment.id))),
     ]
-    robot = spoken(outcome.robot.name)
+    robot = spoken(outcome.robot.label)
     return Report(
         id=experiment.id,
         title=spoken(experiment.name, 200),

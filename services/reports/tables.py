@@ -6,6 +6,7 @@ from typing import Any
 
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.sensitivity import SensitivityRead
+from gaplab.services.core.robot_library import label_of
 from gaplab.services.figures.words import number, spoken
 from gaplab.services.reports.blocks import Grid
 from gaplab.services.reports.content import Facts
@@ -48,7 +49,7 @@ def sensitivity(check: SensitivityRead) -> Grid:
         )
         for found in check.tunables
     )
-    return Grid(f"Check of {check.spec.robot.name} in {check.spec.engine.name}", head, rows)
+    return Grid(f"Check of {label_of(check.spec.robot)} in {check.spec.engine.name}", head, rows)
 
 
 def cost(facts: Facts) -> Grid:

@@ -23,13 +23,13 @@ _MOMENT = (1980, 1, 1, 0, 0, 0)
 
 _FILE = 0o644 << 16
 
-MOTIONS: dict[str, motions.MotionFormat] = {"motion.csv": "csv", "motion.json": "json", "motion.ros2.yaml": "ros2"}
+MOTIONS: dict[motions.MotionFormat, str] = {"csv": "motion.csv", "json": "motion.json", "ros2": "motion.ros2.yaml"}
 
 README = """What experiment {id} ({name}) found, by gaplab {version}.
 
 page.html          all of this on a page to print
 controller.json    genome and fitness of the best measured controller
-motion.*           its motion as CSV, JSON and a ROS 2 JointTrajectory
+motion.*           its motion as CSV, JSON and a ROS 2 JointTrajectory; none if the controller observes while it acts
 simulator.json     the tuned simulator with its intervals, and the rest of the ensemble
 verdict.txt        what can be concluded, in sentences
 samples.csv        all measurements, as gaplab.read_samples reads them for `reality.samples` of another spec
@@ -88,9 +88,9 @@ def _files(outcome: ExperimentOutcome) -> Iterator[tuple[str, str]]:
         yield "controller.json", _json(best.model_dump(mode="json") | {"unit": outcome.robot.unit})
         yield "samples.csv", samples_csv(outcome)
         yield "samples.json", _json([sample.model_dump(mode="json") for sample in outcome.measured])
-        if outcome.robot.world.actuators:
-            for name, form in MOTIONS.items():
-                yield name, motions.written(outcome.spec, frozen(best.genome), form)
+        genome = frozen(best.genome)
+        for form in motions.forms_of(outcome.robot, genome):
+            yield MOTIONS[form], motions.written(outcome.spec, genome, form)
     if outcome.simulators:
         yield "simulator.json", _json(_simulator(outcome))
 

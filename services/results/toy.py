@@ -10,6 +10,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.toy import ToyIteration, ToySample, ToyTransfer, Values
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
+from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments import hiding
@@ -65,7 +66,7 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
     spec = spec_of(row.spec)
     robot = robot_of(spec)
     if not robot.is_function:
-        message = f"the robot {spec.robot.name!r} is not a function of one gene, so there is no curve to draw"
+        message = f"the robot {label_of(spec.robot)!r} is not a function of one gene, so there is no curve to draw"
         raise InvalidSpec([Violation("experiment", row.id, message, "an experiment with the robot 'toy_function'")])
     _refuse_outside("repetition", [repetition], row.spec["repetitions"])
     _refuse_outside("iteration", iterations, row.iterations)

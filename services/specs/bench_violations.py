@@ -21,7 +21,7 @@ def bench_violations(spec: ExperimentSpec, robot: Robot) -> Iterator[Violation]:
 def _limit_violations(spec: ExperimentSpec, robot: Robot) -> Iterator[Violation]:
     limits = spec.reality.limits
     if limits is not None and not robot.world.bodies:
-        message = f"the {robot.name} has no body, so no simulator can forecast its motion"
+        message = f"the {robot.label} has no body, so no simulator can forecast its motion"
         yield Violation("/reality/limits", limits.model_dump(mode="json"), message, "left out")
     if spec.reality.beyond == "refuse" and (limits is None or limits == type(limits)()):
         message = "nothing is refused without limits; give some in `reality.limits`"

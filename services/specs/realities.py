@@ -37,7 +37,7 @@ def physical_reality(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
         kind="physical",
         engine=None,
         parameters={},
-        bench=given.bench or robot.name,
+        bench=given.bench or robot.label,
         repeats=given.repeats,
         probes=given.probes or PHYSICAL_PROBES,
         samples=given.samples,

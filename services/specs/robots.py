@@ -54,7 +54,7 @@ def robot_of(spec: NamesARobot) -> Robot:
         return robot
     if robot.usual_controller is None or robot.usual_task is None:
         named = [(place, ref) for place, ref in (("/controller", spec.controller), ("/task", spec.task)) if ref]
-        message = f"the {robot.name} brings a controller and a task of its own; leave this out"
+        message = f"the {robot.label} brings a controller and a task of its own; leave this out"
         raise InvalidSpec(Violation(place, ref.name, message, "left out") for place, ref in named)
     driving, rating = spec.controller or robot.usual_controller, spec.task or robot.usual_task
     controller, task = gather(lambda: controllers.create(driving, "/controller"), lambda: tasks.create(rating, "/task"))

@@ -58,7 +58,7 @@ class Simulation:
         values = self._robot.sense(_at(seen, times.sensed))
         expected = (len(genomes), len(parameters), len(sensors.times_s), len(sensors.names))
         if np.shape(values) != expected:
-            found = f"robot {self._robot.name!r} returned readings of shape {np.shape(values)}"
+            found = f"robot {self._robot.label!r} returned readings of shape {np.shape(values)}"
             raise PluginBroken(f"{found}; permitted: {expected}")
         outcomes = np.empty((len(genomes), len(parameters), 1 + sensors.size))
         outcomes[..., 0], outcomes[..., 1:] = fitnesses, sensors.standardised(values)
@@ -71,7 +71,7 @@ class Simulation:
         fitnesses = self._robot.fitness(seen)
         if np.shape(fitnesses) != (genomes, simulators):
             expected = f"the fitness of {genomes} genomes in {simulators} simulators"
-            raise PluginBroken(f"robot {self._robot.name!r} returned {np.shape(fitnesses)} numbers for {expected}")
+            raise PluginBroken(f"robot {self._robot.label!r} returned {np.shape(fitnesses)} numbers for {expected}")
         return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
 
     def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:

@@ -49,7 +49,7 @@ def tuning_violations(robot: Robot, discrepancy: Discrepancy, tuner: Tuner) -> I
     """Yield a discrepancy of readings that the robot does not have, and one that the tuner cannot minimise."""
     if discrepancy.senses and not robot.sensors.size:
         able = [name for name, each in discrepancies.items() if not each.senses]
-        message = f"the {robot.name} has no sensors; {' and '.join(able)} need none"
+        message = f"the {robot.label} has no sensors; {' and '.join(able)} need none"
         yield Violation("/discrepancy", discrepancy.name, message, able)
     if tuner.needs_squares and not discrepancy.squares:
         able = [name for name, each in discrepancies.items() if each.squares]
@@ -60,9 +60,9 @@ def tuning_violations(robot: Robot, discrepancy: Discrepancy, tuner: Tuner) -> I
 def strategy_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) -> Iterator[Violation]:
     """Yield a strategy that needs sensors which the robot lacks, and named tunables that the spec does not tune."""
     if strategy.senses and not robot.sensors.size:
-        able = [name for name, each in robots.items() if each().sensors.size]
+        able = [name for name, each in robots.items() if each.example().sensors.size]
         message = (
-            f"the {robot.name} has no sensors, and {strategy.name} with these options selects by readings; "
+            f"the {robot.label} has no sensors, and {strategy.name} with these options selects by readings; "
             f"{' and '.join(able) or 'no robot'} has sensors"
         )
         yield Violation("/strategy", strategy.name, message, able)
@@ -84,11 +84,11 @@ def engine_violations(robot: Robot, places: Mapping[type[Engine], str]) -> Itera
     for engine, pointer in places.items():
         for field in engine.lacks(robot.world):
             others = [name for name, each in able.items() if field not in each.lacks(robot.world)]
-            message = f"the {robot.name} uses {field}, which {engine.name} does not honour; {listed(others)} does"
+            message = f"the {robot.label} uses {field}, which {engine.name} does not honour; {listed(others)} does"
             yield Violation(pointer, engine.name, message, others)
         if robot.loops and not engine.closes_loops:
             others = [name for name, each in able.items() if each.closes_loops]
-            message = f"the controller of the {robot.name} observes while it acts, and {engine.name} closes no loop"
+            message = f"the controller of the {robot.label} observes while it acts, and {engine.name} closes no loop"
             yield Violation(pointer, engine.name, f"{message}; {listed(others)} does", others)
 
 

@@ -12,12 +12,13 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session as Session
 from sqlalchemy.orm import sessionmaker
 
+from gaplab.services.core import robot_library
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
 from gaplab.services.store import database_errors
 from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION, Base
-from gaplab.services.store.queries import events
+from gaplab.services.store.queries import events, robots
 from gaplab.services.store.sqlite_file import create, file_of
 
 P = ParamSpec("P")
@@ -55,6 +56,7 @@ class Store:
         self._writer = sessionmaker(self._engine.execution_options(**{WRITES: True}), expire_on_commit=False)
         event.listen(self._writer, "before_commit", events.write)
         self._reader = sessionmaker(self._engine.execution_options(**snapshot), expire_on_commit=False)
+        robot_library.add_source(self)
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
@@ -96,6 +98,14 @@ class Store:
                 time.sleep(0.01 * 2**attempt)
             with self._writer.begin() as session:
                 return work(session, *args, **kwargs)
+
+    def robot_text(self, sha256: str) -> str | None:
+        """Return the text of a robot file; None if it is not stored here, or the database cannot be used now."""
+        try:
+            with self.reading() as session:
+                return robots.text_of(session, sha256)
+        except (StoreUnavailable, DBAPIError):
+            return None
 
     def check(self) -> None:
         """Check that the database can be used and has the schema of this version.

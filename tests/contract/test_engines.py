@@ -4,7 +4,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -13,11 +13,12 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Motion, Trajectory, open_loop
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.shapes import Box, Sphere
+from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Shape, Sphere, Vector
 from gaplab.services.core.tunables import tunables
-from gaplab.services.core.world import Body, Material, World
+from gaplab.services.core.world import Body, Inertia, Material, PDMotor, World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.engines.uses import USES
 
 
 class Pair(NamedTuple):
@@ -58,7 +59,11 @@ def each_body(world: World, change: Callable[[Body], Body]) -> World:
     return replace(world, bodies=tuple(change(body) for body in world.bodies))
 
 
-def each_motor(world: World, **changes: float) -> World:
+def each_joint(world: World, **changes: Any) -> World:
+    return replace(world, joints=tuple(replace(joint, **changes) for joint in world.joints))
+
+
+def each_motor(world: World, **changes: Any) -> World:
     joints = (replace(joint, motor=joint.motor and replace(joint.motor, **changes)) for joint in world.joints)
     return replace(world, joints=tuple(joints))
 
@@ -66,8 +71,79 @@ def each_motor(world: World, **changes: float) -> World:
 def larger(body: Body) -> Body:
     if isinstance(body.shape, Sphere):
         return replace(body, shape=Sphere(1.1 * body.shape.radius_m))
+    assert isinstance(body.shape, Box)
     x, y, z = body.shape.size_m
     return replace(body, shape=Box((1.1 * x, 1.1 * y, 1.1 * z)))
+
+
+def in_parts(world: World, extra: Shape, center_m: Vector = (0.0, 0.0, 0.0)) -> World:
+    """Each foot with a further shape below it, and an inertia of its own."""
+
+    def change(body: Body) -> Body:
+        if not isinstance(body.shape, Sphere):
+            return body
+        x, y, z = body.center_m
+        parts = (*body.parts, Part(extra, (x, y, z - 0.01)))
+        center = (x + center_m[0], y + center_m[1], z + center_m[2])
+        return replace(body, shape=parts, center_m=center, inertia=Inertia((1e-3, 1e-3, 1e-3)))
+
+    return each_body(world, change)
+
+
+def with_pd(world: World, **changes: Any) -> World:
+    motor = PDMotor(**{"follows": "position", "max_torque_nm": 8.0, "kp": 20.0, "kd": 0.5, **changes})
+    return replace(world, joints=tuple(replace(joint, motor=joint.motor and motor) for joint in world.joints))
+
+
+TURN = (0.0, 0.0, 0.1, 0.99**0.5)
+WITH_OR_WITHOUT: dict[str, tuple[Callable[[World], World], Callable[[World], World]]] = {
+    "body.center_m": (
+        lambda world: in_parts(world, Sphere(0.02)),
+        lambda world: in_parts(world, Sphere(0.02), (0.02, 0.0, 0.0)),
+    ),
+    "body.inertia": (
+        lambda world: world,
+        lambda world: each_body(world, lambda body: replace(body, inertia=Inertia((0.01, 0.01, 0.01)))),
+    ),
+    "body.parts": (lambda world: world, lambda world: in_parts(world, Sphere(0.025))),
+    "fixed": (lambda world: world, lambda world: replace(world, fixed=True, observed=world.bodies[-1].name)),
+    "joint.armature": (lambda world: world, lambda world: each_joint(world, armature=0.01)),
+    "joint.damping": (lambda world: world, lambda world: each_joint(world, damping=0.5)),
+    "joint.dry_friction": (lambda world: world, lambda world: each_joint(world, dry_friction=1.0)),
+    "joint.limits": (lambda world: world, lambda world: each_joint(world, limits=(-0.1, 0.1))),
+    "joint.slides": (lambda world: world, lambda world: each_joint(world, slides=True)),
+    "joint.start": (lambda world: world, lambda world: each_joint(world, start=0.2)),
+    "joint.turn": (lambda world: world, lambda world: each_joint(world, turn=TURN)),
+    "motor.delay_s": (with_pd, lambda world: with_pd(world, delay_s=0.1)),
+    "motor.follows": (
+        lambda world: with_pd(world, max_torque_nm=0.02),  # a torque alone turns a limb faster and faster
+        lambda world: with_pd(world, max_torque_nm=0.02, follows="torque"),
+    ),
+    "motor.kd": (with_pd, lambda world: with_pd(world, kd=1.0)),
+    "motor.kp": (with_pd, lambda world: with_pd(world, kp=10.0)),
+    "observed": (lambda world: world, lambda world: replace(world, observed=world.bodies[-1].name)),
+    "shape.capsule": (
+        lambda world: in_parts(world, Sphere(0.02)),
+        lambda world: in_parts(world, Capsule(0.02, 0.03)),
+    ),
+    "shape.cylinder": (
+        lambda world: in_parts(world, Sphere(0.02)),
+        lambda world: in_parts(world, Cylinder(0.03, 0.04)),
+    ),
+    "shape.hull": (
+        lambda world: in_parts(world, Sphere(0.02)),
+        lambda world: in_parts(world, Hull(((0.03, 0, 0), (-0.03, 0.03, 0), (-0.03, -0.03, 0), (0, 0, -0.03)))),
+    ),
+    "slope_rad": (lambda world: world, lambda world: replace(world, slope_rad=0.1)),
+    "start_turn": (lambda world: world, lambda world: replace(world, start_turn=TURN)),
+    "surfaces": (
+        lambda world: world,
+        lambda world: replace(
+            each_body(world, lambda body: replace(body, surface="ice")), surfaces=(("ice", Material(0.1, 0.05)),)
+        ),
+    ),
+}
+"""Two worlds that differ in a field that not every world has."""
 
 
 EDITS: dict[str, Callable[[World], World]] = {
@@ -138,9 +214,35 @@ def test_a_rollout_is_bit_equal_in_a_fresh_process(pair: Pair) -> None:
 def test_every_honoured_field_changes_a_trajectory(pair: Pair) -> None:
     expected = pair.roll()
 
-    ignored = [field for field in pair.engine.honours if np.array_equal(pair.roll(edited(pair, field)), expected)]
+    fields = pair.engine.honours - WITH_OR_WITHOUT.keys()
+    ignored = [field for field in fields if np.array_equal(pair.roll(edited(pair, field)), expected)]
 
     assert ignored == []
+
+
+@pytest.mark.parametrize("field", USES)
+def test_every_honoured_field_that_a_world_may_use_changes_a_trajectory(embodied: Pair, field: str) -> None:
+    without, used = (change(embodied.robot.world) for change in WITH_OR_WITHOUT[field])
+    if lacked := embodied.engine.lacks(used):
+        pytest.skip(f"{embodied.engine.name} does not honour {', '.join(lacked)}")
+
+    one, other = embodied.roll(without), embodied.roll(used)
+
+    assert USES[field](used)
+    assert np.isfinite(one).all()
+    assert np.isfinite(other).all()
+    assert not np.array_equal(one, other)
+
+
+def test_an_engine_lacks_what_it_does_not_honour_and_a_world_uses(pair: Pair) -> None:
+    class Basic(type(pair.engine)):  # type: ignore[misc]
+        honours = pair.engine.honours - {"slope_rad", "joint.damping"}
+
+    world = pair.robot.world
+    assert Basic.lacks(world) == ()
+    assert Basic.lacks(replace(world, slope_rad=0.1)) == ("slope_rad",)
+    if world.joints:
+        assert Basic.lacks(each_joint(replace(world, slope_rad=0.1), damping=0.1)) == ("joint.damping", "slope_rad")
 
 
 def edited(pair: Pair, field: str) -> World:

@@ -18,7 +18,10 @@ from gaplab.services.core.world import Body, Joint, Material, Motor, World
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco.callback import callbacks
 from gaplab.services.engines.mujoco.layout import layout
-from gaplab.services.engines.mujoco.scene import ROWS, MuJoCoScene, _in_force
+from gaplab.services.engines.mujoco.model import named
+from gaplab.services.engines.mujoco.models import Models
+from gaplab.services.engines.mujoco.pool import in_force
+from gaplab.services.engines.mujoco.scene import ROWS
 from gaplab.services.engines.stepping import WARM_SCENES
 
 mujoco = pytest.importorskip("mujoco")
@@ -54,17 +57,20 @@ def path(engine: MuJoCo, world: World, motion: Motion = MOTION) -> FloatArray:
     return engine.rollout(world, motion).positions_m
 
 
+FIELDS = "qpos qvel qacc qacc_warmstart qacc_smooth qfrc_applied qfrc_bias qfrc_smooth sensordata"
+ROW_FIELDS = "efc_vel efc_pos efc_force efc_J efc_b efc_AR efc_frictionloss"
+
+
 class Sliding:
     """Something of 2 kg at rest on the ground, to be thrown, and followed step by step."""
 
     def __init__(self, world: World, material: Material) -> None:
-        self.scene = MuJoCoScene(mujoco, world, threads=1)
-        (self.model,) = self.scene._painted([material])
-        self.data = self.scene._data()
+        (prepared,) = Models(mujoco, world)[[replace(world, material=material)]]
+        self.model, self.data = prepared.model, mujoco.MjData(prepared.model)
         self.step(30)
 
     def step(self, count: int) -> None:
-        with _in_force(mujoco, *callbacks()):
+        with in_force(mujoco, callbacks()):
             for _ in range(count):
                 self.data.qfrc_applied[:] = 0.0
                 mujoco.mj_step(self.model, self.data)
@@ -118,17 +124,20 @@ def test_a_ball_leaves_with_the_restitutions_share_of_the_speed_at_which_it_came
 
 
 def test_its_fields_are_where_mujocos_description_of_itself_says() -> None:
-    data = Sliding(BOX, Material()).data
-    mujoco.mj_forward(MuJoCoScene(mujoco, BOX, threads=1).model, data)
+    box = Sliding(BOX, Material())
+    model, data = box.model, box.data
+    mujoco.mj_forward(model, data)
     offsets, _ = layout(structs, "mjData")
     contact, size = layout(structs, "mjContact")
 
     def number(address: int, kind: type) -> int | float:
         return kind.from_address(address).value  # type: ignore[attr-defined]
 
-    names = ("qpos", "qvel", "qacc", "qfrc_applied", "userdata", "efc_vel", "efc_force", "efc_J", "efc_b", "efc_AR")
-    for name in names:
+    for name in f"{FIELDS} {ROW_FIELDS}".split():
         assert number(data._address + offsets[name], c_int64) == getattr(data, name).ctypes.data, name
+    inside, _ = layout(structs, "mjModel")
+    assert number(model._address + inside["numeric_data"], c_int64) == model.numeric_data.ctypes.data
+    assert number(model._address + inside["nv"], c_int64) == model.nv
     assert number(data._address + offsets["ncon"], c_int32) == len(data.contact) > 1
     first = number(data._address + offsets["contact"], c_int64)
     for index, point in enumerate(data.contact):
@@ -172,7 +181,7 @@ def test_the_numbers_depend_neither_on_the_threads_nor_on_how_rollouts_are_batch
 ) -> None:
     worlds = [in_material(material) for material in MATERIALS]
     genomes = np.vstack([ROBOT.known, ROBOT.space.draw(count - 1, np.random.default_rng(0))])
-    motions = [replace(ROBOT.motion(genome), observe_s=np.array([0.2, 0.5])) for genome in genomes]
+    motions = [replace(open_loop(ROBOT.motion(genome)), observe_s=np.array([0.2, 0.5])) for genome in genomes]
     apart = np.array([[path(engine, world, motion) for world in worlds] for motion in motions])
     other = MuJoCo(MuJoCo.Options(threads=threads))
 
@@ -225,6 +234,7 @@ def test_what_belongs_to_the_process_is_as_it_was_after_a_rollout(engine: MuJoCo
 
     assert mujoco.get_mjcb_control() is None
     assert mujoco.get_mjcb_time() is None
+    assert mujoco.get_mjcb_sensor() is None
     assert mujoco.MjLogConfig.get().logto_file
 
 
@@ -259,10 +269,11 @@ def test_the_pose_is_of_the_bodys_frame_not_of_its_center_of_mass(engine: MuJoCo
 
 
 def test_every_body_has_the_mass_and_the_inertia_of_its_solid_shape(engine: MuJoCo) -> None:
-    model = engine._scenes[ROBOT.world.kind].model
+    (prepared,) = engine._scenes[ROBOT.world.kind].models[[ROBOT.world]]
+    model = prepared.model
 
     for body in ROBOT.world.bodies:
-        made = model.body(body.name)
+        made = model.body(named(body.name))
         assert made.mass[0] == pytest.approx(body.mass_kg)
         assert sorted(made.inertia) == pytest.approx(sorted(solid(body)))
         assert made.ipos == pytest.approx(body.center_m)
@@ -272,6 +283,7 @@ def solid(body: Body) -> list[float]:
     """Principal moments of inertia of even density."""
     if isinstance(body.shape, Sphere):
         return [0.4 * body.mass_kg * body.shape.radius_m**2] * 3
+    assert isinstance(body.shape, Box)
     x, y, z = np.square(body.shape.size_m)
     return [body.mass_kg / 12 * (y + z), body.mass_kg / 12 * (x + z), body.mass_kg / 12 * (x + y)]
 
@@ -287,15 +299,15 @@ class Turning:
             gravity_m_s2=0.0,
             time_step_s=STEP_S,
         )
-        self.scene = MuJoCoScene(mujoco, world, threads=1)
-        self.data = self.scene._data()
+        (prepared,) = Models(mujoco, world)[[world]]
+        self.model, self.data = prepared.model, mujoco.MjData(prepared.model)
 
     def step(self, target: float, count: int) -> tuple[float, float]:
         """Angle and speed."""
-        with _in_force(mujoco, *callbacks()):
+        with in_force(mujoco, callbacks()):
             for _ in range(count):
                 self.data.qfrc_applied[6] = target
-                mujoco.mj_step(self.scene.model, self.data)
+                mujoco.mj_step(self.model, self.data)
         return float(self.data.qpos[7]), float(self.data.qvel[6])
 
 

@@ -56,7 +56,7 @@ def wheel(motor: Motor, axis: Vector = (0.0, 0.0, 1.0)) -> World:
 
 def turned(engine: PhysX, world: World, target: float, steps: int) -> PhysXScene:
     scene = engine._scenes[world]
-    scene.start(Material())
+    scene.start(world)
     scene.command(0, target)
     scene.step(steps)
     return scene

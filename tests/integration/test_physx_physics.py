@@ -74,7 +74,7 @@ def ahead(request: pytest.FixtureRequest) -> FloatArray:
 def at_rest(world: World, material: Material, ahead: FloatArray) -> Iterator[Sledge]:
     engine = PhysX()
     scene = engine._scenes[world]
-    scene.start(material)
+    scene.start(replace(world, material=material))
     scene.step(30)
     yield Sledge(scene, material, ahead)
     engine.close()
@@ -154,8 +154,9 @@ def test_a_dropped_ball_falls_freely() -> None:
 @pytest.mark.parametrize("height_m", [0.03, 0.1, 0.3, 1.0])
 @pytest.mark.parametrize("restitution", [0.3, 0.6, 0.85])
 def test_a_dropped_ball_bounces_with_the_restitution(restitution: float, height_m: float) -> None:
-    scene = PhysX()._scenes[replace(BALL, start_height_m=height_m + 0.05)]
-    scene.start(Material(restitution=restitution))
+    world = replace(BALL, start_height_m=height_m + 0.05)
+    scene = PhysX()._scenes[world]
+    scene.start(replace(world, material=Material(restitution=restitution)))
     speeds = [0.0]
     while speeds[-1] <= 0:
         scene.step(1)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.kinematics import about, body_poses
 from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Sphere
-from gaplab.services.core.world import Body, Joint, Material, Motor, World
+from gaplab.services.core.shapes import Box, Hull, Part, Sphere
+from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, World
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 from gaplab.services.engines.stepping import WARM_SCENES
@@ -126,6 +127,7 @@ def solid(body: Body) -> list[float]:
     """Principal moments of inertia of even density."""
     if isinstance(body.shape, Sphere):
         return [0.4 * body.mass_kg * body.shape.radius_m**2] * 3
+    assert isinstance(body.shape, Box)
     x, y, z = np.square(body.shape.size_m)
     return [body.mass_kg / 12 * (y + z), body.mass_kg / 12 * (x + z), body.mass_kg / 12 * (x + y)]
 
@@ -138,10 +140,48 @@ def test_a_motor_closes_its_share_of_the_error_in_each_step(engine: PyBullet) ->
         gravity_m_s2=0.0,
     )
     scene = engine._scenes[wheel]
-    scene.start(Material(), 1.0)
+    scene.start(wheel)
     scene.command(0, 1.0)
 
     scene.step(10)
 
     angle = scene.bullet.getJointState(scene.robot, 0, physicsClientId=scene.client)[0]
     assert angle == pytest.approx(1 - 0.9**10, rel=0.02)
+
+
+def test_links_are_where_kinematics_says_in_whatever_order_joints_are_listed(engine: PyBullet) -> None:
+    turn = tuple(about(np.array([0.6, 0.0, 0.8]), np.array([0.5]))[0].tolist())
+    parts = (
+        Part(Sphere(0.03)),
+        Part(Box((0.1, 0.1, 0.02)), (0.0, 0.0, -0.1)),
+        Part(Hull(((0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1), (0, 0, 0)))),
+    )
+    names = ["trunk", "far", "near", "other", "farther"]
+    inertia = Inertia((0.01, 0.02, 0.015), turn)
+    bodies = tuple(
+        Body(name, 0.1 + 0.1 * i, parts, (0.01, 0.0, 0.02 * i), inertia=inertia) for i, name in enumerate(names)
+    )
+    axis = (0.0, 0.6, 0.8)
+    joints = (
+        Joint("a", "far", "farther", (0.1, 0.0, 0.0), axis, turn=turn, start=0.3),
+        Joint("b", "near", "far", (0.0, 0.1, 0.0), axis, slides=True, start=-0.1),
+        Joint("c", "trunk", "near", (0.0, 0.0, 0.1), axis, turn=turn, start=0.7),
+        Joint("d", "trunk", "other", (0.0, 0.2, 0.1), axis, turn=turn, start=-0.2),
+    )
+    world = World(bodies, joints, start_height_m=0.2, start_turn=turn)
+    scene = engine._scenes[world]
+    scene.start(world)
+    scene.step(60)
+
+    positions, orientations = body_poses(world, scene.pose()[None], scene.angles()[None])
+
+    assert np.linalg.norm(scene.pose()[:2]) > 1e-3
+    assert np.ptp(scene.angles() - [0.3, -0.1, 0.7, -0.2]) > 1e-3
+    for link, joint in zip(scene._robot.joints, world.joints, strict=True):
+        state = scene.bullet.getLinkState(scene.robot, link, 0, 1, physicsClientId=scene.client)
+        info = scene.bullet.getDynamicsInfo(scene.robot, link, physicsClientId=scene.client)
+        place = names.index(joint.child)
+        assert info[0] == bodies[place].mass_kg
+        assert info[2] == pytest.approx(inertia.moments_kg_m2)
+        assert positions[0, place] == pytest.approx(state[4], abs=1e-6)
+        assert abs(orientations[0, place] @ state[5]) == pytest.approx(1, abs=1e-6)

@@ -65,8 +65,8 @@ class Sledge(NamedTuple):
 
 def at_rest(world: World, material: Material) -> Sledge:
     scene = PyBulletScene(pybullet, world)
-    scene.start(material, max(material.static_friction, material.dynamic_friction))
-    advance = StickSlip(scene, material)
+    scene.start(replace(world, material=material))
+    advance = StickSlip(scene)
     advance.step(30)
     return Sledge(scene, advance)
 
@@ -92,7 +92,7 @@ def test_a_sliding_sledge_is_slowed_by_the_dynamic_friction_in_any_direction(
 
     sledge.advance.step(20)
 
-    friction = sledge.advance._material.dynamic_friction
+    friction = sledge.scene.world.material.dynamic_friction
     assert (before - sledge.speed()) / (20 * STEP_S) == pytest.approx(friction * G, rel=0.05)
 
 
@@ -112,7 +112,7 @@ def test_four_feet_break_loose_a_little_early_for_the_first_to_slide_takes_the_o
 
 def breaks_loose(sledge: Sledge) -> float:
     """The pull at which the sledge begins to move, as a share of what static friction should withstand."""
-    withstood = sledge.advance._material.static_friction * WEIGHT_N
+    withstood = sledge.scene.world.material.static_friction * WEIGHT_N
     return next(
         float(share)
         for share in np.linspace(0.5, 1.2, 420)
@@ -122,7 +122,7 @@ def breaks_loose(sledge: Sledge) -> float:
 
 @pytest.mark.parametrize("sledge", FRICTIONS, indirect=True)
 def test_a_sledge_that_slid_to_rest_sticks_again(sledge: Sledge) -> None:
-    material = sledge.advance._material
+    material = sledge.scene.world.material
     sledge.throw(0.2, 0.0)
     sledge.advance.step(60)
     assert sledge.speed() < 0.01
@@ -136,7 +136,7 @@ def test_a_sledge_that_slid_to_rest_sticks_again(sledge: Sledge) -> None:
 
 @pytest.mark.parametrize("sledge", FRICTIONS, indirect=True)
 def test_a_sledge_broken_loose_accelerates_against_the_dynamic_friction(sledge: Sledge) -> None:
-    material = sledge.advance._material
+    material = sledge.scene.world.material
     pull = 1.05 * material.static_friction
     for _ in range(3):
         sledge.pull(pull * WEIGHT_N)

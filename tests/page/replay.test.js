@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { camera } from "../../api/dashboard/lib/replay/camera.js";
 import { clock } from "../../api/dashboard/lib/replay/clock.js";
 import { colourOf, components, css } from "../../api/dashboard/lib/replay/colours.js";
-import { perspective, pose, product, shadowOnto, transformed, unit, viewFrom } from "../../api/dashboard/lib/replay/matrix.js";
+import { cross, perspective, pose, product, shadowOnto, transformed, unit, viewFrom } from "../../api/dashboard/lib/replay/matrix.js";
 import { mesh } from "../../api/dashboard/lib/replay/meshes.js";
 import { bodyPoses, feetOnGround, frameAt, pathUntil, shapePoses } from "../../api/dashboard/lib/replay/motion.js";
 
@@ -35,6 +35,18 @@ test("a product applies its second factor first", () => {
 test("what the camera looks at is before it, on its axis", () => {
   near(transformed(viewFrom([3, 4, 0], [0, 0, 0]), [0, 0, 0]), [0, 0, -5]);
   near(transformed(viewFrom([3, 4, 0], [0, 0, 0]), [0, 0, 1]), [0, 1, -5]);
+});
+
+test("on a slope, the picture is upright in the direction against gravity", () => {
+  const { eye, target, up } = camera(() => {}).viewpoint([0, 0, 0], 0, 0.3);
+  near(up, [Math.sin(0.3), 0, Math.cos(0.3)]);
+  const [x, y] = transformed(viewFrom(eye, target, up), up);
+  assert.ok(Math.abs(x) < 1e-6 && y > 0);
+});
+
+test("a camera is farther away from a large robot, by its size", () => {
+  const [small, large] = [1, 4].map((scale) => camera(() => {}, scale).viewpoint([0, 0, 0]));
+  near([large.distance / small.distance, large.eye[2] / small.eye[2], large.scale], [4, 4, 4]);
 });
 
 test("a lens maps its nearest and farthest planes to −1 and 1", () => {
@@ -79,10 +91,47 @@ test("the path ends at the time, and the feet on the ground are those with conta
   assert.deepEqual([0.2, 0.7, 2].map((time) => feetOnGround(WORLD, time)), [[0], [], [0]]);
 });
 
+const HULL = { vertices_m: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2]], faces: [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] };
+
+/** The volume that triangles enclose, if all are anticlockwise as seen from outside. */
+function volume({ points, indices }) {
+  let sixfold = 0;
+  for (let first = 0; first < indices.length; first += 3) {
+    const [a, b, c] = indices.slice(first, first + 3).map((index) => points.slice(6 * index, 6 * index + 3));
+    const normal = cross(b, c);
+    sixfold += a.reduce((sum, value, k) => sum + value * normal[k], 0);
+  }
+  return sixfold / 6;
+}
+
+test("the path is that of the observed body, or of the base where there is no other", () => {
+  const world = { positions_m: [[0, 0, 0, 5, 6, 7], [1, 0, 0, 8, 9, 7]] };
+  assert.deepEqual(pathUntil(world, [0, 1], 1, 1), [[5, 6]]);
+  assert.deepEqual(pathUntil(world, [0, 1], 1, 2), [[0, 0]]);
+});
+
+test("triangles of cylinders and hulls enclose their volume, and normals point outwards", () => {
+  const cylinder = mesh({ kind: "cylinder", size_m: [1, 2] });
+  const hull = mesh({ kind: "hull", size_m: [], ...HULL });
+  assert.ok(Math.abs(volume(cylinder) / (2 * Math.PI) - 1) < 0.02);
+  near([volume(hull)], [1 / 3]);
+  for (let first = 0; first < hull.points.length; first += 6) {
+    const [place, normal] = [hull.points.slice(first, first + 3), hull.points.slice(first + 3, first + 6)];
+    const outwards = [0, 1, 2].reduce((sum, k) => sum + (place[k] - [0.2, 0.2, 0.4][k]) * normal[k], 0);
+    assert.ok(outwards > 0);
+  }
+});
+
+test("a face of more than three corners is cut into triangles", () => {
+  const { indices } = mesh({ kind: "hull", size_m: [], vertices_m: [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], faces: [[0, 1, 2, 3]] });
+  assert.deepEqual(indices, [0, 1, 2, 0, 2, 3]);
+});
+
 test("triangles of every shape have its size, and normals of length 1", () => {
-  const sizes = [["box", [2, 4, 6], [1, 2, 3]], ["sphere", [2], [2, 2, 2]], ["capsule", [1, 4], [1, 1, 3]]];
+  const sizes = [["box", [2, 4, 6], [1, 2, 3]], ["sphere", [2], [2, 2, 2]], ["capsule", [1, 4], [1, 1, 3]],
+    ["cylinder", [2, 6], [2, 2, 3]], ["hull", [], [1, 1, 2]]];
   for (const [kind, size, extents] of sizes) {
-    const { points, indices } = mesh({ kind, size_m: size });
+    const { points, indices } = mesh({ kind, size_m: size, ...HULL });
     const corners = Array.from({ length: points.length / 6 }, (_, index) => points.slice(6 * index, 6 * index + 6));
     near([0, 1, 2].map((axis) => Math.max(...corners.map((corner) => corner[axis]))), extents);
     for (const corner of corners) near([Math.hypot(...corner.slice(3))], [1]);

@@ -25,6 +25,7 @@ WEB = {"fastapi", "starlette", "pydantic", "anyio", "prometheus_client"}
 
 ROOMS = {
     "core": ((), {"numpy", "scipy", "pydantic", "cma"}),
+    "robots": (("core",), {"numpy", "scipy", "pydantic"}),
     "engines": (("core",), {"numpy", "pydantic"}),
     "store": (("core",), {"sqlalchemy", "psycopg"}),
     "figures": ((), {"plotly", "matplotlib"}),

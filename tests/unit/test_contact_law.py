@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.engines.mujoco.law import Drive, apply_impulses, coast, drive, press, settings, touch
+from gaplab.services.engines.mujoco.law import apply_impulses, coast, drive, press, touch
+from gaplab.services.engines.mujoco.settings import Servo, Settings, settings
 
 WORLD = Quadruped().world
 STEP_S = WORLD.time_step_s
-KNOWN = settings(WORLD, 7, [])
+KNOWN = settings(WORLD, 7, 1, Settings())
+NO_SINGLES = (0, 0)
 SURFACE = np.array([1.0, 1.0, 0.8, 0.5, 0.0])
 
 
 def pressed(inverse: Any, excess: Any, friction: Any, sweeps: Any = 50) -> Any:
     impulses = np.zeros(len(excess))
-    press(sweeps, inverse, excess, np.full(len(excess), friction), impulses)
+    press(sweeps, NO_SINGLES, inverse, excess, np.full(len(excess), friction), impulses)
     return impulses
 
 
@@ -89,7 +91,7 @@ def test_what_is_in_the_ground_is_pushed_out_a_fifth_of_its_depth_in_a_step() ->
 
 
 def test_a_motor_that_is_told_no_number_gives_none() -> None:
-    known = settings(WORLD, 7, [Drive(6, 0.1, 20.0, 8.0, 0.01)])
+    known = settings(WORLD, 7, 1, Settings([Servo(6, 0.1, 20.0, 8.0, 0.01)]))
     forces = np.array([*np.zeros(6), np.nan])
 
     drive(known, forces, np.zeros(8), np.zeros(7), np.zeros(7))

@@ -8,8 +8,9 @@ import pytest
 from PIL import Image
 
 from gaplab.schemas.replays import Replay
-from gaplab.services.replay.film import COLOURS, pictures
+from gaplab.services.replay.film import LIGHT, pictures
 from gaplab.services.replay.painting import Camera, Solid, paint
+from gaplab.services.replay.polyhedra import box
 from gaplab.services.replay.video import VideoFormat, film
 
 FRAMES = 9
@@ -84,7 +85,7 @@ def test_an_mp4_can_be_decoded() -> None:
 def test_what_is_on_the_ground_has_another_colour() -> None:
     def count(picture: Image.Image) -> int:
         rgb = np.asarray(picture).astype(int)
-        near = np.abs(rgb - np.array(COLOURS["foot on the ground"]) * 0.75).sum(axis=2) < 120
+        near = np.abs(rgb - np.array(LIGHT.colours["foot on the ground"]) * 0.75).sum(axis=2) < 120
         return int(near.sum())
 
     first, *_, last = pictures(BOTH, every=1, width_px=480)
@@ -114,8 +115,8 @@ def test_a_world_that_failed_or_is_hardware_is_left_out() -> None:
 
 def test_a_nearer_solid_hides_a_farther_one() -> None:
     camera = Camera(np.array([0.0, -2.0, 0.3]), np.array([0.0, 0.0, 0.3]), (80, 60))
-    far = Solid("box", (0.4, 0.4, 0.4), np.array([0.0, 1.0, 0.3]), np.eye(3), (0, 0, 250))
-    near = Solid("sphere", (0.2,), np.array([0.0, 0.0, 0.3]), np.eye(3), (250, 0, 0))
+    far = Solid(box((0.4, 0.4, 0.4)), np.array([0.0, 1.0, 0.3]), np.eye(3), (0, 0, 250))
+    near = Solid((0.2, 0.0), np.array([0.0, 0.0, 0.3]), np.eye(3), (250, 0, 0))
 
     red, _, blue = paint([near, far], camera).getpixel((40, 30))  # type: ignore[misc]
 

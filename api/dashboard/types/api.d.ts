@@ -329,6 +329,10 @@ declare namespace Api {
     mean: number;
     sd: number | null;
   }
+  interface Framing {
+    scale: number;
+    height_m: number;
+  }
   interface Health {
     status: "ok" | "degraded";
     warnings: Array<string>;
@@ -526,6 +530,8 @@ declare namespace Api {
     unit: string;
     bodies: Array<string>;
     feet: Array<string>;
+    observed: number;
+    framing: Framing;
     times_s: Array<number>;
     counted_s: [number, number];
     simulation: ReplayWorld | null;
@@ -547,6 +553,7 @@ declare namespace Api {
     recorded: number | null;
     positions_m: Array<Array<number>>;
     orientations: Array<Array<number>>;
+    slope_rad: number;
     heights_m: Array<number>;
     speeds_m_s: Array<number>;
     contacts: Array<Array<[number, number]>>;
@@ -579,6 +586,16 @@ declare namespace Api {
   }
   type RequestState = "open" | "taken" | "measured" | "failed" | "withdrawn" | "stuck";
   type ResolvedTunable = string | Record<string, any>;
+  interface RobotRead {
+    sha256: string;
+    name: string;
+    file: string | null;
+    bodies: number;
+    actuators: number;
+    mass_kg: number;
+    lost: Array<string>;
+    created_at: string;
+  }
   interface Safety {
     simulators: number;
     failed: number;
@@ -662,12 +679,14 @@ declare namespace Api {
     values: Array<Array<any>>;
   }
   interface Shape {
-    kind: "box" | "sphere" | "capsule" | "plane";
+    kind: "box" | "sphere" | "capsule" | "cylinder" | "hull" | "plane";
     size_m: Array<number>;
     position_m: [number, number, number];
     orientation: [number, number, number, number];
     role: "trunk" | "limb" | "foot" | "ground";
     body: number | null;
+    vertices_m: Array<[number, number, number]>;
+    faces: Array<Array<number>>;
   }
   interface SimulatorRead {
     repetition: number;

@@ -177,6 +177,10 @@ declare namespace Page {
     eye: Vector;
     target: Vector;
     distance: number;
+    /** The size of what is seen, relative to the quadruped. */
+    scale: number;
+    /** The direction that is upwards in the picture, of length 1. */
+    up: Vector;
   }
 
   /** Draws one frame: a matrix for each solid shape, the bodies on the ground, the camera, the colours and the path so far. */

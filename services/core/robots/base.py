@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar
 
+from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import FloatArray, Genome
 from gaplab.services.core.controllers import controllers
@@ -35,6 +36,7 @@ class Robot(Plugin):
         space: space of its genomes.
         known: `(g,)`, a hand-designed genome.
         sensors: what is read during a rollout; by default nothing.
+        label: name that people know it by.
     """
 
     engine: ClassVar[str]
@@ -47,8 +49,18 @@ class Robot(Plugin):
     space: Space
     known: Genome
     sensors: Sensors = Sensors()
+    label: str
     _controller: Controller
     _task: Task
+
+    def __init__(self, options: Frozen | None = None) -> None:
+        super().__init__(options)
+        self.label = self.name
+
+    @classmethod
+    def example(cls) -> "Robot":
+        """Return a robot of this class, for the catalogue and the checks of the contract."""
+        return cls()
 
     def perform(self, controller: Controller, task: Task) -> None:
         """Let a controller drive the robot, and a task rate it; both are new, and serve this robot alone."""
@@ -93,14 +105,18 @@ class Robot(Plugin):
     @classmethod
     def details(cls) -> dict[str, Any]:
         """Return engine, controller, task, unit, genes, sensors, and whether it is a function, for the catalogue."""
-        robot = cls()
+        return {"engine": cls.engine, **cls.told(cls.example())}
+
+    @staticmethod
+    def told(robot: "Robot") -> dict[str, Any]:
+        """Return what the catalogue tells of a robot, but for its engine."""
         return {
-            "engine": cls.engine,
             "controller": _named(robot.usual_controller),
             "task": _named(robot.usual_task),
             "unit": robot.unit,
             "genes": robot.space.size,
             "function": robot.is_function,
+            "bodies": len(robot.world.bodies),
             **robot.sensors.details(),
         }
 

@@ -1,4 +1,4 @@
-"""The contact law as compiled code, which MuJoCo calls in the middle of each step, from any thread, without Python.
+"""The law of motors, joints and contacts as compiled code, which MuJoCo calls in each step, from any thread.
 
 Numba compiles it. `mujoco.introspect` describes the layout of MuJoCo's data. Numba's values are untyped, hence `Any`.
 """
@@ -7,20 +7,32 @@ from ctypes import CDLL, c_int, c_void_p
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from gaplab.services.engines.mujoco.law import DOFS, ROWS, STEP, SWEEPS, apply_impulses, coast, drive, press, touch
+from gaplab.services.engines.mujoco.law import ROWS, apply_impulses, coast, damp, drive, press, stop, touch
 from gaplab.services.engines.mujoco.layout import layout
+from gaplab.services.engines.mujoco.settings import AHEAD, DOFS, STEP, SWEEPS
 
 MANY = 1 << 20
 """Length of an array view whose true length the compiled code does not need."""
 
+UNMOVED = 1e-12
+"""Squared length of the row of a contact that no joint moves away from the ground."""
+
+
+class Callbacks(NamedTuple):
+    """C functions for MuJoCo's `mjcb_control`, `mjcb_time` and `mjcb_sensor`."""
+
+    law: Any
+    clock: Any
+    sensor: Any
+
 
 @cache
-def callbacks() -> tuple[Any, Any]:
-    """Return the law and a constant clock, as C functions for `mjcb_control` and `mjcb_time`.
+def callbacks() -> Callbacks:
+    """Return the law, a constant clock, and a sensor of accelerations.
 
     MuJoCo reads the time at every stage of a step, which takes longer than some stages; the constant clock saves that.
     Compiling takes about two seconds, once in a process.
@@ -30,29 +42,30 @@ def callbacks() -> tuple[Any, Any]:
     types = numba.types
     law = numba.cfunc(types.void(types.voidptr, types.voidptr), error_model="numpy")(_law(numba))
     clock = numba.cfunc(types.float64())(lambda: 0.0)
-    return law.ctypes, clock.ctypes
+    sensor = numba.cfunc(types.void(types.voidptr, types.voidptr, types.int32))(_sensor(numba))
+    return Callbacks(law.ctypes, clock.ctypes, sensor.ctypes)
 
 
 def _law(numba: Any) -> Any:
-    """Compute torques, then contact forces, which are added to them; MuJoCo's solver has no contacts left."""
-    at = layout(import_module("mujoco.introspect.structs"), "mjData")[0]
-    time, rows_of, forces_of, angles_of = at["time"] // 8, at["nefc"] // 4, at["qfrc_applied"] // 8, at["qpos"] // 8
-    known_of, speeds_of, accelerations_of = at["userdata"] // 8, at["qvel"] // 8, at["qacc"] // 8
+    """Compute torques, then forces of joints and contacts, which are added; MuJoCo's solver has no rows left."""
+    structs = import_module("mujoco.introspect.structs")
+    at, settings_of = layout(structs, "mjData")[0], layout(structs, "mjModel")[0]["numeric_data"] // 8
+    rows_of, forces_of = at["nefc"] // 4, at["qfrc_applied"] // 8
+    angles_of, speeds_of = at["qpos"] // 8, at["qvel"] // 8
+    accelerations_of = at["qacc_warmstart"] // 8  # those of the last step: MuJoCo copies them there at its end
     view, pointer, compiled = numba.carray, _pointer(numba), numba.njit(error_model="numpy")
-    turn, meet = compiled(drive), compiled(_meet(numba))
+    turn, slow, meet = compiled(drive), compiled(damp), compiled(_meet(numba))
 
     def law(model: Any, data: Any) -> None:
         fields, counts = view(data, MANY, np.int64), view(data, MANY, np.int32)
-        known = view(pointer(fields[known_of]), MANY, np.float64)
+        known = view(pointer(view(model, MANY, np.int64)[settings_of]), MANY, np.float64)
         dofs = int(known[DOFS])
         forces = view(pointer(fields[forces_of]), dofs, np.float64)
-        angles = view(pointer(fields[angles_of]), dofs + 1, np.float64)
+        angles = view(pointer(fields[angles_of]), dofs + int(known[AHEAD]), np.float64)
         speeds = view(pointer(fields[speeds_of]), dofs, np.float64)
         accelerations = view(pointer(fields[accelerations_of]), dofs, np.float64)
-        if view(data, MANY, np.float64)[time] == 0.0:
-            for dof in range(dofs):
-                accelerations[dof] = 0.0
         turn(known, forces, angles, speeds, accelerations)
+        slow(known, forces, speeds)
         if counts[rows_of] > 0:
             meet(model, data, known, forces, counts[rows_of])
             counts[rows_of] = 0
@@ -60,18 +73,32 @@ def _law(numba: Any) -> Any:
     return law
 
 
-def _meet(numba: Any) -> Any:
-    """Compute the impulses of all contacts, and add them as forces on the joints."""
+def _sensor(numba: Any) -> Any:
+    """Copy the accelerations at the end of a step to the readings of sensors, which a rollout returns."""
     structs = import_module("mujoco.introspect.structs")
-    at, (contact, size) = layout(structs, "mjData")[0], layout(structs, "mjContact")
+    at, model_at = layout(structs, "mjData")[0], layout(structs, "mjModel")[0]
+    accelerations_of, readings_of, dofs_of = at["qacc"] // 8, at["sensordata"] // 8, model_at["nv"] // 8
+    view, pointer = numba.carray, _pointer(numba)
+
+    def sensor(model: Any, data: Any, _: Any) -> None:
+        fields, dofs = view(data, MANY, np.int64), view(model, MANY, np.int64)[dofs_of]
+        readings = view(pointer(fields[readings_of]), dofs, np.float64)
+        accelerations = view(pointer(fields[accelerations_of]), dofs, np.float64)
+        for dof in range(dofs):
+            readings[dof] = accelerations[dof]
+
+    return sensor
+
+
+def _meet(numba: Any) -> Any:
+    """Compute the impulses of joints and contacts, and add them as forces on the degrees of freedom."""
+    at = layout(import_module("mujoco.introspect.structs"), "mjData")[0]
     bias_of, smooth_of, free_of = at["qfrc_bias"] // 8, at["qfrc_smooth"] // 8, at["qacc_smooth"] // 8
     jacobian_of, inverse_of, before_of = at["efc_J"] // 8, at["efc_AR"] // 8, at["efc_vel"] // 8
     excess_of, frictions_of, impulses_of = at["efc_b"] // 8, at["efc_frictionloss"] // 8, at["efc_force"] // 8
-    count_of, contacts_of, row_of = at["ncon"] // 4, at["contact"] // 8, contact["efc_address"] // 4
-    depth_of, friction_of = contact["dist"] // 8, contact["friction"] // 8
     view, pointer, solve = numba.carray, _pointer(numba), _solve()
-    begin, want, balance, bear = (
-        numba.njit(error_model="numpy")(each) for each in (coast, touch, press, apply_impulses)
+    begin, balance, bear, aim, land = (
+        numba.njit(error_model="numpy")(each) for each in (coast, press, apply_impulses, _aim(numba), _land(numba))
     )
 
     def meet(model: Any, data: Any, known: Any, forces: Any, rows: int) -> None:
@@ -87,17 +114,56 @@ def _meet(numba: Any) -> Any:
         frictions = view(pointer(fields[frictions_of]), rows, np.float64)
         impulses = view(pointer(fields[impulses_of]), rows, np.float64)
         begin(step, jacobian, before, free, excess, impulses)
+        singles = aim(data, known, excess, frictions)
+        land(data, known, jacobian, before, excess, frictions)
+        inverse = view(pointer(fields[inverse_of]), (rows, rows), np.float64)
+        balance(int(known[SWEEPS]), singles, inverse, excess, frictions, impulses)
+        bear(step, jacobian, impulses, forces)
+
+    return meet
+
+
+def _aim(numba: Any) -> Any:
+    """Set the bounds of dry friction's impulses, and the target speeds of limits; return the numbers of their rows."""
+    at = layout(import_module("mujoco.introspect.structs"), "mjData")[0]
+    brakes_of, limits_of, gaps_of = at["nf"] // 4, at["nl"] // 4, at["efc_pos"] // 8
+    view, pointer, end = numba.carray, _pointer(numba), numba.njit(error_model="numpy")(stop)
+
+    def aim(data: Any, known: Any, excess: Any, frictions: Any) -> Any:
+        fields, counts = view(data, MANY, np.int64), view(data, MANY, np.int32)
+        brakes = int(counts[brakes_of])
+        singles = brakes + int(counts[limits_of])
+        gaps = view(pointer(fields[gaps_of]), singles, np.float64)
+        for row in range(brakes):
+            frictions[row] *= known[STEP]
+        for row in range(brakes, singles):
+            excess[row] -= end(known, gaps[row])
+            frictions[row] = np.inf
+        return brakes, singles
+
+    return aim
+
+
+def _land(numba: Any) -> Any:
+    """Set the target speeds and the coefficients of contacts."""
+    structs = import_module("mujoco.introspect.structs")
+    at, (contact, size) = layout(structs, "mjData")[0], layout(structs, "mjContact")
+    count_of, contacts_of, row_of = at["ncon"] // 4, at["contact"] // 8, contact["efc_address"] // 4
+    depth_of, friction_of = contact["dist"] // 8, contact["friction"] // 8
+    view, pointer, want = numba.carray, _pointer(numba), numba.njit(error_model="numpy")(touch)
+
+    def land(data: Any, known: Any, jacobian: Any, before: Any, excess: Any, frictions: Any) -> None:
+        fields = view(data, MANY, np.int64)
         for number in range(view(data, MANY, np.int32)[count_of]):
             here = pointer(fields[contacts_of] + number * size)
             its, row = view(here, MANY, np.float64), view(here, MANY, np.int32)[row_of]
             if row >= 0:
                 all_three, coefficients = slice(row, row + ROWS), its[friction_of : friction_of + 5]
                 frictions[row] = want(known, -its[depth_of], before[all_three], coefficients, excess[all_three])
-        inverse = view(pointer(fields[inverse_of]), (rows, rows), np.float64)
-        balance(int(known[SWEEPS]), inverse, excess, frictions, impulses)
-        bear(step, jacobian, impulses, forces)
+                if known[AHEAD] == 0.0 and np.sum(jacobian[row] ** 2) < UNMOVED:
+                    frictions[row] = excess[row] = 0.0  # it bears no load, so it has no friction either
 
-    return meet
+    return land
 
 
 def _pointer(numba: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The MuJoCo engine: worlds are grouped by kind, and each kind's rollouts run in one call."""
+"""The MuJoCo engine: worlds are grouped by what is compiled, and the rollouts of a group run in one call."""
 
 from collections.abc import Sequence
 from importlib import import_module
@@ -10,11 +10,35 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion, Recording, Trajectory
+from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
 from gaplab.services.engines.mujoco.scene import MuJoCoScene
 from gaplab.services.engines.stepping import WarmScenes, consecutive, recording
+
+IN_PLACE = frozenset(
+    {
+        "body.mass_kg",
+        "body.center_m",
+        "body.inertia",
+        "joint.limits",
+        "joint.damping",
+        "joint.dry_friction",
+        "joint.armature",
+        "motor.position_gain",
+        "motor.max_speed_rad_s",
+        "motor.max_torque_nm",
+        "motor.follows",
+        "motor.kp",
+        "motor.kd",
+        "motor.delay_s",
+        "surfaces",
+        "gravity_m_s2",
+        "slope_rad",
+        "noise",
+    }
+)
+"""Fields that are numbers of a compiled model."""
 
 
 class MuJoCoOptions(Frozen):
@@ -40,6 +64,8 @@ class MuJoCo(Engine):
     Options = MuJoCoOptions
     options: MuJoCoOptions
     honours = ALL_FIELDS
+    in_place = IN_PLACE
+    closes_loops = True
     repeatable = True
 
     def __init__(self, options: Frozen | None = None) -> None:
@@ -57,26 +83,26 @@ class MuJoCo(Engine):
         """Return whether MuJoCo is installed, and Numba, which compiles the contact law."""
         return super().available() and find_spec("numba") is not None
 
-    def rollout(self, world: World, motion: Motion) -> Trajectory:
-        """Return the trajectory of the base, `(t, 3)`; times are rounded to whole time steps."""
-        poses = self._scenes[world.kind].poses([world.material], [motion])[0, 0]
+    def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
+        """Return the trajectory of the observed body, `(t, 3)`; times are rounded to whole time steps."""
+        poses = self._scenes[world.built(self.in_place)].poses([world], [motion])[0, 0]
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
-    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion]) -> Trajectory:
-        """Return every motion in every world; worlds that differ only in material share calls of MuJoCo."""
+    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
+        """Return every motion in every world; worlds that differ only in place share calls of MuJoCo."""
         poses = np.empty((len(motions), len(worlds), len(motions[0].observe_s), 7))
         left = list(range(len(worlds)))
         while left:
-            kind = worlds[left[0]].kind
-            alike = [column for column in left if worlds[column].kind == kind]
+            built = worlds[left[0]].built(self.in_place)
+            alike = [column for column in left if worlds[column].built(self.in_place) == built]
             here = consecutive(alike)
-            poses[:, here] = self._scenes[kind].poses([worlds[column].material for column in alike], motions)
+            poses[:, here] = self._scenes[built].poses([worlds[column] for column in alike], motions)
             left = [column for column in left if column not in alike]
         return Trajectory(motions[0].observe_s, poses[..., :3], poses[..., 3:])
 
-    def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
+    def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
         """Return the same rollout with joint angles and torques."""
-        return recording(motion, times_s, *self._scenes[world.kind].record(world.material, motion, times_s))
+        return recording(motion, times_s, *self._scenes[world.built(self.in_place)].record(world, motion, times_s))
 
     def close(self) -> None:
         """End all threads."""

@@ -1,18 +1,40 @@
-"""The law of motors and contacts, in place of MuJoCo's own.
+"""The law of motors, joints and contacts, in place of MuJoCo's own.
 
 A World has static friction, dynamic friction and restitution; MuJoCo's contacts have none of these. Therefore MuJoCo
-computes kinematics, collisions and the inverse inertia at contacts, and this law computes the forces, in plain
-functions on arrays. `callback` compiles them.
+computes kinematics, collisions and the inverse inertia at contacts and limits, and this law computes the forces, in
+plain functions on arrays. `callback` compiles them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from math import hypot
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import World
+from gaplab.services.core.motor_law import DAMPING as VISCOSITY
+from gaplab.services.core.motor_law import FEED, STIFFNESS
+from gaplab.services.core.motor_law import STRONGEST as STRONGEST_NM
+from gaplab.services.engines.mujoco.settings import (
+    AHEAD,
+    DAMPERS,
+    DAMPING,
+    DOF,
+    EACH_DAMPER,
+    EACH_MOTOR,
+    EACH_SERVO,
+    FALL,
+    FASTEST,
+    FIRST,
+    GAIN,
+    LAW,
+    MOTOR_ROTOR,
+    MOTORS,
+    ROTOR,
+    SERVOS,
+    STEP,
+    STRONGEST,
+)
 
 SLIDES_M_S = 0.01
 """Speed along the ground above which a contact slides: a tenth of the speed that gravity adds in 1/100 s."""
@@ -23,13 +45,6 @@ PUSHED_OUT = 0.2
 BOUNCES = 2.0
 """Bounce threshold: the speed that gravity adds in this many steps; at 1/100 s Bullet's 0.2 m/s."""
 
-STEP, FALL, SWEEPS, DOFS, MOTORS, FIRST = 0, 1, 2, 3, 4, 5
-"""Indices into the settings: time step, speed that gravity adds in it, solver iterations, numbers of degrees of freedom
-and motors, and the first motor."""
-
-DOF, GAIN, FASTEST, STRONGEST, ROTOR, EACH = 0, 1, 2, 3, 4, 5
-"""Indices into a motor's settings, and their number."""
-
 STATIC, DYNAMIC, RESTITUTION = 0, 2, 3
 """Indices into a contact's five coefficients."""
 
@@ -37,72 +52,81 @@ ROWS = 3
 """Rows of a contact: away from the ground, and two directions along it."""
 
 
-class Drive(NamedTuple):
-    """A motor's settings: its degree of freedom, share of the error closed in a step, limits, and rotor's inertia."""
-
-    dof: int
-    gain: float
-    fastest_rad_s: float
-    strongest_nm: float
-    rotor_kg_m2: float
-
-
-def settings(world: World, dofs: int, drives: Sequence[Drive]) -> FloatArray:
-    """Return the settings of a world, as an array for the law."""
-    step, sweeps = world.time_step_s, max(1, world.solver_iterations)
-    motors = [value for drive in drives for value in drive]
-    return np.array([step, abs(world.gravity_m_s2) * step, sweeps, dofs, len(drives), *motors])
-
-
 def drive(known: Any, forces: Any, angles: Any, speeds: Any, accelerations: Any) -> None:
     """Compute the torques of the motors.
 
-    A motor targets the speed that closes its share of the error in a step. Its rotor turns with its hinge, and the
+    A Motor targets the speed that closes its share of the error in a step. Its rotor turns with its joint, and the
     torque would bring the rotor alone to that speed. This acts like an implicit servo, which is stable at any strength.
-    The hinge should get the whole torque, so the torque that the rotor took in the last step is added to the limit.
+    A PDMotor has a rotor too, of the inertia that makes its torque that of the end of the step. The joint should get
+    the whole torque, so the torque that the rotor took in the last step is added to the limit.
 
     Args:
         known: settings.
-        forces: `(6 + hinges,)`: targets, rad; overwritten with torques.
-        angles: `(7 + hinges,)`; the first seven are the pose of the base.
-        speeds: `(6 + hinges,)`; the first six are the base's.
-        accelerations: `(6 + hinges,)`, of the last step; zeros in the first step.
+        forces: `(d,)`: targets; overwritten with torques.
+        angles: `(d + ahead,)`; for a base that is free, the first seven are its pose.
+        speeds: `(d,)`; for a base that is free, the first six are its own.
+        accelerations: `(d,)`, of the last step; zeros in the first step.
     """
-    for motor in range(int(known[MOTORS])):
-        at = FIRST + EACH * motor
+    ahead, at = int(known[AHEAD]), FIRST
+    for _ in range(int(known[SERVOS])):
         dof, rotor = int(known[at + DOF]), known[at + ROTOR]
         fastest, strongest = known[at + FASTEST], known[at + STRONGEST]
-        closing = known[at + GAIN] * (forces[dof] - angles[dof + 1]) / known[STEP]
+        closing = known[at + GAIN] * (forces[dof] - angles[dof + ahead]) / known[STEP]
         wanted = np.minimum(np.maximum(closing, -fastest), fastest)
         asked, took = rotor * (wanted - speeds[dof]) / known[STEP], rotor * accelerations[dof]
         forces[dof] = np.minimum(np.maximum(asked, min(0.0, took) - strongest), max(0.0, took) + strongest)
+        at += EACH_SERVO
+    for _ in range(int(known[MOTORS])):
+        dof, law = int(known[at + DOF]), at + LAW
+        asked = known[law + STIFFNESS] * (forces[dof] - angles[dof + ahead]) + known[law + FEED] * forces[dof]
+        asked -= known[law + VISCOSITY] * speeds[dof]
+        strongest, took = known[law + STRONGEST_NM], known[at + MOTOR_ROTOR] * accelerations[dof]
+        forces[dof] = np.minimum(np.maximum(asked, min(0.0, took) - strongest), max(0.0, took) + strongest)
+        at += EACH_MOTOR
+
+
+def damp(known: Any, forces: Any, speeds: Any) -> None:
+    """Subtract the damping `(d,)` from the forces; MuJoCo's armature makes it that of the speeds after the step."""
+    at = FIRST + EACH_SERVO * int(known[SERVOS]) + EACH_MOTOR * int(known[MOTORS])
+    for _ in range(int(known[DAMPERS])):
+        dof = int(known[at + DOF])
+        forces[dof] -= known[at + DAMPING] * speeds[dof]
+        at += EACH_DAMPER
 
 
 def drive_torques(known: FloatArray, targets: FloatArray, angles: FloatArray, speeds: FloatArray) -> FloatArray:
-    """Return the torques that motors gave their hinges in each step of a rollout, within their limits.
+    """Return the torques that motors gave their joints in each step of a rollout, within their limits.
 
-    What the rotor takes is not the hinge's. In an impact the rotor passes on more than its motor can; the motor's limit
+    What the rotor takes is not the joint's. In an impact the rotor passes on more than its motor can; the motor's limit
     counts.
 
     Args:
         known: settings.
-        targets: `(s, 6 + hinges)`: targets, rad.
-        angles: `(s + 1, 7 + hinges)`: before each step, and at the end.
-        speeds: `(s + 1, 6 + hinges)`, likewise.
+        targets: `(s, d)`: targets.
+        angles: `(s + 1, d + ahead)`: before each step, and at the end.
+        speeds: `(s + 1, d)`, likewise.
 
     Returns:
-        `(s, 6 + hinges)`, N·m; 0 without a motor.
+        `(s, d)`, N·m; 0 without a motor.
     """
     accelerations = np.diff(speeds, axis=0) / known[STEP]
     before = np.vstack([np.zeros_like(accelerations[:1]), accelerations[:-1]])
     found = np.array(targets)
     for step, forces in enumerate(found):
         drive(known, forces, angles[step], speeds[step], before[step])
-    for motor in range(int(known[MOTORS])):
-        at = FIRST + EACH * motor
-        dof, strongest = int(known[at + DOF]), known[at + STRONGEST]
-        found[:, dof] = np.clip(found[:, dof] - known[at + ROTOR] * accelerations[:, dof], -strongest, strongest)
+    for dof, strongest, rotor in _rotors(known):
+        found[:, dof] = np.clip(found[:, dof] - rotor * accelerations[:, dof], -strongest, strongest)
     return found
+
+
+def _rotors(known: FloatArray) -> Iterator[tuple[int, float, float]]:
+    """Yield the degree of freedom, the largest torque and the rotor's inertia of each motor."""
+    servos, motors = int(known[SERVOS]), int(known[MOTORS])
+    for at in range(FIRST, FIRST + EACH_SERVO * servos, EACH_SERVO):
+        yield int(known[at + DOF]), known[at + STRONGEST], known[at + ROTOR]
+    first = FIRST + EACH_SERVO * servos
+    for at in range(first, first + EACH_MOTOR * motors, EACH_MOTOR):
+        yield int(known[at + DOF]), known[at + LAW + STRONGEST_NM], known[at + MOTOR_ROTOR]
 
 
 def coast(step: float, jacobian: Any, before: Any, accelerations: Any, excess: Any, impulses: Any) -> None:
@@ -142,19 +166,37 @@ def touch(known: Any, depth: float, before: Any, coefficients: Any, excess: Any)
     return coefficients[DYNAMIC] if hypot(before[1], before[2]) > SLIDES_M_S else coefficients[STATIC]
 
 
-def press(sweeps: int, inverse: Any, excess: Any, frictions: Any, impulses: Any) -> None:
+def stop(known: Any, gap: float) -> Any:
+    """Return the smallest speed away from a limit at the end of a step: it closes the gap, or opens a share of it.
+
+    Args:
+        known: settings.
+        gap: from the joint to its limit, rad; negative beyond it.
+    """
+    return -gap / known[STEP] if gap > 0 else -PUSHED_OUT * gap / known[STEP]
+
+
+def press(sweeps: int, singles: Any, inverse: Any, excess: Any, frictions: Any, impulses: Any) -> None:
     """Solve Coulomb's law by projected Gauss-Seidel: contacts push, never pull, and friction stays in its cone.
 
     Args:
-        sweeps: number of sweeps over all contacts.
+        sweeps: number of sweeps over all rows.
+        singles: `(2,)`: number of joints with dry friction, which have the first rows, and of these with the limits,
+            which have the next. A contact has three rows.
         inverse: `(r, r)`, symmetric: inverse inertia, the speed of each row by the impulse in each row.
         excess: `(r,)`: speeds above the targets without the impulses; updated to include them.
-        frictions: `(r,)`: coefficient of each contact, in the first of its three rows.
-        impulses: `(r,)`: zeros; overwritten with the impulses of the contacts, N·s.
+        frictions: `(r,)`: coefficient of each contact, in the first of its three rows; largest impulse of the others.
+        impulses: `(r,)`: zeros; overwritten with the impulses, N·s.
     """
     rows = len(excess)
     for _ in range(sweeps):
-        for row in range(0, rows, ROWS):
+        for row in range(singles[1]):
+            least, most = -frictions[row] if row < singles[0] else 0.0, frictions[row]
+            wanted = min(max(least, impulses[row] - excess[row] / inverse[row, row]), most)
+            change, impulses[row] = wanted - impulses[row], wanted
+            for other in range(rows):
+                excess[other] += inverse[row, other] * change
+        for row in range(singles[1], rows, ROWS):
             first, second = row + 1, row + 2
             normal = max(0.0, impulses[row] - excess[row] / inverse[row, row])
             change, impulses[row] = normal - impulses[row], normal

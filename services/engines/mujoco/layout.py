@@ -16,14 +16,14 @@ def layout(structs: ModuleType, name: str) -> tuple[Offsets, int]:
         structs: the module `mujoco.introspect.structs`.
         name: name of the structure, like `mjContact`.
     """
-    offsets, size, _ = _struct(structs, name)
+    offsets, size, _ = _struct(structs, structs.STRUCTS[name].fields)
     return offsets, size
 
 
-def _struct(structs: ModuleType, name: str) -> tuple[Offsets, int, int]:
+def _struct(structs: ModuleType, fields: Any) -> tuple[Offsets, int, int]:
     offsets: Offsets = {}
     end, alignment = 0, 1
-    for field in structs.STRUCTS[name].fields:
+    for field in fields:
         size, unit = _measure(structs, field.type)
         offsets[field.name] = _up(end, unit)
         end, alignment = offsets[field.name] + size, max(alignment, unit)
@@ -39,9 +39,11 @@ def _measure(structs: ModuleType, kind: Any) -> tuple[int, int]:
         for extent in kind.extents:
             size *= extent
         return size, unit
+    if type(kind).__name__ == "AnonymousStructDecl":
+        return _struct(structs, kind.fields)[1:]
     if kind.name in _SCALARS:
         return _SCALARS[kind.name], _SCALARS[kind.name]
-    return _struct(structs, kind.name)[1:]
+    return _struct(structs, structs.STRUCTS[kind.name].fields)[1:]
 
 
 def _up(offset: int, unit: int) -> int:

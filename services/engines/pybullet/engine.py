@@ -5,6 +5,7 @@ from importlib import import_module
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.world import World
+from gaplab.services.engines.base import ALL_FIELDS
 from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 from gaplab.services.engines.stepped import SteppedEngine
@@ -14,12 +15,31 @@ class PyBullet(SteppedEngine[PyBulletScene]):
     """Bullet's rigid bodies; stick-slip switching at each contact distinguishes static and dynamic friction.
 
     Deterministic within one version and architecture. Restitution acts on impacts faster than 0.2 m/s, Bullet's
-    threshold. If dynamic friction is not below static friction, there is no switching and no cost of it.
+    threshold. If dynamic friction is not below static friction, there is no switching and no cost of it. Bullet has no
+    armature.
     """
 
     name = "pybullet"
     source = "https://pybullet.org, version 3.2.7"
     library = "pybullet"
+    honours = ALL_FIELDS - {"joint.armature"}
+    in_place = frozenset(
+        {
+            "body.mass_kg",
+            "gravity_m_s2",
+            "joint.damping",
+            "joint.dry_friction",
+            "motor.delay_s",
+            "motor.kd",
+            "motor.kp",
+            "motor.max_speed_rad_s",
+            "motor.max_torque_nm",
+            "motor.position_gain",
+            "noise",
+            "slope_rad",
+            "surfaces",
+        }
+    )
     install = "pip install pybullet, which has wheels up to Python 3.11, or choose another engine, like mujoco"
 
     def __init__(self, options: Frozen | None = None) -> None:
@@ -31,8 +51,6 @@ class PyBullet(SteppedEngine[PyBulletScene]):
         return PyBulletScene(self._bullet, world)
 
     def _start(self, scene: PyBulletScene, world: World) -> Callable[[int], None]:
-        material = world.material
-        scene.world = world
-        scene.start(material, max(material.static_friction, material.dynamic_friction))
-        switches = material.dynamic_friction < material.static_friction
-        return StickSlip(scene, material).step if switches else scene.step
+        scene.start(world)
+        switches = any(each.dynamic_friction < each.static_friction for each in scene.materials.values())
+        return StickSlip(scene).step if switches else scene.step

@@ -1,21 +1,23 @@
-"""A World as bodies in its own Bullet server, built once and reset before each rollout."""
+"""A World in its own Bullet server, built once and reset before each rollout."""
 
-from dataclasses import dataclass
+from functools import partial
 from types import ModuleType
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import inverse, rotated
-from gaplab.services.core.shapes import Box
-from gaplab.services.core.world import Body, Joint, Material, World
+from gaplab.services.core.observations import gravity_m_s2
+from gaplab.services.core.shapes import UNTURNED, Quaternion, Vector
+from gaplab.services.core.world import Material, Motor, World
+from gaplab.services.engines.pybullet.robot import BASE, build_robot, inertial_frame, set_masses
+from gaplab.services.engines.pybullet.torques import Torques
 
-UNTURNED = (0.0, 0.0, 0.0, 1.0)
 FAR_AWAY = (0.0, 0.0, 1e4)
 """Position of the base, m, in which nothing touches the ground."""
 
-BASE = -1
-"""Bullet's index of the base. Links count from 0, and link i belongs to joint i."""
+ANGLE, SPEED, MOTOR_TORQUE = 0, 1, 3
+"""Indices into Bullet's numbers about a joint."""
 
 
 class PyBulletScene:
@@ -25,9 +27,10 @@ class PyBulletScene:
     values set by `changeDynamics`. Therefore `start` applies the material again, and a rollout commands every motor.
 
     Attributes:
+        world: the world that the scene is now.
         client: id of the server; every call names it, so scenes do not interfere.
         robot: Bullet's id of the robot.
-        colliding: Bullet's indices of the links that can touch the ground.
+        materials: material of each link that can touch the ground, by Bullet's index.
     """
 
     def __init__(self, bullet: ModuleType, world: World) -> None:
@@ -35,40 +38,45 @@ class PyBulletScene:
         self.world = world
         self.client: int = bullet.connect(bullet.DIRECT)
         self._set_up_physics()
-        tree = _tree(world)
-        self.robot = self._create_robot(tree)
-        self.colliding = tuple(index for index, body in enumerate(tree.bodies, start=BASE) if body.collides)
-        self._motors = tuple(
-            (index, joint.motor) for index, joint in enumerate(world.joints) if joint.motor is not None
-        )
-        self._from_center_of_mass = [-each for each in tree.bodies[0].center_m]
-        self._finish_robot(tree)
+        self._robot = build_robot(bullet, self.client, world)
+        self.robot = self._robot.robot
+        self.materials: dict[int, Material] = {}
+        self._bare_step = partial(bullet.stepSimulation, physicsClientId=self.client)
+        self._frame = self._from_center_of_mass()
+        self._set_joints()
         self._initial: int = bullet.saveState(physicsClientId=self.client)
 
-    def start(self, material: Material, friction: float) -> None:
-        """Reset to time 0, with a material and the initial coefficient of friction of its contacts.
+    def start(self, world: World) -> None:
+        """Reset to time 0 of a world, with the static friction of all contacts.
 
         `restoreState` keeps contact points of the last rollout, with their impulses, where a foot ended near its start.
         Far from the ground they are dropped.
         """
-        self.bullet.resetBasePositionAndOrientation(self.robot, FAR_AWAY, UNTURNED, physicsClientId=self.client)
-        self.bullet.performCollisionDetection(physicsClientId=self.client)
-        self.bullet.restoreState(self._initial, physicsClientId=self.client)
-        bounce, client = material.restitution, self.client
-        for link in self.colliding:
-            self.bullet.changeDynamics(self.robot, link, restitution=bounce, physicsClientId=client)
-            self.set_friction(link, friction)
+        bullet, client, turn = self.bullet, self.client, self.world.start_turn
+        bullet.resetBasePositionAndOrientation(self.robot, FAR_AWAY, turn, physicsClientId=client)
+        bullet.performCollisionDetection(physicsClientId=client)
+        bullet.restoreState(self._initial, physicsClientId=client)
+        self._become(world)
+        self._torques.reset()
+        named = dict(world.surfaces)
+        for link, body in self._robot.colliding.items():
+            material = self.materials[link] = named.get(body.surface, world.material)
+            bullet.changeDynamics(self.robot, link, restitution=material.restitution, physicsClientId=client)
+            self.set_friction(link, max(material.static_friction, material.dynamic_friction))
 
     def set_friction(self, link: int, friction: float) -> None:
         """Set the coefficient of friction of a link from the next step on."""
         self.bullet.changeDynamics(self.robot, link, lateralFriction=friction, physicsClientId=self.client)
 
     def command(self, actuator: int, target: float) -> None:
-        """Set a new target for a motor, rad."""
-        index, motor = self._motors[actuator]
+        """Set a new target for a motor, in its unit."""
+        joint, motor = self._motors[actuator]
+        if not isinstance(motor, Motor):
+            self._torques.command(joint, target)
+            return
         self.bullet.setJointMotorControl2(
             self.robot,
-            index,
+            self._robot.joints[joint],
             self.bullet.POSITION_CONTROL,
             targetPosition=target,
             force=motor.max_torque_nm,
@@ -80,23 +88,23 @@ class PyBulletScene:
 
     def step(self, count: int) -> None:
         """Advance by a number of time steps."""
-        advance, client = self.bullet.stepSimulation, self.client
+        advance = self.advance
         for _ in range(count):
-            advance(physicsClientId=client)
+            advance()
 
     def pose(self) -> FloatArray:
         """Return `(7,)`: position and quaternion of the base's frame."""
         position, turn = self.bullet.getBasePositionAndOrientation(self.robot, physicsClientId=self.client)
-        origin, turn = self.bullet.multiplyTransforms(position, turn, self._from_center_of_mass, UNTURNED)
+        origin, turn = self.bullet.multiplyTransforms(position, turn, *self._frame)
         return np.array([*origin, *turn])
 
     def angles(self) -> FloatArray:
-        """Return the joint angles `(joints,)`, rad."""
-        return self._states(0)
+        """Return the joint angles `(joints,)`, rad or m."""
+        return self._states(ANGLE)
 
     def speeds(self) -> FloatArray:
-        """Return the joint speeds `(joints,)`, rad/s."""
-        return self._states(1)
+        """Return the joint speeds `(joints,)`, rad/s or m/s."""
+        return self._states(SPEED)
 
     def turning(self) -> FloatArray:
         """Return the angular velocity of the base, `(3,)`, rad/s, in its own frame."""
@@ -104,8 +112,12 @@ class PyBulletScene:
         return rotated(inverse(self.pose()[3:]), np.array(turning))
 
     def torques(self) -> FloatArray:
-        """Return the torques of the motors in the last step, `(joints,)`, N·m."""
-        return self._states(3)
+        """Return the torques of the motors in the last step, `(joints,)`, N·m or N."""
+        torques = self._states(MOTOR_TORQUE)
+        for number, joint in enumerate(self.world.joints):
+            if not isinstance(joint.motor, Motor):  # Bullet's motor is the dry friction there
+                torques[number] = self._torques.motor_nm(number)
+        return torques
 
     def close(self) -> None:
         """Close the server."""
@@ -113,7 +125,7 @@ class PyBulletScene:
 
     def _states(self, place: int) -> FloatArray:
         """Return one of Bullet's numbers about each joint, `(joints,)`."""
-        joints = range(len(self.world.joints))
+        joints = self._robot.joints
         states = self.bullet.getJointStates(self.robot, joints, physicsClientId=self.client) if joints else ()
         return np.array([state[place] for state in states], dtype=float)
 
@@ -126,69 +138,50 @@ class PyBulletScene:
             deterministicOverlappingPairs=1,
             physicsClientId=client,
         )
-        bullet.setGravity(0, 0, -self.world.gravity_m_s2, physicsClientId=client)
+        bullet.setGravity(*gravity_m_s2(self.world), physicsClientId=client)
         plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
         self.ground: int = bullet.createMultiBody(0, plane, physicsClientId=client)
         # Bullet multiplies the coefficients of two bodies in contact: with 1 here, the robot's apply.
         bullet.changeDynamics(self.ground, BASE, lateralFriction=1.0, restitution=1.0, physicsClientId=client)
 
-    def _create_robot(self, tree: "_Tree") -> int:
-        base, *links = tree.bodies
-        robot: int = self.bullet.createMultiBody(
-            baseMass=base.mass_kg,
-            baseCollisionShapeIndex=self._create_shape(base),
-            basePosition=(0.0, 0.0, self.world.start_height_m),
-            baseInertialFramePosition=base.center_m,
-            linkMasses=[link.mass_kg for link in links],
-            linkCollisionShapeIndices=[self._create_shape(link) for link in links],
-            linkVisualShapeIndices=[-1] * len(links),
-            linkPositions=[joint.origin_m for joint in tree.joints],
-            linkOrientations=[UNTURNED] * len(links),
-            linkInertialFramePositions=[link.center_m for link in links],
-            linkInertialFrameOrientations=[UNTURNED] * len(links),
-            linkParentIndices=tree.parents,
-            linkJointTypes=[self.bullet.JOINT_REVOLUTE] * len(links),
-            linkJointAxis=[joint.axis for joint in tree.joints],
-            physicsClientId=self.client,
-        )
-        return robot
+    def _become(self, world: World) -> None:
+        """Set what differs in a world from that of the last start."""
+        before, self.world = self.world, world
+        if world.bodies != before.bodies:
+            set_masses(self.bullet, self.client, self._robot, world)
+        if world.joints != before.joints or world.bodies != before.bodies:
+            self._set_joints()
+        if (world.gravity_m_s2, world.slope_rad) != (before.gravity_m_s2, before.slope_rad):
+            self.bullet.setGravity(*gravity_m_s2(world), physicsClientId=self.client)
 
-    def _create_shape(self, body: Body) -> int:
-        shape, options = body.shape, {"collisionFramePosition": body.center_m, "physicsClientId": self.client}
-        if isinstance(shape, Box):
-            half = [edge / 2 for edge in shape.size_m]
-            return int(self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, **options))
-        return int(self.bullet.createCollisionShape(self.bullet.GEOM_SPHERE, radius=shape.radius_m, **options))
+    def _set_joints(self) -> None:
+        """Set dry friction, and choose how to step: with torques that Bullet has no motor for, or without."""
+        numbers = {joint.name: number for number, joint in enumerate(self.world.joints)}
+        self._motors = tuple((numbers[joint.name], joint.motor) for joint in self.world.actuators)
+        for link, joint in zip(self._robot.joints, self.world.joints, strict=True):
+            if not isinstance(joint.motor, Motor):
+                self.bullet.setJointMotorControl2(
+                    self.robot,
+                    link,
+                    self.bullet.VELOCITY_CONTROL,
+                    targetVelocity=0.0,
+                    force=joint.dry_friction,
+                    physicsClientId=self.client,
+                )
+        self._torques = Torques(self.world)
+        self._driven = [self._robot.joints[number] for number in self._torques.joints]
+        self.advance = self._driven_step if self._driven else self._bare_step
 
-    def _finish_robot(self, tree: "_Tree") -> None:
-        """Remove damping and unwanted collisions, and free the hinges without motors.
+    def _driven_step(self) -> None:
+        bullet, robot, links, client = self.bullet, self.robot, self._driven, self.client
+        states = bullet.getJointStates(robot, links, physicsClientId=client)
+        forces = self._torques.of(states)
+        bullet.setJointMotorControlArray(robot, links, bullet.TORQUE_CONTROL, forces=forces, physicsClientId=client)
+        self._bare_step()
 
-        Bullet computes a link's inertia from its collision shape. A link without a shape would have none, and
-        `changeDynamics(localInertiaDiagonal=...)` would change the base's instead. Therefore every body gets its shape.
-        """
-        bullet, robot, client = self.bullet, self.robot, self.client
-        for index, body in enumerate(tree.bodies, start=BASE):
-            bullet.changeDynamics(robot, index, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
-            if not body.collides:
-                bullet.setCollisionFilterGroupMask(robot, index, 0, 0, physicsClientId=client)
-        for index in range(len(tree.joints)):
-            bullet.setJointMotorControl2(robot, index, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
-
-
-@dataclass(frozen=True)
-class _Tree:
-    """Bodies in Bullet's order: the base, then the child of each joint; in `parents`, the base is 0."""
-
-    bodies: tuple[Body, ...]
-    joints: tuple[Joint, ...]
-    parents: tuple[int, ...]
-
-
-def _tree(world: World) -> _Tree:
-    by_name = {body.name: body for body in world.bodies}
-    names = [world.bodies[0].name, *(joint.child for joint in world.joints)]
-    return _Tree(
-        bodies=tuple(by_name[name] for name in names),
-        joints=world.joints,
-        parents=tuple(names.index(joint.parent) for joint in world.joints),
-    )
+    def _from_center_of_mass(self) -> tuple[Vector, Quaternion]:
+        """Return the base's frame in its inertial frame, which is what Bullet tells the pose of."""
+        center, turn = inertial_frame(self.world.bodies[0])
+        if turn == UNTURNED:
+            return (-center[0], -center[1], -center[2]), UNTURNED
+        return self.bullet.invertTransform(center, turn)  # type: ignore[no-any-return]

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from sqlalchemy import ColumnElement, and_, func, not_, or_, select
+from sqlalchemy import ColumnElement, and_, case, func, not_, or_, select
 
 from gaplab.schemas.lifecycle import OPEN, State
+from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.experiments.query import fields
 from gaplab.services.experiments.query.fields import Condition, Field, field_of
 from gaplab.services.experiments.query.parsing import Every, Not, Some, Term, Tree, Value, Words, parse, refusal
@@ -84,6 +85,12 @@ def _of_controllers() -> ColumnElement[str]:
     return func.coalesce(later, earlier)
 
 
+def _of_robots() -> ColumnElement[str]:
+    """SQL: the name that people know the robot by."""
+    plugin, name = (_E.spec["robot"][place] for place in ("name", "options"))
+    return case((plugin.as_string() == IMPORTED, name["name"].as_string()), else_=plugin.as_string())
+
+
 EXPERIMENT_FIELDS: Fields = {
     "id": fields.text(_E.id, "id"),
     "name": fields.text(_E.name, "name"),
@@ -91,7 +98,7 @@ EXPERIMENT_FIELDS: Fields = {
     "tag": fields.tags(_tagged, "a tag of it or of its study"),
     "study": fields.text(_E.study_id, "id of its study; `none` without one"),
     "strategy": fields.text(_E.strategy, "name of the strategy"),
-    "robot": fields.text(_E.spec["robot"]["name"].as_string(), "name of the robot"),
+    "robot": fields.text(_of_robots(), "name of the robot"),
     "controller": fields.text(_E.spec["controller"]["name"].as_string(), "controller; `none`: the robot's own"),
     "task": fields.text(_E.spec["task"]["name"].as_string(), "task; `none`: the robot's own"),
     "engine": fields.text(_E.spec["engine"]["name"].as_string(), "engine of the simulators"),

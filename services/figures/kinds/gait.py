@@ -23,13 +23,13 @@ def gait_figure(replay: Replay, *, title: str | None = None) -> FigureDefinition
     worlds = [(name, world) for name, world in there if world is not None and world.heights_m]
     whose = "sample" if replay.kind == "sample" else "transferred controller"
     own = f"The {whose} of iteration {replay.iteration}, repetition {replay.repetition}"
-    time = Axis("Time (s)", (0.0, replay.times_s[-1]))
+    time, height = Axis("Time (s)", (0.0, replay.times_s[-1])), _height(replay)
     return FigureDefinition(
         name="gait",
         title=heading(own if title is None else title),
         panels=(
-            _footfall(replay, worlds, time),
-            _over_time("Height of base (m)", replay, [(name, world.heights_m) for name, world in worlds], time),
+            *([_footfall(replay, worlds, time)] if replay.feet else []),
+            _over_time(f"{height} (m)", replay, [(name, world.heights_m) for name, world in worlds], time),
             _over_time("Speed (m/s)", replay, [(name, world.speeds_m_s) for name, world in worlds], time),
         ),
         caption=_caption(replay, worlds),
@@ -78,23 +78,26 @@ def _caption(replay: Replay, worlds: Sequence[Named]) -> str:
     return " ".join(
         [
             *parts,
-            "Bars: the foot is less than 2 mm above the ground.",
+            *(["Bars: the foot is less than 2 mm above the ground."] if replay.feet else []),
             "Speed: over ground in the direction of the whole motion, mean over 0.2 s.",
         ]
     )
 
 
 def _told(replay: Replay, worlds: Sequence[Named]) -> str:
-    parts = [
-        f"{name} its fitness is {number(world.fitness)} {replay.unit}; share of the time on the ground: "
-        + ", ".join(
+    parts = []
+    for name, world in worlds:
+        shares = [
             f"{foot} {100 * _share(spans, replay.times_s[-1]):.0f} %"
-            for foot, spans in zip(replay.feet, world.contacts, strict=True)
-        )
-        + "."
-        for name, world in worlds
-    ]
+            for foot, spans in zip(replay.feet, world.contacts, strict=False)  # unknown without joint angles
+        ]
+        told = f"; share of the time on the ground: {', '.join(shares)}" if shares else ""
+        parts.append(f"{name} its fitness is {number(world.fitness)} {replay.unit}{told}.")
     return " ".join(parts) or "The physics failed in both worlds."
+
+
+def _height(replay: Replay) -> str:
+    return f"Height of {replay.bodies[replay.observed].replace('_', ' ') if replay.observed else 'base'}"
 
 
 def _table(replay: Replay, worlds: Sequence[Named]) -> Table:
@@ -104,12 +107,14 @@ def _table(replay: Replay, worlds: Sequence[Named]) -> Table:
             f"{foot}: share of time on the ground, number of contacts",
             *(
                 f"{100 * _share(world.contacts[at], replay.times_s[-1]):.0f} %, {len(world.contacts[at])} ×"
+                if world.contacts
+                else "unknown"
                 for _, world in worlds
             ),
         )
         for at, foot in enumerate(replay.feet)
     ]
-    means = [("Mean height of base (m)", [world.heights_m for _, world in worlds])]
+    means = [(f"Mean {_height(replay).lower()} (m)", [world.heights_m for _, world in worlds])]
     means.append(("Mean speed (m/s)", [world.speeds_m_s for _, world in worlds]))
     rows += [(label, *(number(sum(each) / len(each)) for each in values)) for label, values in means]
     rows.append((f"Fitness ({replay.unit})", *(number(world.fitness) for _, world in worlds)))

@@ -11,7 +11,7 @@
     supervisor
     notification, of an event; notifier, which finds them
     deletion, of a study or an experiment;  view, a saved query
-    attachment, of answers
+    attachment, of answers;  robot, a file that specs name by its hash
     token, of a caller;  idempotency, a request with its answer
 
 Values that are plotted or filtered are columns; vectors are JSON arrays, in which floats round-trip exactly. Neither a
@@ -50,4 +50,5 @@ from gaplab.services.store.models.provenance import SupervisorRow as SupervisorR
 from gaplab.services.store.models.results import IterationRow as IterationRow
 from gaplab.services.store.models.results import MeasurementRow as MeasurementRow
 from gaplab.services.store.models.results import SimulatorRow as SimulatorRow
+from gaplab.services.store.models.robots import RobotRow as RobotRow
 from gaplab.services.store.models.sensitivity import SensitivityRow as SensitivityRow

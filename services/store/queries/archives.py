@@ -17,9 +17,10 @@ from gaplab.services.store.models import (
     ExperimentProvenanceRow,
     ExperimentRow,
     RepetitionRow,
+    RobotRow,
     StudyRow,
 )
-from gaplab.services.store.queries import provenance
+from gaplab.services.store.queries import provenance, robots
 
 Row = dict[str, Any]
 
@@ -45,7 +46,8 @@ def read_rows(session: Session, name: str, columns: Iterable[str], owners: Seque
         owners: ids of experiments, or of studies if the table is `study`; rows have this order.
     """
     names = list(columns)
-    queries = [_provenances(names, owners)] if name == "provenance" else [_query(name, names, each) for each in owners]
+    shared = {"provenance": _provenances, "robot": _robots}
+    queries = [shared[name](names, owners)] if name in shared else [_query(name, names, each) for each in owners]
     for query in queries:
         for row in session.execute(query, execution_options={"yield_per": _AT_ONCE}).mappings():
             yield {key: value.value if isinstance(value, Enum) else value for key, value in row.items()}
@@ -81,6 +83,8 @@ def insert_rows(session: Session, name: str, rows: Iterable[Row]) -> int:
         count += len(some)
         if name == "provenance":
             provenance.insert_unless_there(session, some)
+        elif name == "robot":
+            robots.insert_unless_there(session, some)
         else:
             session.execute(insert(table), _with_ids(session, some) if REPETITION_ID in table.c else some)
     return count
@@ -104,6 +108,13 @@ def _provenances(columns: Sequence[str], experiments: Sequence[str]) -> Select[A
     table, use = Base.metadata.tables["provenance"], ExperimentProvenanceRow
     used = select(use.provenance_id).where(use.experiment_id.in_(experiments))
     return select(*(table.c[each] for each in columns)).where(table.c.id.in_(used)).order_by(table.c.id)
+
+
+def _robots(columns: Sequence[str], experiments: Sequence[str]) -> Select[Any]:
+    """Return the query for robot files, which experiments share."""
+    table, hash_ = RobotRow.__table__, ExperimentRow.spec["robot"]["options"]["sha256"].as_string()
+    used = select(hash_).where(ExperimentRow.id.in_(experiments), hash_.is_not(None))
+    return select(*(table.c[each] for each in columns)).where(table.c.sha256.in_(used)).order_by(table.c.sha256)
 
 
 def _query(name: str, columns: Sequence[str], owner: str) -> Select[Any]:

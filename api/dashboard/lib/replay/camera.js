@@ -18,8 +18,9 @@ const KEYS = { ArrowLeft: [-STEP, 0, 1], ArrowRight: [STEP, 0, 1], ArrowUp: [0, 
  * Return a camera; `changed` is called after each move.
  *
  * @param {() => void} changed
+ * @param {number} [scale] the size of what it sees, relative to the quadruped
  */
-export function camera(changed) {
+export function camera(changed, scale = 1) {
   const position = { turn: -1.0, rise: 0.35, distance: 1.25 };
 
   /** @type {(turn: number, rise: number, zoom?: number) => void} */
@@ -77,14 +78,15 @@ export function camera(changed) {
    *
    * @param {Page.Vector} target
    * @param {number} [further]
+   * @param {number} [slope] angle by which the ground, the plane z = 0, rises along x in the picture
    * @returns {Page.Viewpoint}
    */
-  function viewpoint(target, further = 0) {
-    const distance = position.distance + further;
+  function viewpoint(target, further = 0, slope = 0) {
+    const distance = position.distance * scale + further;
     const level = distance * Math.cos(position.rise);
     const eye = [
       target[0] + level * Math.cos(position.turn), target[1] + level * Math.sin(position.turn), target[2] + distance * Math.sin(position.rise)];
-    return { eye, target, distance };
+    return { eye, target, distance, scale, up: [Math.sin(slope), 0, Math.cos(slope)] };
   }
 
   return { listen, move, viewpoint };

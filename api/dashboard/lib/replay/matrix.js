@@ -51,15 +51,16 @@ export function perspective(angle, aspect, near, far) {
 }
 
 /**
- * Return the world as seen from `eye` towards `target`, with z upwards.
+ * Return the world as seen from `eye` towards `target`.
  *
  * @param {Page.Vector} eye
  * @param {Page.Vector} target
+ * @param {Page.Vector} [upwards]
  * @returns {Page.Matrix}
  */
-export function viewFrom(eye, target) {
+export function viewFrom(eye, target, upwards = [0, 0, 1]) {
   const back = unit([0, 1, 2].map((k) => eye[k] - target[k]));
-  const right = unit([-back[1], back[0], 0]);
+  const right = unit(cross(upwards, back));
   const up = cross(back, right);
   return new Float32Array([
     right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0,
@@ -100,4 +101,4 @@ export function unit(vector) {
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 /** @type {(a: Page.Vector, b: Page.Vector) => Page.Vector} */
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

@@ -59,15 +59,19 @@ export function shapePoses(world, poses) {
 }
 
 /**
- * Return where the robot's base was over the ground, frame by frame up to a time.
+ * Return where a body was over the ground, frame by frame up to a time.
  *
  * @param {Api.ReplayWorld} world
  * @param {number[]} timesS
  * @param {number} time
+ * @param {number} [body] the base in a world that has only the base
  */
-export function pathUntil(world, timesS, time) {
+export function pathUntil(world, timesS, time, body = 0) {
   const [frame] = frameAt(timesS, time);
-  return world.positions_m.slice(0, frame + 1).map(([x, y]) => [x, y]);
+  return world.positions_m.slice(0, frame + 1).map((row) => {
+    const first = 3 * body < row.length ? 3 * body : 0;
+    return [row[first], row[first + 1]];
+  });
 }
 
 /**

@@ -25,16 +25,17 @@ uniform vec4 other;
 uniform vec4 sky;
 uniform vec3 light;
 uniform vec3 around;
+uniform float scale;
 out vec4 seen;
 void main() {
   if (kind == 2) {
     seen = colour;
   } else if (kind == 1) {
-    vec2 square = at.xy / 0.25;
+    vec2 square = at.xy / (0.25 * scale);
     vec2 soft = fwidth(square);
     vec2 edges = clamp((abs(fract(square * 0.5) - 0.5) - 0.25) / max(soft * 0.5, vec2(1e-4)), -1.0, 1.0);
     float checker = 0.5 - 0.5 * edges.x * edges.y;
-    float far = smoothstep(1.5, 6.0, distance(at.xy, around.xy));
+    float far = smoothstep(1.5, 6.0, distance(at.xy, around.xy) / scale);
     seen = mix(mix(colour, other, checker), sky, far);
   } else {
     float lit = 0.62 + 0.38 * dot(normalize(facing), light);

@@ -12,6 +12,7 @@ import * as webgl from "./webgl.js";
  * @typedef {object} Shared what the stages of a replay have in common
  * @property {import("./camera.js").Camera} camera
  * @property {(time: number) => { target: Page.Vector, further: number }} lookAt the camera's target, and how much farther away it is than usual
+ * @property {number} observed the body whose path is drawn
  * @property {AbortSignal} signal
  */
 
@@ -23,7 +24,7 @@ import * as webgl from "./webgl.js";
  * @param {string} label
  * @param {Shared} shared
  */
-export function stage(world, timesS, label, { camera, lookAt, signal }) {
+export function stage(world, timesS, label, { camera, lookAt, observed, signal }) {
   const canvas = h("canvas", { class: "stage-canvas", tabindex: "0", role: "img", "aria-label": label });
   const feet = [...new Set(world.shapes.filter(({ role }) => role === "foot").map(({ body }) => body))];
   /** @type {WebGL2RenderingContext | null} */
@@ -50,7 +51,7 @@ export function stage(world, timesS, label, { camera, lookAt, signal }) {
     const grounded = new Set(feetOnGround(world, time).map((foot) => feet[foot]));
     const { target, further } = lookAt(time);
     const models = shapePoses(world, bodyPoses(world, timesS, time));
-    paint(models, grounded, camera.viewpoint(target, further), palette, pathUntil(world, timesS, time));
+    paint(models, grounded, camera.viewpoint(target, further, world.slope_rad), palette, pathUntil(world, timesS, time, observed));
     canvas.dataset.time = time.toFixed(3);
   }
 

@@ -33,7 +33,7 @@ export const context = (canvas) => canvas.getContext("webgl2", { antialias: true
 export function painter(canvas, gl, shapes) {
   const program = link(gl);
   const uniform = Object.fromEntries(
-    ["view", "model", "kind", "colour", "other", "sky", "light", "around"].map((name) => [name, gl.getUniformLocation(program, name)]));
+    ["view", "model", "kind", "colour", "other", "sky", "light", "around", "scale"].map((name) => [name, gl.getUniformLocation(program, name)]));
   const solids = solidsOf(shapes);
   const uploaded = solids.map((shape) => upload(gl, program, mesh(shape)));
   const ground = upload(gl, program, GROUND);
@@ -48,21 +48,22 @@ export function painter(canvas, gl, shapes) {
     gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, 0);
   }
 
-  /** @type {(palette: Page.Palette, target: Page.Vector) => void} */
-  function drawGround(palette, target) {
+  /** @type {(palette: Page.Palette, camera: Page.Viewpoint) => void} */
+  function drawGround(palette, { target: [x, y], scale }) {
     gl.uniform4fv(uniform.other, palette["floor-other"]);
     const model = IDENTITY.slice();
-    model.set([Math.round(target[0]), Math.round(target[1])], 12);
+    for (const axis of [0, 5, 10]) model[axis] = scale;
+    model.set([scale * Math.round(x / scale), scale * Math.round(y / scale)], 12);
     drawMesh(ground, model, KIND.ground, palette.floor);
   }
 
   /**
    * Darken each spot of the ground once, however many bodies are above it.
    *
-   * @type {(models: Page.Matrix[], palette: Page.Palette) => void}
+   * @type {(models: Page.Matrix[], palette: Page.Palette, scale: number) => void}
    */
-  function drawShadows(models, palette) {
-    const projection = shadowOnto(LIGHT, 0.001);
+  function drawShadows(models, palette, scale) {
+    const projection = shadowOnto(LIGHT, 0.001 * scale);
     gl.enable(gl.STENCIL_TEST);
     gl.stencilFunc(gl.EQUAL, 0, 1);
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
@@ -72,11 +73,11 @@ export function painter(canvas, gl, shapes) {
     gl.disable(gl.STENCIL_TEST);
   }
 
-  /** @type {(path: Page.Vector[], palette: Page.Palette) => void} */
-  function drawPath(path, palette) {
+  /** @type {(path: Page.Vector[], palette: Page.Palette, scale: number) => void} */
+  function drawPath(path, palette, scale) {
     gl.bindVertexArray(null);
     gl.bindBuffer(gl.ARRAY_BUFFER, line);
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(path.flatMap(([x, y]) => [x, y, 0.003])), gl.DYNAMIC_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(path.flatMap(([x, y]) => [x, y, 0.003 * scale])), gl.DYNAMIC_DRAW);
     const attribute = gl.getAttribLocation(program, "place");
     gl.enableVertexAttribArray(attribute);
     gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 0, 0);
@@ -94,14 +95,15 @@ export function painter(canvas, gl, shapes) {
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.useProgram(program);
-    const lens = perspective(VIEW_ANGLE, canvas.width / canvas.height, 0.05, 40);
-    gl.uniformMatrix4fv(uniform.view, false, product(lens, viewFrom(camera.eye, camera.target)));
+    const lens = perspective(VIEW_ANGLE, canvas.width / canvas.height, 0.05 * camera.scale, 40 * camera.scale);
+    gl.uniformMatrix4fv(uniform.view, false, product(lens, viewFrom(camera.eye, camera.target, camera.up)));
     gl.uniform3fv(uniform.light, LIGHT);
     gl.uniform3fv(uniform.around, camera.target);
     gl.uniform4fv(uniform.sky, palette.sky);
-    drawGround(palette, camera.target);
-    drawShadows(models, palette);
-    if (path.length > 1) drawPath(path, palette);
+    gl.uniform1f(uniform.scale, camera.scale);
+    drawGround(palette, camera);
+    drawShadows(models, palette, camera.scale);
+    if (path.length > 1) drawPath(path, palette, camera.scale);
     solids.forEach((shape, index) =>
       drawMesh(uploaded[index], models[index], KIND.body, colourOf(shape, palette, grounded.has(shape.body))));
   };

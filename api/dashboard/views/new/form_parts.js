@@ -3,6 +3,7 @@
 
 import { h } from "../../lib/dom.js";
 import { count, readableName } from "../../lib/format.js";
+import { robotPicture } from "../../lib/robot_picture.js";
 import { EVALUATIONS, ticked } from "./draft.js";
 import { errorRoom, field, numberField, optionFields, tickField } from "./fields.js";
 
@@ -105,6 +106,7 @@ export function simulationPart(form) {
   const robotEngine = `The robot’s own${robot ? `: ${robot.details.engine}` : ""}`;
   return part("Simulation",
     pluginField(form, "Robot", draft.robot, catalogue.robots, "/robot"),
+    robotPicture(robot, form.signal),
     ...(robot?.details.controller ? [
       pluginField(form, "Controller", draft.controller, catalogue.controllers ?? [], "/controller", ownOf(robot.details.controller)),
       pluginField(form, "Task", draft.task, catalogue.tasks ?? [], "/task", ownOf(robot.details.task))] : []),

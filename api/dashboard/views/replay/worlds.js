@@ -9,7 +9,6 @@ import { frameAt } from "../../lib/replay/motion.js";
 import { stage } from "../../lib/replay/stage.js";
 
 const SMOOTHING = 12;  // frames to each side over which the camera's path is averaged
-const TARGET_HEIGHT_M = 0.12;
 
 /**
  * Return both stages in one element, and `draw(time)` for both.
@@ -24,7 +23,9 @@ export function worlds(replay, isPhysical, signal) {
   /** @type {ReturnType<typeof stage>[]} */
   const stages = [];
   const draw = (/** @type {number | undefined} */ time = undefined) => stages.forEach((each) => each.draw(time));
-  const shared = { camera: camera(() => draw()), lookAt: (/** @type {number} */ time) => between(paths, replay.times_s, time), signal };
+  const { framing, observed } = replay;
+  const lookAt = (/** @type {number} */ time) => between(paths, replay.times_s, time, framing.height_m);
+  const shared = { camera: camera(() => draw(), framing.scale), lookAt, observed, signal };
   /** @type {(world: Api.ReplayWorld | null, title: string, absent: string) => HTMLElement} */
   const worldPanel = (world, title, absent) => {
     if (!world) return panel(title, "", empty(absent));
@@ -70,11 +71,12 @@ export function smoothed(positions) {
  * @param {Page.Vector[][]} paths
  * @param {number[]} timesS
  * @param {number} time
+ * @param {number} height that the camera looks at
  */
-function between(paths, timesS, time) {
+function between(paths, timesS, time, height) {
   const [frame, share] = frameAt(timesS, time);
   const bases = paths.map((path) => [0, 1].map((k) => path[frame][k] * (1 - share) + (path[frame + 1] ?? path[frame])[k] * share));
   const [x, y] = [0, 1].map((k) => bases.reduce((sum, base) => sum + base[k], 0) / (bases.length || 1));
   const apart = Math.max(0, ...bases.map((base) => Math.hypot(base[0] - x, base[1] - y)));
-  return { target: [x, y, TARGET_HEIGHT_M], further: 2.2 * apart };
+  return { target: [x, y, height], further: 2.2 * apart };
 }

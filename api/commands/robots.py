@@ -1,0 +1,171 @@
+"""Commands that import robots from files, and store them in the service."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from pydantic import ValidationError
+from rich.markup import escape
+from rich.table import Table
+
+from gaplab.api.clients.progress.text import console
+from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
+from gaplab.api.commands.exit_codes import Exit
+from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.schemas.mistakes import sentence
+from gaplab.services.core.errors import InvalidRobot
+
+if TYPE_CHECKING:
+    from gaplab.services.robots.importing import ImportedFile, MassRow
+    from gaplab.services.robots.options import ImportOptions
+
+MOTORS = "servo, position, velocity or torque"
+OTHERS = (
+    "kp, kd, max_torque, position_gain, motored, keyframe, vertices, visuals, static_friction, dynamic_friction, "
+    "observed, controller or task; repeatable"
+)
+
+robot = typer.Typer(help="Import robots from URDF and MJCF, and store them.", no_args_is_help=True)
+app.add_typer(robot, name="robot", rich_help_panel=PLUGINS)
+
+
+@robot.command("import")
+def import_file(  # noqa: PLR0913, PLR0917 - each is an option of the command
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="a URDF or an MJCF")],
+    name: Annotated[str | None, typer.Option(help="name of the robot; left out: that in the file")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="file to write; left out: NAME.json", show_default=False)
+    ] = None,
+    fixed: Annotated[bool, typer.Option("--fixed", help="the base never moves, like that of an arm")] = False,
+    mend: Annotated[bool, typer.Option("--mend", help="replace masses and inertias that no rigid body has")] = False,
+    motor: Annotated[
+        str | None,
+        typer.Option(help=f"motor of the joints: {MOTORS}; left out: the file's, position for a URDF"),
+    ] = None,
+    time_step: Annotated[float | None, typer.Option(help="time step, s; left out: the file's, or 1/240")] = None,
+    start: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT=RAD", help="angle at time 0; JOINT may be a pattern like '*_knee'; repeatable"),
+    ] = None,
+    lock: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="joints to fix at zero; repeatable")] = None,
+    settings: Annotated[list[str] | None, typer.Option("--set", "-s", metavar="NAME=VALUE", help=OTHERS)] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a robot file from a URDF or an MJCF, and print what is lost or changed. Needs MuJoCo."""
+    from gaplab.services.robots.importing import import_robot
+
+    flags = {"name": name, "fixed": fixed, "mend": mend, "motor": motor, "time_step_s": time_step, "lock": lock or []}
+    chosen = _options({**flags, "start": _starts(start or []), **dict(map(_setting, settings or []))})
+    try:
+        imported = import_robot(file, chosen)
+    except InvalidRobot as error:
+        typer.echo(f"gaplab: {file} cannot be imported:", err=True)
+        for reason in error.reasons:
+            typer.echo(f"  - {reason}", err=True)
+        raise typer.Exit(Exit.INVALID) from error
+    written = output or Path(f"{imported.robot.name}.json")
+    written.write_text(json.dumps(imported.robot.content, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+    if as_json:
+        print_json(_facts(imported, written))
+    else:
+        console().print(*_lines(imported, written), sep="\n", soft_wrap=True)
+
+
+def _options(given: dict[str, Any]) -> "ImportOptions":
+    from gaplab.services.robots.options import ImportOptions
+
+    try:
+        return ImportOptions.model_validate({name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        raise typer.BadParameter("; ".join(_mistake(dict(each)) for each in error.errors())) from error
+
+
+def _mistake(error: dict[str, Any]) -> str:
+    if error["type"] == "extra_forbidden":
+        return f"{error['loc'][-1]} is no option of an import; permitted: {OTHERS.partition(';')[0]}"
+    return sentence(error)
+
+
+def _starts(texts: list[str]) -> dict[str, float]:
+    found = {}
+    for text in texts:
+        joint, _, angle = text.rpartition("=")
+        try:
+            found[joint] = float(angle)
+        except ValueError:
+            joint = ""
+        if not joint:
+            msg = f"{text!r} sets no angle; write JOINT=RAD, like knee=-1.8"
+            raise typer.BadParameter(msg, param_hint="--start")
+    return found
+
+
+def _setting(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise typer.BadParameter(f"{text!r} sets nothing; write NAME=VALUE, like kp=60", param_hint="--set")
+    return name, value
+
+
+def _facts(imported: "ImportedFile", written: Path) -> dict[str, Any]:
+    rows = [vars(row) for row in imported.masses]
+    return {
+        "file": str(written),
+        "name": imported.robot.name,
+        "sha256": imported.robot.sha256,
+        "lost": imported.robot.lost,
+        "masses": rows,
+        "mass_before_kg": imported.before_kg,
+        "mass_after_kg": imported.after_kg,
+    }
+
+
+def _lines(imported: "ImportedFile", written: Path) -> Iterator[str | Table]:
+    world = imported.robot.world
+    yield f"[bold]{escape(imported.robot.name)}[/]: {len(world.bodies)} bodies, {len(world.actuators)} actuators"
+    yield "[bold]lost or changed[/]"
+    yield from (f"  - {escape(line)}" for line in imported.robot.lost)
+    yield _mass_table(imported)
+    yield f"Wrote {escape(str(written))}, sha256 {imported.robot.sha256}"
+
+
+def _mass_table(imported: "ImportedFile") -> Table:
+    table = Table("body", "of the file's", "kg in the file", "kg imported", box=None)
+    for row in imported.masses:
+        table.add_row(escape(row.body), str(len(row.members)), *_both(row))
+    table.add_row("all", "", f"{imported.before_kg:.6g}", f"{imported.after_kg:.6g}", style="bold")
+    return table
+
+
+def _both(row: "MassRow") -> tuple[str, str]:
+    return f"{row.before_kg:.6g}", f"{row.after_kg:.6g}"
+
+
+@robot.command()
+def add(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="a robot file, as `gaplab robot import` writes it")],
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Store a robot file in the service, so that specs can name its robot."""
+    with connect(url) as client:
+        found = client.add_robot(file)
+    text = f"Stored the robot {found.name}, sha256 {found.sha256}. A spec names it: {json.dumps({'robot': found.name})}"
+    print_result(found, text, as_json=as_json)
+
+
+@robot.command("list")
+def list_(as_json: AsJson = False, url: Url = None) -> None:
+    """List the robots from files that the service has, the newest of a name first."""
+    with connect(url) as client:
+        found = client.robots()
+    if as_json:
+        print_json(found)
+        return
+    table = Table("name", "sha256", "bodies", "actuators", "kg", "file", "stored", box=None)
+    for each in found:
+        size = str(each.bodies), str(each.actuators), f"{each.mass_kg:.4g}"
+        table.add_row(escape(each.name), each.sha256[:12], *size, escape(each.file or "-"), f"{each.created_at:%F %R}")
+    console().print(table if found else "No robot is stored; `gaplab robot add FILE` stores one.")

@@ -1,0 +1,172 @@
+"""Robot files: a robot as JSON, without code: its world, where it comes from, and what drives and rates it by default.
+
+The canonical text leaves out what has its default value, so that a field that the World gets later changes no hash.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import MISSING, fields, is_dataclass
+from functools import cached_property
+from hashlib import sha256
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, StringConstraints, ValidationError
+
+from gaplab.schemas.base import Frozen
+from gaplab.schemas.mistakes import permitted_by, sentence
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.robots import MOST_LOSSES, RobotSource
+from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.world import World
+from gaplab.services.core.world_checks import world_violations
+
+MOST_BYTES = 2_000_000
+"""Largest size of a robot file."""
+
+_SHAPES = "a shape: its kind is box, sphere, capsule, cylinder or hull"
+_MESSAGES = {
+    "extra_forbidden": ("{} is no field here", "no such field"),
+    "unexpected_keyword_argument": ("{} is no field here", "no such field"),
+    "union_tag_invalid": (f"{{}} must be {_SHAPES}", _SHAPES),
+    "union_tag_not_found": (f"{{}} must be {_SHAPES}", _SHAPES),
+}
+"""Message and what is permitted, by pydantic's type of error, where its own words would not help."""
+
+_UNWRITTEN = ("origin", "edits")
+"""Fields of a world that say how it was edited; a file has only what it is."""
+
+
+class RobotFile(Frozen):
+    """A robot as its file has it.
+
+    Attributes:
+        format_version: version of the format.
+        name: name of the robot.
+        source: file that it was imported from; None if it was written by hand.
+        usual_controller: controller of a spec that names none.
+        usual_task: task of a spec that names none.
+        lost: what its import lost or changed, line by line.
+        world: the robot in reality.
+    """
+
+    model_config = ConfigDict(strict=True)
+
+    format_version: Annotated[int, Field(ge=1, le=1)] = 1
+    name: Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,59}$")]
+    source: RobotSource | None = None
+    usual_controller: PluginRef
+    usual_task: PluginRef
+    lost: Annotated[tuple[Annotated[str, Field(max_length=1_000)], ...], Field(max_length=MOST_LOSSES)] = ()
+    world: World
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """The file as JSON values, without what has its default value."""
+        refs = {name: getattr(self, name).model_dump(mode="json") for name in ("usual_controller", "usual_task")}
+        source = {} if self.source is None else {"source": self.source.model_dump(mode="json")}
+        return {
+            "format_version": self.format_version,
+            "name": self.name,
+            **source,
+            **refs,
+            "lost": list(self.lost),
+            "world": _plain(self.world),
+        }
+
+    @cached_property
+    def text(self) -> str:
+        """The canonical text: sorted keys, no spaces, shortest numbers."""
+        return json.dumps(self.content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+    @cached_property
+    def sha256(self) -> str:
+        """The identity of the robot: the hash of the canonical text, whatever the spaces and the order in the file."""
+        return sha256(self.text.encode()).hexdigest()
+
+
+def read_robot_file(text: str | bytes) -> RobotFile:
+    """Return the robot of a file's text.
+
+    Raises:
+        InvalidSpec: with every violation; pointers are places in the file.
+    """
+    if len(text) > MOST_BYTES:
+        message = f"the robot file has {len(text):,} bytes, but at most {MOST_BYTES:,} are permitted"
+        raise InvalidSpec([Violation("", None, message, f"at most {MOST_BYTES:,} bytes")])
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InvalidSpec([Violation("", None, f"the robot file is no JSON: {error}", "JSON in UTF-8")]) from error
+    _refuse_edits(content)
+    try:
+        robot = RobotFile.model_validate_json(text)
+    except ValidationError as error:
+        raise InvalidSpec(_violations(error, content)) from error
+    if violations := tuple(world_violations(robot.world, "/world")):
+        raise InvalidSpec(violations)
+    return robot
+
+
+def _refuse_edits(content: Any) -> None:  # noqa: ANN401 - any JSON
+    world = content.get("world") if isinstance(content, dict) else None
+    names = [name for name in _UNWRITTEN if isinstance(world, dict) and name in world]
+    if names:
+        message = "{} is no field of a robot file: it would say how the world was edited"
+        raise InvalidSpec(Violation(f"/world/{name}", None, message.format(name), "no such field") for name in names)
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - any value of a world
+    """Return a value of a world as JSON, without fields that have their default values; a shape keeps its kind."""
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    if not is_dataclass(value):
+        return value
+    found = {}
+    for field in fields(value):
+        given = getattr(value, field.name)
+        default = field.default if field.default_factory is MISSING else field.default_factory()
+        if field.name not in _UNWRITTEN and (field.name == "kind" or given != default):
+            found[field.name] = _plain(given)
+    return found
+
+
+def _violations(error: ValidationError, content: Any) -> Iterator[Violation]:  # noqa: ANN401 - any JSON
+    """Return the errors of pydantic with JSON pointers, of each union only those of the member that was meant."""
+    for each in error.errors():
+        place, meant = _place(each["loc"], content, is_missing=each["type"] == "missing")
+        if meant:
+            pointer = "".join(f"/{str(part).replace('~', '~0').replace('/', '~1')}" for part in place)
+            message, permitted = _MESSAGES.get(each["type"], (sentence(dict(each), place), permitted_by(dict(each))))
+            if each["type"] in _MESSAGES:
+                message = message.format(place[-1])
+            yield Violation(pointer, each["input"], message, permitted)
+
+
+def _place(
+    loc: Sequence[str | int],
+    content: Any,  # noqa: ANN401 - any JSON
+    *,
+    is_missing: bool,
+) -> tuple[list[str | int], bool]:
+    """Return the place of an error without the names of members of unions, and whether such a member was meant."""
+    place: list[str | int] = []
+    for at, part in enumerate(loc):
+        if isinstance(content, dict) and (part in content or (is_missing and at == len(loc) - 1)):
+            place.append(part)
+            content = content.get(part)
+        elif isinstance(content, list) and isinstance(part, int):
+            place.append(part)
+            content = content[part] if part < len(content) else None
+        elif not _is_meant(str(part), content):
+            return place, False
+    return place, True
+
+
+def _is_meant(member: str, given: Any) -> bool:  # noqa: ANN401 - any JSON
+    """Return whether a value, as it is, can only have been meant as this member of a union."""
+    if member.startswith("tuple"):
+        return isinstance(given, list)
+    if member.startswith("tagged-union"):
+        return not isinstance(given, list)
+    pd = isinstance(given, dict) and ("follows" in given or "kp" in given)
+    return {"Motor": not pd, "PDMotor": pd}.get(member, True)

@@ -1,0 +1,125 @@
+"""Robot files in the store: added once each, listed, and found by the names that specs give them."""
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+from gaplab.schemas.plugin import PluginRead, PluginRef
+from gaplab.schemas.robots import RobotRead
+from gaplab.schemas.spec import SharedSettings
+from gaplab.services.core import robot_library
+from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, unknown_name
+from gaplab.services.core.robot_files import RobotFile, read_robot_file
+from gaplab.services.core.robot_library import IMPORTED
+from gaplab.services.core.robots import robots
+from gaplab.services.specs.default_engines import default_engine
+from gaplab.services.store.models import RobotRow
+from gaplab.services.store.queries import robots as rows
+from gaplab.services.store.session import Session, Store, snapshot, transaction
+from gaplab.services.store.texts import storable
+
+S = TypeVar("S", bound=SharedSettings)
+
+
+def add_robot(store: Store, text: str | bytes) -> RobotRead:
+    """Store a robot file, unless it is stored already, and return what it is; its name now means this robot.
+
+    Raises:
+        InvalidSpec: it is no robot file, a plug-in has its name, or its usual controller or task cannot drive and rate
+            it; with every violation.
+    """
+    file = read_robot_file(text)
+    if file.name in robots:
+        message = f"gaplab has a robot {file.name!r} already; choose another name"
+        raise InvalidSpec([Violation("/name", file.name, message, "another name")])
+    robot_library.learn([file.text])
+    robots.create(_ref(file.sha256, file.name))
+    return _insert(store, file)
+
+
+@transaction
+def _insert(session: Session, file: RobotFile) -> RobotRead:
+    return _view(rows.put(session, file.sha256, file.name, file.text), file)
+
+
+@snapshot
+def list_robots(session: Session) -> tuple[RobotRead, ...]:
+    """Return all stored robots, by name, the newest of a name first."""
+    return tuple(_view(row, read_robot_file(row.text)) for row in rows.all_(session))
+
+
+@snapshot
+def robot_text(session: Session, named: str) -> str:
+    """Return the text of a robot file.
+
+    Args:
+        session: a snapshot of the database.
+        named: hash or name of the robot.
+
+    Raises:
+        NotFound: there is no such robot.
+    """
+    row = session.get(RobotRow, storable(named)) or rows.newest(session, storable(named))
+    if row is None:
+        raise NotFound(f"there is no robot {named!r}; `gaplab robot list` lists those that are stored")
+    return row.text
+
+
+def with_stored_robot(store: Store, spec: S) -> S:
+    """Return the spec with the hash of the stored robot that it means by a name; unchanged if a plug-in has the name.
+
+    Raises:
+        InvalidSpec: no robot has the name, or the robot has options, which one from a file does not have.
+    """
+    name = spec.robot.name
+    if name in robots or name in robots.unusable:
+        return spec
+    found, names = _newest(store, name)
+    if found is None:
+        raise InvalidSpec([unknown_name("/robot", "robot", name, [*robots, *names])])
+    if spec.robot.options:
+        message = f"the robot {name} comes from a file, which has no options"
+        raise InvalidSpec([Violation("/robot/options", spec.robot.options, message, "left out")])
+    return spec.model_copy(update={"robot": found})
+
+
+@snapshot
+def _newest(session: Session, name: str) -> tuple[PluginRef | None, list[str]]:
+    row = rows.newest(session, storable(name))
+    names = sorted({each.name for each in rows.all_(session)}) if row is None else []
+    return None if row is None else _ref(row.sha256, row.name), names
+
+
+def _ref(sha256: str, name: str) -> PluginRef:
+    return PluginRef(name=IMPORTED, options={"sha256": sha256, "name": name})
+
+
+def catalogued(found: Sequence[RobotRead]) -> tuple[PluginRead, ...]:
+    """Return the catalogue's entries of stored robots: the newest of each name that no plug-in has."""
+    newest = {each.name: each for each in reversed(found) if each.name not in robots}
+    return tuple(_entry(each) for _, each in sorted(newest.items()))
+
+
+def _entry(found: RobotRead) -> PluginRead:
+    robot = robots.create(_ref(found.sha256, found.name))
+    details = {
+        **robots[IMPORTED].told(robot),
+        "engine": default_engine(robot),
+        "sha256": found.sha256,
+    }
+    source = f"robot file {found.sha256[:12]}" + (f", imported from {found.file}" if found.file else "")
+    summary = f"{found.bodies} bodies, {found.actuators} actuators, {found.mass_kg:.3g} kg."
+    return PluginRead(name=found.name, summary=summary, source=source, options={}, details=details)
+
+
+def _view(row: RobotRow, file: RobotFile) -> RobotRead:
+    world = file.world
+    return RobotRead(
+        sha256=row.sha256,
+        name=row.name,
+        file=file.source.file if file.source else None,
+        bodies=len(world.bodies),
+        actuators=len(world.actuators),
+        mass_kg=sum(body.mass_kg for body in world.bodies),
+        lost=file.lost,
+        created_at=row.created_at,
+    )

@@ -1,0 +1,71 @@
+"""Pictures of robots: a robot as it stands at the start, painted as videos are."""
+
+from hashlib import sha256
+from io import BytesIO
+
+import numpy as np
+
+from gaplab.schemas.replays import Framing
+from gaplab.services.core.errors import NotFound
+from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
+from gaplab.services.core.robots import robots
+from gaplab.services.core.world import World
+from gaplab.services.replay.film import DARK, LIGHT, camera_at, colour_of, solid
+from gaplab.services.replay.painting import paint
+from gaplab.services.replay.process import Key, RolloutProcess
+from gaplab.services.replay.shapes import USUAL_SIZE_M, extent_of, feet_of, shapes_of
+
+
+def robot_picture(drawing: RolloutProcess, name: str, *, dark: bool, width_px: int) -> bytes:
+    """Return a picture of a robot of the catalogue as PNG.
+
+    Args:
+        drawing: the process that draws.
+        name: name of the robot.
+        dark: true for the dark colours of the page.
+        width_px: width of the picture.
+
+    Raises:
+        NotFound: no usable robot has this name, or it has no body.
+        EngineInterrupted: drawing took too long.
+        LimitReached: too many callers wait.
+    """
+    if name not in robots:
+        raise NotFound(f"no usable robot is called {name[:64]!r}; permitted: {', '.join(robots)}")
+    world = robots[name].example().world
+    if not world.bodies:
+        raise NotFound(f"the robot {name!r} has no body, so there is no picture of it")
+    return world_picture(drawing, world, dark=dark, width_px=width_px)
+
+
+def world_picture(drawing: RolloutProcess, world: World, *, dark: bool, width_px: int) -> bytes:
+    """Return a picture of a world with bodies as PNG; other arguments and errors are those of `robot_picture`."""
+    key: Key = ("picture", sha256(repr(world).encode()).hexdigest(), dark, width_px)
+    found: bytes | None = drawing.answers.get(key)
+    if found is None:
+        found = drawing.call(portrait, world, dark, width_px)
+        drawing.answers.keep(key, found, len(found))
+    return found
+
+
+def portrait(world: World, dark: bool, width_px: int) -> bytes:
+    """Return the picture of a world at its start as PNG."""
+    pose = np.array([[0.0, 0.0, world.start_height_m, *world.start_turn]])
+    angles = np.array([[joint.start for joint in world.joints]])
+    positions, orientations = body_poses(world, pose, angles)
+    feet = feet_of(world)
+    clearances = [clearances_m(world.bodies[foot], positions[:, foot], orientations[:, foot])[0] for foot in feet]
+    down = {foot for foot, clearance in zip(feet, clearances, strict=True) if clearance < TOUCHING_M}
+    shapes, look = shapes_of(world), DARK if dark else LIGHT
+    low, high = extent_of(shapes, positions[0], orientations[0])
+    size = max(float(np.linalg.norm(high - low)), 1e-3)
+    framing = Framing(scale=size / USUAL_SIZE_M, height_m=float(low[2] + high[2]) / 2)
+    camera = camera_at([(low + high)[:2] / 2], (width_px, width_px * 3 // 4), framing, world.slope_rad)
+    solids = [
+        solid(shape, positions[0], orientations[0], colour_of(shape, down, look))
+        for shape in shapes
+        if shape.kind != "plane"
+    ]
+    target = BytesIO()
+    paint(solids, camera, look.scenery).quantize(128).save(target, "PNG", optimize=True)
+    return target.getvalue()

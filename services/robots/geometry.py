@@ -1,0 +1,117 @@
+"""Shapes of a compiled model as those of a World."""
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial import QhullError
+from scipy.spatial.transform import Rotation
+
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Quaternion, Shape, Sphere, Vector
+from gaplab.services.robots.hulls import simplify
+from gaplab.services.robots.notes import Notes
+from gaplab.services.robots.options import ImportOptions
+
+DIGITS = 7
+"""Decimals of a hull's vertices, m: finer than their single precision."""
+
+
+def vector(values: FloatArray) -> Vector:
+    """Return three numbers; adding 0 makes -0 to 0."""
+    x, y, z = (float(value) + 0.0 for value in values)
+    return x, y, z
+
+
+def quaternion(turn: Rotation) -> Quaternion:
+    """Return a rotation as x, y, z, w with w ≥ 0."""
+    x, y, z, w = (float(value) + 0.0 for value in turn.as_quat(canonical=True))
+    return x, y, z, w
+
+
+def rotation_of(wxyz: FloatArray) -> Rotation:
+    """Return the rotation of MuJoCo's quaternion w, x, y, z."""
+    return Rotation.from_quat(np.roll(wxyz, -1))
+
+
+class Shapes:
+    """Shapes of the geoms of a model; the hull of a mesh is computed once."""
+
+    def __init__(self, model: Any, options: ImportOptions, notes: Notes) -> None:  # noqa: ANN401
+        self._model, self._options, self._notes = model, options, notes
+        self._hulls: dict[int, Hull | None] = {}
+        planes = [at for at in range(model.ngeom) if model.geom_bodyid[at] == 0 and self._kind(at) == "plane"]
+        self._grounds = [(int(model.geom_contype[at]), int(model.geom_conaffinity[at])) for at in planes]
+        self.friction = max((float(model.geom_friction[at, 0]) for at in planes), default=0.0)
+
+    def collides(self, geom: int) -> bool:
+        """Return whether a geom collides with the file's ground, or with anything, if the file has no ground."""
+        kind, with_kinds = int(self._model.geom_contype[geom]), int(self._model.geom_conaffinity[geom])
+        if not self._grounds:
+            return bool(kind or with_kinds)
+        return any(kind & ground[1] or with_kinds & ground[0] for ground in self._grounds)
+
+    def part(self, geom: int, center: FloatArray, turn: Rotation) -> Part | None:
+        """Return the part of a geom; None of one that a World cannot have.
+
+        Args:
+            geom: number of the geom.
+            center: `(3,)`: its place in the frame of the World's body.
+            turn: its rotation there.
+        """
+        shape = self._shape(geom)
+        if shape is None:
+            return None
+        return Part(shape, vector(center), quaternion(turn), collides=self.collides(geom))
+
+    def _shape(self, geom: int) -> Shape | None:
+        x, y, z = (float(value) for value in self._model.geom_size[geom])
+        kind = self._kind(geom)
+        if kind == "box":
+            return Box((2 * x, 2 * y, 2 * z))
+        if kind == "sphere":
+            return Sphere(x)
+        if kind in {"capsule", "cylinder"}:
+            return (Capsule if kind == "capsule" else Cylinder)(x, 2 * y)
+        if kind == "mesh":
+            return self._hull(int(self._model.geom_dataid[geom]))
+        if kind == "ellipsoid":
+            self._notes.lose(
+                f"{self._name(geom)} is an ellipsoid: it becomes a hull of {self._options.vertices} points"
+            )
+            return _ellipsoid(np.array([x, y, z]), self._options.vertices)
+        self._notes.lose(f"{self._name(geom)} is a {kind}, which a robot cannot have: it is left out")
+        return None
+
+    def _hull(self, mesh: int) -> Hull | None:
+        if mesh not in self._hulls:
+            self._hulls[mesh] = self._simplified(mesh)
+        return self._hulls[mesh]
+
+    def _simplified(self, mesh: int) -> Hull | None:
+        model = self._model
+        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        name = str(model.mesh(mesh).name) or f"mesh{mesh}"
+        try:
+            points, lacking = simplify(model.mesh_vert[first : first + count].astype(float), self._options.vertices)
+        except QhullError:
+            self._notes.lose(f"mesh {name} is flat: it is left out")
+            return None
+        change = f", {100 * lacking:.2g} % smaller than its convex hull" if lacking else ""
+        self._notes.lose(f"mesh {name} of {count} vertices becomes a hull of {len(points)}{change}")
+        return Hull(tuple(vector(np.round(point, DIGITS)) for point in points))
+
+    def _kind(self, geom: int) -> str:
+        kinds = ("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf")
+        return kinds[int(self._model.geom_type[geom])]
+
+    def _name(self, geom: int) -> str:
+        return str(self._model.geom(geom).name) or f"geom{geom}"
+
+
+def _ellipsoid(radii: FloatArray, count: int) -> Hull:
+    """Return the hull of points that are spread evenly over an ellipsoid, along a spiral."""
+    at = np.arange(count) + 0.5
+    height, around = 1 - 2 * at / count, np.pi * (1 + np.sqrt(5)) * at
+    across = np.sqrt(1 - height * height)
+    points = np.stack([across * np.cos(around), across * np.sin(around), height], axis=1) * radii
+    return Hull(tuple(vector(np.round(point, DIGITS)) for point in points))

@@ -1,0 +1,188 @@
+"""A robot file from a URDF or an MJCF."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gaplab.schemas.robots import RobotSource
+from gaplab.services.core.errors import InvalidRobot, InvalidSpec
+from gaplab.services.core.robot_files import RobotFile, read_robot_file
+from gaplab.services.core.world import Body, Joint, Material, Surfaces, World
+from gaplab.services.robots.bodies import Bodies
+from gaplab.services.robots.motors import with_motors, with_swings
+from gaplab.services.robots.notes import Notes
+from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.poses import base_pose, start_angles, with_starts
+from gaplab.services.robots.reading import Source, body_name, read_source
+
+URDF_STEP_S = 1 / 240
+"""Time step of a URDF, which has none: Bullet's."""
+
+SAME_KG = 1e-9
+"""Difference of masses that rounding explains."""
+
+
+@dataclass(frozen=True)
+class MassRow:
+    """Masses of one body of a World.
+
+    Attributes:
+        body: its name.
+        members: names of the bodies of the file that it consists of.
+        before_kg: their mass in the file.
+        after_kg: its mass.
+    """
+
+    body: str
+    members: tuple[str, ...]
+    before_kg: float
+    after_kg: float
+
+
+@dataclass(frozen=True)
+class ImportedFile:
+    """A robot file, and its masses before and after."""
+
+    robot: RobotFile
+    masses: tuple[MassRow, ...]
+
+    @property
+    def before_kg(self) -> float:
+        """Return the mass of the robot in the file."""
+        return sum(row.before_kg for row in self.masses)
+
+    @property
+    def after_kg(self) -> float:
+        """Return the mass of the robot in its World."""
+        return sum(row.after_kg for row in self.masses)
+
+
+def import_robot(file: Path, options: ImportOptions) -> ImportedFile:
+    """Return the robot of a URDF or an MJCF.
+
+    Raises:
+        InvalidRobot: with every reason that was found.
+        EngineUnavailable: MuJoCo is not installed.
+        OSError: the file cannot be read.
+    """
+    notes = Notes()
+    content = file.read_bytes()
+    source = read_source(file, content.decode("utf-8-sig", "replace"), options, notes)
+    bodies = Bodies(source, options, notes)
+    world = _world(source, bodies, options, notes)
+    notes.check()
+    masses = tuple(_masses(source, bodies))
+    for row in masses:
+        if abs(row.after_kg - row.before_kg) > SAME_KG:
+            notes.lose(f"{row.body}: {row.before_kg:.6g} kg in the file, {row.after_kg:.6g} kg imported")
+    robot = RobotFile(
+        name=_name(options.name or source.name or file.stem),
+        source=RobotSource(
+            file=file.name,
+            sha256=sha256(content).hexdigest(),
+            options=options.model_dump(mode="json", exclude_defaults=True),
+        ),
+        usual_controller=options.controller,
+        usual_task=options.task,
+        lost=tuple(notes.lost),
+        world=world,
+    )
+    try:
+        return ImportedFile(read_robot_file(robot.text), masses)
+    except InvalidSpec as error:
+        raise InvalidRobot(f"{each.pointer}: {each.message}" for each in error.violations) from error
+
+
+def _world(source: Source, bodies: Bodies, options: ImportOptions, notes: Notes) -> World:
+    model, fixed = source.model, source.fixed or bodies.is_held
+    _note_losses(source, notes)
+    qpos = start_angles(source, options, notes)
+    joints = with_starts([bodies.joint(head) for head in bodies.heads[1:]], source, qpos, options, notes)
+    joints = with_swings(with_motors(joints, source, options, notes))
+    found, material, surfaces = _surfaces(source, bodies, options, notes)
+    height_m, turn = base_pose(bodies, found, joints, qpos, fixed=fixed)
+    if not fixed and source.is_urdf:
+        notes.lose("the base floats: --fixed holds it")
+    usual_step_s = URDF_STEP_S if source.is_urdf else float(model.opt.timestep)
+    return World(
+        bodies=tuple(found),
+        joints=tuple(joints),
+        material=material,
+        surfaces=surfaces,
+        start_height_m=height_m,
+        start_turn=turn,
+        gravity_m_s2=abs(float(model.opt.gravity[2])),
+        time_step_s=options.time_step_s or usual_step_s,
+        fixed=fixed,
+        observed=options.observed or (_last(joints) if fixed else ""),
+    )
+
+
+def _last(joints: list[Joint]) -> str:
+    """Return the body that most joints carry, the first of several."""
+    depths: dict[str, int] = {}
+    for joint in joints:
+        depths[joint.child] = depths.get(joint.parent, 0) + 1
+    return max(depths, key=lambda name: depths[name], default="")
+
+
+def _surfaces(
+    source: Source, bodies: Bodies, options: ImportOptions, notes: Notes
+) -> tuple[list[Body], Material, Surfaces]:
+    """Return the bodies with their surfaces, the material of most, and the surfaces of the others."""
+    found, usual = [bodies.body(head) for head in bodies.heads], Material()
+    static, dynamic = options.static_friction, options.dynamic_friction
+    if source.is_urdf or static is not None or dynamic is not None:
+        static = usual.static_friction if static is None else static
+        dynamic = min(usual.dynamic_friction, static) if dynamic is None else dynamic
+        notes.lose(f"friction of all contacts: static {static:g}, dynamic {dynamic:g}")
+        return found, Material(static, dynamic), ()
+    frictions = [bodies.friction(head) for head in bodies.heads]
+    most = Counter(value for value in frictions if value is not None).most_common(1)
+    common = most[0][0] if most else usual.static_friction
+    notes.lose(f"friction: MuJoCo's one coefficient {common:g} is both the static and the dynamic one")
+    others = sorted({value for value in frictions if value is not None} - {common})
+    names = {value: f"friction_{value:g}" for value in others}
+    found = [
+        body if value not in names else replace(body, surface=names[value])
+        for body, value in zip(found, frictions, strict=True)
+    ]
+    return found, Material(common, common), tuple((name, Material(value, value)) for value, name in names.items())
+
+
+def _note_losses(source: Source, notes: Notes) -> None:
+    """Note what a compiled model has, and a World has not."""
+    model: Any = source.model
+    notes.lose("collisions of the robot's bodies with each other are lost: bodies touch the ground alone")
+    if source.is_urdf:
+        return
+    notes.lose("soft contacts and limits (solref, solimp, margin, condim, priority, cone) are lost: contacts are rigid")
+    springs = [str(model.joint(at).name) for at in range(model.njnt) if model.jnt_stiffness[at]]
+    if springs:
+        notes.lose("springs of joints are lost: {}", *springs)
+    for field, what in (("nsensor", "sensors"), ("nexclude", "excluded contacts"), ("npair", "pairs of contacts")):
+        if count := int(getattr(model, field, 0)):
+            notes.lose(f"{count} {what} are lost")
+    if np.any(model.opt.gravity[:2]) or model.opt.gravity[2] > 0:
+        notes.refuse(f"gravity is {model.opt.gravity.tolist()}, but in a World it points down; --slope is a tunable")
+    for field, what in (("density", "air or water"), ("viscosity", "air or water"), ("wind", "wind")):
+        if np.any(getattr(model.opt, field)):
+            notes.lose(f"{what} ({field}) is lost")
+
+
+def _masses(source: Source, bodies: Bodies) -> Iterator[MassRow]:
+    for head in bodies.heads:
+        names = tuple(body_name(source.model, at) for at in bodies.members(head)) if head else ()
+        before = sum(source.masses_kg.get(name, 0.0) for name in names)
+        yield MassRow(bodies.name(head), names, before, bodies.mass_kg(head) if head else 0.0)
+
+
+def _name(given: str) -> str:
+    name = re.sub(r"[^a-z0-9]+", "_", given.lower()).strip("_")
+    return (name if name[:1].isalpha() else f"robot_{name}")[:60]

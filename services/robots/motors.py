@@ -1,0 +1,216 @@
+"""Motors of joints: those of an MJCF, or one kind for all joints of a URDF, which has none."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from gaplab.services.core.world import Joint, Motor, PDMotor
+from gaplab.services.robots.bodies import joint_name
+from gaplab.services.robots.notes import Notes, listed
+from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.reading import Source, mujoco_library
+
+REACH_RAD, REACH_M = 0.35, 0.02
+"""Error at which a motor whose gain is computed has its largest torque: a share of a usual step of a leg."""
+
+DAMPING_RATIO = 0.7
+"""Damping of a joint under a motor whose gains are computed; 1 is critical."""
+
+SWING_RAD, SWING_M = 0.5, 0.02
+"""Largest usual movement to each side of the start."""
+
+BOUNDLESS_RAD = np.pi
+"""Error for which a motor without a limit has torque enough, where the joint has no limits either."""
+
+FILTERS = {0, 2, 3}
+"""MuJoCo's types of actuators' dynamics that a World may do without: none, and filters of the control."""
+
+
+def with_motors(joints: list[Joint], source: Source, options: ImportOptions, notes: Notes) -> list[Joint]:
+    """Return the joints with their motors: the file's, unless the options say which."""
+    if options.motor is None and not source.is_urdf:
+        return _of_the_file(joints, source, options, notes)
+    chosen = [joint.name for joint in joints if fnmatchcase(joint.name, options.motored)]
+    if not chosen:
+        notes.refuse(f"no joint is called like {options.motored!r}; joints: {listed((j.name for j in joints), 30)}")
+    kind = options.motor or "position"
+    notes.lose(
+        f"{'each' if len(chosen) == len(joints) else 'these'} joint gets a motor, as the file has none: {{}}", *chosen
+    )
+    inertias = _inertias(source.model)
+    return [_driven(j, kind, inertias[j.name], source, options, notes) if j.name in chosen else j for j in joints]
+
+
+def _driven(
+    joint: Joint,
+    kind: str,
+    inertia: float,
+    source: Source,
+    options: ImportOptions,
+    notes: Notes,
+) -> Joint:
+    torque = options.max_torque or _effort(source.model, joint.name)
+    unit = "N" if joint.slides else "N·m"
+    if torque is None:
+        torque = _needed_torque(source.model, joint.name)
+        notes.lose(f"{joint.name} has no largest effort: {torque:.3g} {unit}, of the robot's weight")
+    if kind == "servo":
+        speed = source.speeds.get(joint.name, 20.0)
+        return replace(joint, motor=Motor(options.position_gain, torque, speed))
+    reach = REACH_M if joint.slides else REACH_RAD
+    kp = options.kp or torque / reach
+    kd = options.kd or 2 * DAMPING_RATIO * float(np.sqrt(kp * inertia))
+    if joint.name in source.speeds:
+        notes.lose("velocity limits are lost, which a servo keeps: {}", joint.name)
+    if kind == "position":
+        return replace(joint, motor=PDMotor("position", torque, kp, kd))
+    if kind == "velocity":
+        return replace(joint, motor=PDMotor("velocity", torque, kd=kd), swing=source.speeds.get(joint.name, 5.0) / 2)
+    return replace(joint, motor=PDMotor("torque", torque), swing=torque / 2)
+
+
+def _effort(model: Any, name: str) -> float | None:  # noqa: ANN401
+    at = _number(model, name)
+    largest = float(np.abs(model.jnt_actfrcrange[at]).max())
+    return largest if model.jnt_actfrclimited[at] and largest > 0 else None
+
+
+def _needed_torque(model: Any, name: str) -> float:  # noqa: ANN401
+    """Return half the torque that bears the robot at the farthest point of the limb, as legs share the weight."""
+    mujoco = mujoco_library()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    at = _number(model, name)
+    moved = {int(model.jnt_bodyid[at])}
+    for body in range(model.nbody):
+        if int(model.body_parentid[body]) in moved:
+            moved.add(body)
+    geoms = [geom for geom in range(model.ngeom) if int(model.geom_bodyid[geom]) in moved]
+    reaches = [np.linalg.norm(data.geom_xpos[geom] - data.xanchor[at]) + model.geom_rbound[geom] for geom in geoms]
+    weight = float(model.body_mass.sum()) * 9.81
+    return weight if model.jnt_type[at] == 2 else 0.5 * weight * float(max(reaches, default=0.1))
+
+
+def _inertias(model: Any) -> Mapping[str, float]:  # noqa: ANN401
+    """Return the inertia of each joint at the reference angles if all others are free, kg m² or kg."""
+    return {joint_name(model, int(model.dof_jntid[dof])): 1 / float(model.dof_invweight0[dof]) for dof in _dofs(model)}
+
+
+def _dofs(model: Any) -> list[int]:  # noqa: ANN401
+    return [dof for dof in range(model.nv) if model.jnt_type[model.dof_jntid[dof]] >= 2]
+
+
+def _number(model: Any, name: str) -> int:  # noqa: ANN401
+    return next(at for at in range(model.njnt) if joint_name(model, at) == name)
+
+
+def _of_the_file(joints: list[Joint], source: Source, options: ImportOptions, notes: Notes) -> list[Joint]:
+    found = dict(_motors(source.model, {joint.name: joint for joint in joints}, options, notes))
+    if len(found) == 0:
+        notes.refuse("the file has no actuators: give all joints a motor with --motor")
+    order = [joint.name for joint in joints if joint.name in found]
+    if order != list(found):
+        notes.lose("the order of actuators is that of the joints: {}", *order)
+    return [found.get(joint.name, joint) for joint in joints]
+
+
+def _motors(
+    model: Any,  # noqa: ANN401
+    joints: Mapping[str, Joint],
+    options: ImportOptions,
+    notes: Notes,
+) -> Iterator[tuple[str, Joint]]:
+    seen = set()
+    for at in range(model.nu):
+        name = str(model.actuator(at).name) or f"actuator{at}"
+        if int(model.actuator_trntype[at]) != 0:
+            notes.refuse(f"actuator {name} does not move a joint")
+            continue
+        joint = joints.get(joint_name(model, int(np.ravel(model.actuator_trnid[at])[0])))
+        if joint is None:
+            notes.refuse(f"actuator {name} moves the base")
+        elif joint.name in seen:
+            notes.refuse(f"actuator {name} is the second one of joint {joint.name}")
+        elif int(model.actuator_gaintype[at]) != 0 or int(model.actuator_biastype[at]) > 1:
+            notes.refuse(f"actuator {name} is no motor, position or velocity actuator")
+        else:
+            seen.add(joint.name)
+            yield joint.name, _motor(model, at, name, joint, options, notes)
+
+
+def _motor(
+    model: Any,  # noqa: ANN401
+    at: int,
+    name: str,
+    joint: Joint,
+    options: ImportOptions,
+    notes: Notes,
+) -> Joint:
+    gear, gain = float(model.actuator_gear[at, 0]), float(model.actuator_gainprm[at, 0])
+    _, stiffness, damping = (-float(value) for value in model.actuator_biasprm[at, :3])
+    kind = "position" if stiffness > 0 else "velocity" if damping > 0 else "torque"
+    matches = {"position": gain == stiffness, "velocity": gain == damping, "torque": True}
+    dynamics = int(model.actuator_dyntype[at])
+    if not matches[kind] or gear == 0 or model.actuator_biasprm[at, 0] != 0 or dynamics not in FILTERS:
+        notes.refuse(f"actuator {name} is no motor, position or velocity actuator")
+        return joint
+    if dynamics:
+        notes.lose("activation dynamics are lost: {}", name)
+    _note_units(model, at, name, gear * gain if kind == "torque" else gear, notes)
+    limit = options.max_torque or _limit(model, at, joint, gear, gain)
+    if limit is None:
+        limit = _unlimited(joint, gear * gear * gain, kind)
+        notes.lose(f"actuator {name} has no largest torque: {limit:.4g} N·m, which is more than it needs")
+    kp = gear * gear * stiffness if kind == "position" else 0.0
+    motor = PDMotor(kind, limit, kp, gear * gear * damping)  # type: ignore[arg-type]
+    return replace(joint, motor=motor, swing=limit / 2 if kind == "torque" else joint.swing)
+
+
+def _note_units(model: Any, at: int, name: str, factor: float, notes: Notes) -> None:  # noqa: ANN401
+    if factor != 1:
+        notes.lose(f"targets are those of the joint, {factor:g} times MuJoCo's control: {{}}", name)
+    for field in ("actuator_damping", "actuator_armature", "actuator_delay"):
+        if np.any(getattr(model, field, np.zeros(model.nu))[at]):
+            notes.lose(f"{field.partition('_')[2]} of actuators is lost: {{}}", name)
+
+
+def _limit(model: Any, at: int, joint: Joint, gear: float, gain: float) -> float | None:  # noqa: ANN401
+    """Return the largest torque on the joint; None if the file has no limit."""
+    found = []
+    if model.actuator_forcelimited[at]:
+        found.append(abs(gear) * float(np.abs(model.actuator_forcerange[at]).max()))
+    if model.actuator_ctrllimited[at] and not model.actuator_biasprm[at].any():
+        found.append(abs(gear * gain) * float(np.abs(model.actuator_ctrlrange[at]).max()))
+    if (effort := _effort(model, joint.name)) is not None:
+        found.append(effort)
+    return min(found, default=None)
+
+
+def _unlimited(joint: Joint, gain: float, kind: str) -> float:
+    if kind == "torque":
+        return abs(gain) * 1000.0
+    lower, upper = joint.limits or (-BOUNDLESS_RAD, BOUNDLESS_RAD)
+    return abs(gain) * max(upper - lower, 1.0) * (1 if kind == "position" else 20)
+
+
+def with_swings(joints: list[Joint]) -> list[Joint]:
+    """Return the joints with the usual movement of their position motors.
+
+    It is 0.5 rad or 0.02 m, but at most the way to the nearer limit, and at least a tenth of the range.
+    """
+    found = []
+    for joint in joints:
+        follows = getattr(joint.motor, "follows", "position")
+        if joint.motor is not None and follows == "position":
+            swing = SWING_M if joint.slides else SWING_RAD
+            if joint.limits is not None:
+                lower, upper = joint.limits
+                nearer = min(joint.start - lower, upper - joint.start)
+                swing = min(swing, max(nearer, 0.1 * (upper - lower)))
+            found.append(replace(joint, swing=swing))
+        else:
+            found.append(joint)
+    return found

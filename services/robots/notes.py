@@ -1,0 +1,52 @@
+"""What an import says: what it lost or changed, and why it refuses a file."""
+
+from collections.abc import Iterable
+
+from gaplab.services.core.errors import InvalidRobot
+
+
+class Notes:
+    """Lines about one import, in the order of its steps.
+
+    Attributes:
+        refused: what has no place in a World; the file cannot be imported.
+    """
+
+    def __init__(self) -> None:
+        self._lost: dict[str, list[str]] = {}
+        self.refused: list[str] = []
+
+    @property
+    def lost(self) -> list[str]:
+        """Return what is lost or changed, a line each."""
+        return [line.replace("{}", listed(names, 40)) for line, names in self._lost.items()]
+
+    def lose(self, line: str, *names: str) -> None:
+        """Note what is lost or changed, once.
+
+        Args:
+            line: sentence; `{}` in it becomes the names of all notes with the same line.
+            names: names of the bodies, joints or others that it is about.
+        """
+        known = self._lost.setdefault(line, [])
+        known += [name for name in names if name not in known]
+
+    def refuse(self, line: str) -> None:
+        """Note a reason to refuse the file."""
+        self.refused.append(line)
+
+    def check(self) -> None:
+        """Raise all reasons to refuse the file so far.
+
+        Raises:
+            InvalidRobot: there is one.
+        """
+        if self.refused:
+            raise InvalidRobot(self.refused)
+
+
+def listed(names: Iterable[str], most: int = 6) -> str:
+    """Return names in a sentence: the first few, and the number of all others."""
+    all_names = list(names)
+    others = len(all_names) - most
+    return ", ".join(all_names[:most]) + (f" and {others} more" if others > 0 else "")

@@ -1,0 +1,59 @@
+"""Options of an import: the same file with the same options gives the same robot."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core.shapes import MOST_VERTICES
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class ImportOptions(Frozen):
+    """What the file leaves open, and what replaces the file's own values.
+
+    Attributes:
+        name: name of the robot; None for that in the file.
+        fixed: whether the base never moves; a URDF does not say it.
+        mend: whether masses and inertias that no rigid body has are replaced, instead of refused.
+        visuals: whether shapes that touch nothing are kept where the body also has shapes that touch.
+        lock: patterns of the names of joints that are fixed at zero, like `*_finger_*`.
+        motor: motor of all motored joints, in place of the file's; None: the file's, and `position` for a URDF.
+        motored: pattern of the names of joints that get a motor, like `*_knee`; for a URDF, or with `motor`.
+        kp: gain of the motors, N·m/rad; None: computed.
+        kd: damping of the motors, N·m·s/rad; None: computed.
+        position_gain: share of the error that a servo closes in a step.
+        max_torque: largest torque of the motors; None: the file's, or computed.
+        time_step_s: time step; None: MJCF's own, and 1/240 s for a URDF.
+        start: angle at time 0 by pattern of joint names; a later pattern wins.
+        keyframe: name of the MJCF's keyframe that is the start; None for the first.
+        vertices: largest number of vertices of a hull.
+        static_friction: None: the file's, or gaplab's.
+        dynamic_friction: None: the same.
+        observed: name of the body whose motion is the trajectory; None: the base, and the last link of a fixed robot.
+        controller: usual controller.
+        task: usual task.
+    """
+
+    name: str | None = None
+    fixed: bool = False
+    mend: bool = False
+    visuals: bool = False
+    lock: tuple[str, ...] = ()
+    motor: Literal["servo", "position", "velocity", "torque"] | None = None
+    motored: str = "*"
+    kp: Positive | None = None
+    kd: Positive | None = None
+    position_gain: Annotated[float, Field(gt=0, le=1)] = 0.1
+    max_torque: Positive | None = None
+    time_step_s: Annotated[float, Field(gt=0, le=0.1)] | None = None
+    start: dict[str, float] = Field(default_factory=dict)
+    keyframe: str | None = None
+    vertices: Annotated[int, Field(ge=8, le=MOST_VERTICES)] = 32
+    static_friction: Annotated[float, Field(ge=0)] | None = None
+    dynamic_friction: Annotated[float, Field(ge=0)] | None = None
+    observed: str | None = None
+    controller: PluginRef = PluginRef(name="square_pulses")
+    task: PluginRef = PluginRef(name="walk")

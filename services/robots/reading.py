@@ -1,0 +1,146 @@
+"""A URDF or MJCF as a MuJoCo model whose base is free, so that no mass is welded to the world."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from gaplab.services.core.errors import EngineUnavailable, InvalidRobot
+from gaplab.services.robots.mending import hold, mend
+from gaplab.services.robots.notes import Notes, listed
+from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.urdf import read_urdf, tree_of
+
+
+@dataclass(frozen=True)
+class Source:
+    """A compiled file.
+
+    Attributes:
+        model: MuJoCo's `MjModel`, with static bodies of their own.
+        is_urdf: true for a URDF, false for MJCF.
+        name: name of the robot in the file.
+        masses_kg: mass of each body as the file says it, before anything was changed.
+        speeds: largest speed of each joint that has one.
+        fixed: whether the base never moves.
+    """
+
+    model: Any
+    is_urdf: bool
+    name: str
+    masses_kg: Mapping[str, float]
+    speeds: Mapping[str, float]
+    fixed: bool
+
+
+def mujoco_library() -> Any:  # noqa: ANN401 - MuJoCo has no types
+    """Return the module `mujoco`.
+
+    Raises:
+        EngineUnavailable: it is not installed.
+    """
+    if find_spec("mujoco") is None:
+        raise EngineUnavailable("the import of robots needs MuJoCo: pip install 'gaplab[mujoco]'")
+    return import_module("mujoco")
+
+
+def read_source(file: Path, text: str, options: ImportOptions, notes: Notes) -> Source:
+    """Return a compiled URDF or MJCF.
+
+    Raises:
+        InvalidRobot: it is neither, or has what a World cannot have.
+    """
+    mujoco = mujoco_library()
+    try:
+        is_urdf = tree_of(text).tag == "robot"
+        if is_urdf:
+            urdf = read_urdf(file, text, options, notes)
+            spec = mujoco.MjSpec.from_string(urdf.text, assets=urdf.assets or None)
+            masses, speeds, name = urdf.masses_kg, urdf.speeds, urdf.name
+        else:
+            spec = mujoco.MjSpec.from_file(str(file))
+            masses, speeds, name = {}, {}, spec.modelname
+            _lock(spec, options)
+        return _compiled(spec, options, notes, Source(None, is_urdf, name, masses, speeds, fixed=options.fixed))
+    except (ValueError, SyntaxError) as error:
+        raise InvalidRobot([*notes.refused, " ".join(str(error).split())]) from error
+
+
+def _compiled(spec: Any, options: ImportOptions, notes: Notes, source: Source) -> Source:  # noqa: ANN401
+    _refuse(spec, notes)
+    spec.compiler.fusestatic = False
+    root = _root(spec, notes)
+    notes.check()
+    fixed = options.fixed
+    if not root.joints:
+        fixed = fixed or not source.is_urdf
+        root.add_freejoint()
+    if fixed:
+        hold(root, notes)
+    moved = {body.name or f"body{at}" for at, body in enumerate(spec.bodies) if body.joints}
+    mend(spec, notes, moved, allowed=options.mend)
+    notes.check()
+    model = spec.compile()
+    masses = source.masses_kg or {body_name(model, at): float(model.body_mass[at]) for at in range(1, model.nbody)}
+    return Source(model, source.is_urdf, source.name, masses, source.speeds, fixed)
+
+
+def _root(spec: Any, notes: Notes) -> Any:  # noqa: ANN401
+    """Return the body that carries all others; note static things beside it."""
+    bodies = spec.worldbody.find_all("body")
+    roots = [body for body in bodies if body.parent == spec.worldbody]
+    if len(roots) != 1:
+        notes.refuse(f"the file has {len(roots)} separate bodies, but a robot has one base: {listed(_names(roots))}")
+        notes.check()
+    geoms = [geom for geom in spec.geoms if geom.parent == spec.worldbody]
+    planes = [geom for geom in geoms if "PLANE" in str(geom.type)]
+    if planes:
+        notes.lose("the ground of the file is replaced by that of the world: the plane z = 0")
+    if others := [geom for geom in geoms if geom not in planes]:
+        notes.lose("static shapes of the scene are lost: {}", *_names(others))
+    return roots[0]
+
+
+def _lock(spec: Any, options: ImportOptions) -> None:  # noqa: ANN401
+    """Fix joints at their reference angles, and delete their actuators."""
+    for joint in list(spec.joints):
+        if any(fnmatchcase(joint.name, pattern) for pattern in options.lock):
+            for actuator in [each for each in spec.actuators if each.target == joint.name]:
+                spec.delete(actuator)
+            spec.delete(joint)
+
+
+_COUPLINGS = {
+    "equalities": "a World has no constraints but joints",
+    "tendons": "a World has motors on joints alone",
+    "flexes": "the bodies of a World are rigid",
+}
+"""Why elements of a spec are refused, by the name of their list."""
+
+
+def _refuse(spec: Any, notes: Notes) -> None:  # noqa: ANN401
+    for joint in spec.joints:
+        kind, name = str(joint.type).rpartition("_")[2].lower(), joint.name or "(unnamed)"
+        if kind == "ball":
+            notes.refuse(f"joint {name} is a ball joint: a World has hinges and slides; --lock fixes it")
+        if kind == "free" and joint.parent.parent != spec.worldbody:
+            notes.refuse(f"joint {name} is free, but its body is not the base")
+    for kind, why in _COUPLINGS.items():
+        for name in _names(each for each in getattr(spec, kind) if getattr(each, "active", True)):
+            notes.refuse(f"{kind}: {name}, but {why}")
+    for body in spec.bodies:
+        if len(body.joints) > 1:
+            names = listed(_names(body.joints))
+            notes.refuse(f"body {body.name} has {len(body.joints)} joints ({names}), but a World has one for each body")
+
+
+def _names(things: Any) -> list[str]:  # noqa: ANN401
+    return [thing.name or "(unnamed)" for thing in things]
+
+
+def body_name(model: Any, at: int) -> str:  # noqa: ANN401
+    """Return the name of a body, or one made of its number."""
+    return str(model.body(at).name) or f"body{at}"

@@ -1,0 +1,163 @@
+"""URDF as MuJoCo can read it: with the paths of its meshes, and with notes of what MuJoCo drops without a word.
+
+Source: https://wiki.ros.org/urdf/XML, https://mujoco.readthedocs.io/en/stable/modeling.html#urdf-extensions
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from gaplab.services.robots.notes import Notes
+from gaplab.services.robots.options import ImportOptions
+
+Element = ElementTree.Element
+
+_LOST = {
+    "transmission": "transmissions are lost, a motor moves its joint directly; of {}",
+    "safety_controller": "soft limits of safety controllers are lost: {}",
+    "contact": "contact properties are lost, friction too; of {}",
+    "gazebo": "extensions for Gazebo are lost",
+}
+"""What is said of elements that MuJoCo drops, by tag."""
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """A URDF that MuJoCo can read.
+
+    Attributes:
+        text: URDF with absolute paths of meshes.
+        assets: meshes that were converted, by name.
+        masses_kg: masses of the links that have one.
+        speeds: largest speed of each joint that has one, rad/s or m/s.
+        name: name of the robot in the file.
+    """
+
+    text: str
+    assets: dict[str, bytes]
+    masses_kg: dict[str, float]
+    speeds: dict[str, float]
+    name: str
+
+
+def tree_of(text: str) -> Element:
+    """Return the root of an XML text; some files declare a version of XML that does not exist."""
+    return ElementTree.fromstring(re.sub(r"^\s*<\?xml[^>]*\?>", "", text))  # noqa: S314
+
+
+def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Urdf:
+    """Return a URDF that MuJoCo can read, and note what it would lose.
+
+    Raises:
+        InvalidRobot: a mesh is missing.
+    """
+    root = tree_of(text)
+    _lock(root, options.lock)
+    _refuse(root, notes)
+    _note_losses(root, notes)
+    if not options.visuals:
+        for link in root.iter("link"):
+            for visual in link.findall("visual"):
+                link.remove(visual)
+    assets = dict(_resolve_meshes(root, file, notes))
+    notes.check()
+    compiler = ElementTree.SubElement(ElementTree.SubElement(root, "mujoco"), "compiler")
+    compiler.set("discardvisual", "false" if options.visuals else "true")
+    compiler.set("strippath", "false")
+    masses = {_name(link): _mass_kg(link) for link in root.iter("link")}
+    return Urdf(
+        text=ElementTree.tostring(root, encoding="unicode"),
+        assets=assets,
+        masses_kg={name: mass for name, mass in masses.items() if mass is not None},
+        speeds=dict(_speeds(root)),
+        name=_name(root),
+    )
+
+
+def _lock(root: Element, patterns: Sequence[str]) -> None:
+    """Fix joints at zero."""
+    for joint in root.findall("joint"):
+        if any(fnmatchcase(_name(joint), pattern) for pattern in patterns):
+            joint.set("type", "fixed")
+            for mimic in joint.findall("mimic"):
+                joint.remove(mimic)
+
+
+def _refuse(root: Element, notes: Notes) -> None:
+    for joint in root.findall("joint"):
+        if joint.find("mimic") is not None:
+            notes.refuse(f"joint {_name(joint)} mimics another: a World has no coupled joints; --lock fixes it")
+        if joint.get("type") in {"planar", "floating"}:
+            notes.refuse(f"joint {_name(joint)} is {joint.get('type')}: a World has hinges and slides; --lock fixes it")
+
+
+def _note_losses(root: Element, notes: Notes) -> None:
+    for tag, line in _LOST.items():
+        owners = [_name(found) or _name(owner) for owner in root.iter() for found in owner.findall(tag)]
+        if owners:
+            notes.lose(line, *owners)
+    massless = [_name(link) for link in root.findall("link") if _mass_kg(link) is None]
+    shaped = [_name(link) for link in root.findall("link") if link.find("collision") is not None]
+    if guessed := [name for name in massless if name in shaped]:
+        notes.lose("{}: without <inertial>, so mass and inertia are of the shapes at 1000 kg/m³", *guessed)
+
+
+def _speeds(root: Element) -> Iterator[tuple[str, float]]:
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        if limit is not None and joint.get("type") != "fixed" and float(limit.get("velocity", 0)) > 0:
+            yield _name(joint), float(limit.get("velocity", 0))
+
+
+def _resolve_meshes(root: Element, file: Path, notes: Notes) -> Iterator[tuple[str, bytes]]:
+    """Replace the names of mesh files by absolute paths; return those that had to be converted."""
+    for mesh in root.iter("mesh"):
+        given = mesh.get("filename", "")
+        path = find_mesh(given, file.absolute().parent)
+        if path is None:
+            notes.refuse(f"mesh {given!r} was not found beside {file.name} or in a folder above it")
+        elif path.suffix.lower() == ".dae":
+            name = f"{path.stem}.stl"
+            mesh.set("filename", name)
+            yield name, _converted(path, notes)
+        else:
+            mesh.set("filename", str(path))
+
+
+def find_mesh(given: str, folder: Path) -> Path | None:
+    """Return the file of a mesh: beside the URDF, or as ROS finds a package, in a folder above it; None if none is.
+
+    Args:
+        given: the name in the URDF, like `package://a1_description/meshes/trunk.stl`.
+        folder: folder of the URDF.
+    """
+    scheme, _, rest = given.rpartition("://")
+    if scheme == "file":
+        return Path(rest) if Path(rest).is_file() else None
+    names = [rest, rest.partition("/")[2]] if scheme else [rest]
+    folders = [folder, *folder.parents] if scheme else [folder]
+    return next((here / name for here in folders for name in names if name and (here / name).is_file()), None)
+
+
+def _converted(path: Path, notes: Notes) -> bytes:
+    """Return a DAE, in the unit that it says, as STL in metres."""
+    if find_spec("trimesh") is None:
+        notes.refuse(f"{path.name} is a DAE, which trimesh reads: pip install 'gaplab[collada]'")
+        return b""
+    loaded: Any = import_module("trimesh").load_scene(path)
+    return bytes(loaded.convert_units("meters").to_mesh().export(file_type="stl"))
+
+
+def _mass_kg(link: Element) -> float | None:
+    mass = link.find("inertial/mass")
+    return None if mass is None else float(mass.get("value", "nan"))
+
+
+def _name(element: Element) -> str:
+    return element.get("name", "")

@@ -1,0 +1,40 @@
+"""Robot files."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import select, update
+from sqlalchemy.orm import Session
+
+from gaplab.services.store.clock import now
+from gaplab.services.store.models import RobotRow
+from gaplab.services.store.statements import insert_new
+
+
+def text_of(session: Session, sha256: str) -> str | None:
+    """Return the text of the robot with this hash; None if there is none."""
+    return session.scalar(select(RobotRow.text).where(RobotRow.sha256 == sha256))
+
+
+def newest(session: Session, name: str) -> RobotRow | None:
+    """Return the robot that was stored last under a name; None if there is none."""
+    order = RobotRow.created_at.desc(), RobotRow.sha256
+    return session.scalar(select(RobotRow).where(RobotRow.name == name).order_by(*order).limit(1))
+
+
+def all_(session: Session) -> list[RobotRow]:
+    """Return all robots, by name, the newest of a name first."""
+    return list(session.scalars(select(RobotRow).order_by(RobotRow.name, RobotRow.created_at.desc(), RobotRow.sha256)))
+
+
+def put(session: Session, sha256: str, name: str, text: str) -> RobotRow:
+    """Insert a robot file unless it is there, and return its row; it is the newest of its name now."""
+    values = {"sha256": sha256, "name": name, "text": text}
+    session.execute(insert_new(session, RobotRow).values(**values, created_at=now()))
+    session.execute(update(RobotRow).where(RobotRow.sha256 == sha256).values(created_at=now()))
+    return session.get_one(RobotRow, sha256)
+
+
+def insert_unless_there(session: Session, rows: Sequence[dict[str, Any]]) -> None:
+    """Insert robot files; one that is there already stays as it is."""
+    session.execute(insert_new(session, RobotRow).values(created_at=now()), list(rows))

@@ -1,0 +1,160 @@
+"""Replays of a robot with every shape, asked over HTTP."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+
+from gaplab import Client
+from gaplab.api.app import create_app
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.records import MeasurementKind
+from gaplab.schemas.replays import Replay
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.bench import motions
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.motions import Motion
+from gaplab.services.core.robots import robots
+from gaplab.services.core.types import Simulator, Transferred, Tuned
+from gaplab.services.core.world import PDMotor
+from gaplab.services.experiments import submission
+from gaplab.services.plugins import watching
+from gaplab.services.plugins.folders import VARIABLE
+from gaplab.services.running import execution
+from gaplab.services.store.lease import Requested
+from gaplab.services.store.session import Store
+from tests.drawn_robot import FILES, strode
+from tests.integration.test_client import InProcess
+
+
+@pytest.fixture
+def api(sqlite_store: Store, put: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
+    monkeypatch.setenv(VARIABLE, str(put(**FILES)))
+    monkeypatch.setattr(watching, "LOOK_S", 0)
+    app = create_app(sqlite_store)
+    watching.reload()
+    yield TestClient(app)
+    app.state.rollout_process.close()
+    app.state.drawing_process.close()
+
+
+def test_every_part_of_every_body_is_shown(sqlite_store: Store, api: TestClient) -> None:
+    experiment = strode(sqlite_store)
+
+    answer = api.get(f"/experiments/{experiment}/replay")
+
+    assert answer.status_code == 200, answer.text
+    shown = Replay.model_validate_json(answer.content)
+    world = shown.simulation
+    assert world is not None
+    kinds = [shape.kind for shape in world.shapes if shape.body is not None]
+    assert sorted(set(kinds)) == ["box", "capsule", "cylinder", "hull", "sphere"]
+    assert (shown.bodies[shown.observed], shown.feet) == ("head", ("left foot", "right foot", "wheel"))
+    assert world.slope_rad == 0.12
+    assert shown.framing.scale == 1.0
+    assert {shape.body for shape in world.shapes if shape.role == "trunk"} == {shown.observed}
+    assert {shape.kind for shape in world.shapes if shape.role == "foot"} == {"hull", "cylinder"}
+
+
+def test_heights_and_speeds_are_those_of_the_observed_body_that_slides(sqlite_store: Store, api: TestClient) -> None:
+    experiment = strode(sqlite_store)
+
+    shown = Replay.model_validate_json(api.get(f"/experiments/{experiment}/replay").content)
+    figure = api.get(f"/figures/gait?experiment={experiment}&format=json").json()
+
+    assert shown.simulation is not None
+    expected = 0.39 + 0.16 + 0.04 * np.sin(4 * np.array(shown.times_s) + 8)
+    assert np.allclose(shown.simulation.heights_m, expected, atol=1e-3)
+    assert np.mean(shown.simulation.speeds_m_s) == pytest.approx(0.3 * 0.3, rel=0.05)
+    assert any("Mean height of head" in row[0] for row in figure["table"]["rows"])
+
+
+def test_its_video_shows_each_colour(sqlite_store: Store, api: TestClient) -> None:
+    experiment = strode(sqlite_store)
+
+    answer = api.get(f"/experiments/{experiment}/video?width=640&format=gif")
+
+    assert answer.status_code == 200, answer.text
+    with Image.open(BytesIO(answer.content)) as film:
+        frame = np.asarray(film.convert("RGB")).astype(int)
+    orange = (frame[..., 0] > 100) & (frame[..., 0] > 1.5 * frame[..., 1]) & (frame[..., 2] < 40)
+    blue = (frame[..., 2] > 70) & (frame[..., 0] < 20)
+    assert orange.sum() > 20
+    assert blue.sum() > 50
+
+
+def test_a_controller_in_a_loop_has_no_motion_to_take_to_the_bench(sqlite_store: Store, api: TestClient) -> None:
+    spec = {"strategy": "simulated_fit", "robot": "strider", "engine": "puppet", "iterations": 1, "repetitions": 1}
+    bench = spec | {"budget": "smoke", "reality": {"kind": "physical", "probes": "each"}}
+    experiment = submission.submit_experiment(sqlite_store, ExperimentSpec.model_validate(bench)).id
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    genome = robots["strider"]().known
+    for step in (Tuned(0, (Simulator(frozen([1.0, 0.8, 0.0])),)), Transferred(0, genome, 0.4)):
+        execution.record(sqlite_store, claim, step)
+    execution.record_all(sqlite_store, [(claim, [Requested(2, 0, MeasurementKind.PROBE, genome)])])
+    (request,) = api.get(f"/requests?experiment={experiment}").json()["items"]
+
+    refused = {form: api.get(f"/requests/{request['id']}/motion?format={form}") for form in ("csv", "json", "ros2")}
+    shown = api.get(f"/experiments/{experiment}/replay?iteration=0")
+
+    assert {answer.status_code for answer in refused.values()} == {409}
+    assert "observes the robot while it acts" in refused["csv"].json()["detail"]
+    assert (shown.status_code, shown.json()["reality"]) == (200, None)
+    assert motions.forms_of(robots["strider"](), genome) == ()
+
+
+def test_velocities_are_not_written_as_the_positions_of_a_trajectory() -> None:
+    robot = robots.create(PluginRef(name="quadruped"))
+    assert motions.forms_of(robot, robot.known) == ("csv", "json", "ros2")
+    assert isinstance(robot.motion(robot.known), Motion)
+
+    first, *others = robot.world.joints
+    robot.world = replace(robot.world, joints=(replace(first, motor=PDMotor("velocity", 1.0)), *others))
+
+    assert motions.forms_of(robot, robot.known) == ("csv", "json")
+
+
+def test_each_robot_with_a_body_has_a_picture_in_both_themes(api: TestClient) -> None:
+    bodies = {each["name"]: each["details"]["bodies"] for each in api.get("/catalogue").json()["robots"]}
+    assert bodies["strider"] == 7
+    assert bodies["toy_function"] == 0
+
+    answers = {
+        (name, theme): api.get(f"/catalogue/robots/{name}/picture?theme={theme}&width=160")
+        for name in ("strider", "quadruped")
+        for theme in ("light", "dark")
+    }
+
+    assert len({answer.content for answer in answers.values()}) == 4
+    for answer in answers.values():
+        assert answer.headers["content-type"] == "image/png"
+        with Image.open(BytesIO(answer.content)) as picture:
+            assert picture.size == (160, 120)
+    tag = answers["strider", "dark"].headers["ETag"]
+    address = "/catalogue/robots/strider/picture?theme=dark&width=160"
+    assert api.get(address, headers={"If-None-Match": tag}).status_code == 304
+
+
+def test_what_has_no_picture_says_why(api: TestClient) -> None:
+    nobody, toy = api.get("/catalogue/robots/nobody/picture"), api.get("/catalogue/robots/toy_function/picture")
+
+    assert (nobody.status_code, toy.status_code) == (404, 404)
+    assert "no usable robot is called 'nobody'; permitted: quadruped" in nobody.json()["detail"]
+    assert "'toy_function' has no body" in toy.json()["detail"]
+    assert api.get("/catalogue/robots/quadruped/picture?theme=pink").status_code == 422
+
+
+def test_the_client_writes_a_picture_into_a_file(sqlite_store: Store, api: TestClient, tmp_path: Path) -> None:
+    network = InProcess(sqlite_store)
+    with Client("http://test", transport=network, pauses_s=(0.0, 0.0, 0.0)) as client:
+        file = client.robot_picture("strider", tmp_path / "pictures" / "strider.png", width=80)
+    network.close()
+
+    with Image.open(file) as picture:
+        assert (picture.format, picture.width) == ("PNG", 80)

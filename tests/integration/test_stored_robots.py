@@ -1,0 +1,183 @@
+"""Robots from files: stored by their hash, named in specs, simulated by workers, and in archives."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from gaplab import migrations
+from gaplab.api.app import create_app
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.archives import export_experiment, import_archive
+from gaplab.services.core import robot_library
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.robot_files import RobotFile, read_robot_file
+from gaplab.services.core.robots.imported import Imported
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.stored_specs import spec_to_run
+from gaplab.services.experiments import stored_robots, submission
+from gaplab.services.experiments.listing import ListFilter, list_experiments
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.models import ExperimentRow, RobotRow
+from gaplab.services.store.session import Store
+
+SPEC: dict[str, Any] = {
+    "strategy": "simulated_fit",
+    "robot": "walker",
+    "engine": "mujoco",
+    "budget": {
+        "preset": "smoke",
+        "controller_evaluations": 25,
+        "selection_evaluations": 25,
+        "simulator_evaluations": 25,
+    },
+    "iterations": 1,
+    "repetitions": 1,
+}
+
+
+def file_of(name: str = "walker") -> RobotFile:
+    """The quadruped, as a file has it."""
+    example = robot_library.robot_file(Imported.example().options.sha256)
+    assert example is not None
+    return read_robot_file(json.dumps(example.content | {"name": name}))
+
+
+@pytest.fixture(autouse=True)
+def _nothing_known() -> Iterator[None]:
+    """Let each test know the robots of its own store alone."""
+    robot_library._known.clear()
+    yield
+    robot_library._known.clear()
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    url = f"sqlite:///{tmp_path / 'gaplab.db'}"
+    migrations.upgrade(url)
+    opened = Store(url)
+    yield opened
+    opened.dispose()
+
+
+@pytest.fixture
+def http(store: Store) -> TestClient:
+    return TestClient(create_app(store))
+
+
+def test_a_robot_is_stored_once_under_the_hash_of_its_content(http: TestClient) -> None:
+    file = file_of()
+    first = http.post("/robots", content=json.dumps(file.content, indent=3))
+    again = http.post("/robots", content=file.text)
+
+    assert first.status_code == again.status_code == 201
+    assert first.json()["sha256"] == again.json()["sha256"] == file.sha256
+    assert [each["name"] for each in http.get("/robots").json()] == ["walker"]
+    assert http.get(f"/robots/{file.sha256}").text == http.get("/robots/walker").text == file.text
+    assert http.get("/robots/nobody").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("content", "status", "pointer"),
+    [
+        (b"<mujoco/>", 422, ""),
+        (b"[" * 100_000, 422, ""),
+        (b"x" * 2_000_001, 413, None),
+        (b'{"name": "walker"}', 422, "/world"),
+    ],
+)
+def test_what_is_no_robot_file_is_refused_with_its_place(
+    http: TestClient, content: bytes, status: int, pointer: str | None
+) -> None:
+    answer = http.post("/robots", content=content)
+
+    assert answer.status_code == status
+    if pointer is not None:
+        assert pointer in [each["pointer"] for each in answer.json()["errors"]]
+    assert http.get("/robots").json() == []
+
+
+def test_a_robot_cannot_have_the_name_of_a_plug_in_or_a_controller_that_is_not_there(http: TestClient) -> None:
+    taken = http.post("/robots", content=file_of("quadruped").text).json()
+    content = file_of().content | {"usual_controller": {"name": "wings", "options": {}}}
+    winged = http.post("/robots", content=json.dumps(content)).json()
+
+    assert "gaplab has a robot 'quadruped' already" in taken["errors"][0]["message"]
+    assert "wings" in winged["errors"][0]["message"]
+
+
+def test_a_spec_means_the_newest_robot_of_a_name_and_keeps_its_hash(store: Store) -> None:
+    old = stored_robots.add_robot(store, file_of().text)
+    first = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    heavier = json.loads(file_of().text)
+    heavier["world"]["bodies"][0]["mass_kg"] = 3.0
+    new = stored_robots.add_robot(store, json.dumps(heavier))
+    second = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+
+    assert [each.spec["robot"]["options"]["sha256"] for each in (first, second)] == [old.sha256, new.sha256]
+    assert first.spec["robot"]["options"]["name"] == "walker"
+
+
+def test_an_unknown_robot_is_refused_with_the_names_that_are_there(store: Store) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    with pytest.raises(InvalidSpec, match="walker") as raised:
+        submission.submit_study(store, StudySpec.model_validate({"robot": "wolker", "budget": "smoke"}))
+
+    assert raised.value.violations[0].pointer == "/robot"
+
+
+def test_a_robot_from_a_file_has_the_numbers_of_the_plug_in_to_the_last_bit(store: Store) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    with store.reading() as session:
+        from_file = spec_to_run(session.get_one(ExperimentRow, made.id).spec)
+    plug_in = submission.resolve_experiment(ExperimentSpec.model_validate(SPEC | {"robot": Quadruped.name}))
+
+    ours, theirs = (list(repetition(setting(spec, 0))) for spec in (from_file, plug_in))
+    assert [repr(step) for step in ours] == [repr(step) for step in theirs]
+
+
+def test_a_spec_whose_robot_is_gone_says_so(store: Store) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    with store.transaction() as session:
+        session.delete(session.get_one(RobotRow, made.spec["robot"]["options"]["sha256"]))
+        spec = spec_to_run(session.get_one(ExperimentRow, made.id).spec)
+    robot_library._known.clear()
+
+    with pytest.raises(InvalidSpec, match="the robot 'walker' with the hash"):
+        setting(spec, 0)
+
+
+def test_queries_and_the_catalogue_know_it_by_its_name(store: Store, http: TestClient) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    entry = next(each for each in http.get("/catalogue").json()["robots"] if each["name"] == "walker")
+
+    assert entry["details"]["controller"]["name"] == "square_pulses"
+    assert (entry["details"]["genes"], entry["details"]["unit"]) == (24, "m/s")
+    assert [each.id for each in list_experiments(store, ListFilter(q="robot = walker")).items] == [made.id]
+    assert list_experiments(store, ListFilter(q="robot = imported")).items == ()
+
+
+def test_an_archive_has_its_robots_and_brings_them(store: Store, tmp_path: Path) -> None:
+    file = file_of()
+    stored_robots.add_robot(store, file.text)
+    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    with export_experiment(store, made.id).file as exported:
+        content = exported.read()
+    robot_library._known.clear()
+    other = f"sqlite:///{tmp_path / 'other.db'}"
+    migrations.upgrade(other)
+    target = Store(other)
+    archive = tmp_path / "walker.zip"
+    archive.write_bytes(content)
+    with archive.open("rb") as opened:
+        import_archive(target, opened)
+
+    assert read_robot_file(stored_robots.robot_text(target, "walker")).sha256 == file.sha256
+    target.dispose()

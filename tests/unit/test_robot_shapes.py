@@ -1,0 +1,191 @@
+"""What draws a robot: faces that close and point outwards, feet, struts, and how far away the camera is."""
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from gaplab.schemas.replays import Shape
+from gaplab.services.core.kinematics import about
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Sphere
+from gaplab.services.core.world import Body, Inertia, Joint, World
+from gaplab.services.replay.polyhedra import Polyhedron, box, cylinder, hull_faces, polyhedron
+from gaplab.services.replay.portraits import portrait
+from gaplab.services.replay.shapes import MOST_FEET, extent_of, feet_of, framing_of, labels, observed_of, shapes_of
+
+EVEN = Inertia((0.01, 0.01, 0.01))
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+CUBE = tuple((x, y, z) for x in (-0.5, 0.0, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5))
+CLOUD = tuple((float(x), float(y), float(z)) for x, y, z in np.random.default_rng(3).normal(size=(64, 3)))
+
+
+def volume(solid: Polyhedron) -> float:
+    """The volume by the divergence theorem; fails unless each edge is passed once in each direction."""
+    edges = [edge for face in solid.faces for edge in zip(face, (*face[1:], face[0]), strict=True)]
+    assert len(edges) == len(set(edges))
+    assert {(second, first) for first, second in edges} == set(edges)
+    corners, sixfold = solid.corners_m, 0.0
+    for face in solid.faces:
+        for second, third in pairwise(face[1:]):
+            sixfold += float(corners[face[0]] @ np.cross(corners[second], corners[third]))
+    return sixfold / 6
+
+
+@pytest.mark.parametrize("points", [CUBE, CLOUD, CLOUD[:4]])
+def test_faces_of_a_hull_are_closed_and_point_outwards(points: Any) -> None:
+    solid = polyhedron(*hull_faces(points))
+
+    assert volume(solid) == pytest.approx(ConvexHull(np.array(points)).volume)
+    first = solid.corners_m[[face[0] for face in solid.faces]]
+    above = np.einsum("fk,pfk->pf", solid.normals, solid.corners_m[:, None] - first)
+    assert above.max() < 1e-12  # no corner is outside a face
+    assert np.linalg.norm(solid.normals, axis=1) == pytest.approx(np.ones(len(solid.faces)))
+
+
+def test_a_hull_has_no_points_inside_and_the_order_of_its_faces_is_fixed() -> None:
+    corners, faces = hull_faces(((0.0, 0.0, 0.0), *CUBE))
+
+    assert len(corners) == 8
+    assert len(faces) == 12
+    assert hull_faces.__wrapped__(((0.0, 0.0, 0.0), *CUBE)) == (corners, faces)
+    assert list(faces) == sorted(faces)
+
+
+def test_points_in_a_plane_have_the_faces_of_a_flat_box() -> None:
+    corners, faces = hull_faces(((0.0, 0.0, 1.0), (2.0, 0.0, 1.0), (0.0, 3.0, 1.0)))
+
+    assert np.ptp(np.array(corners), axis=0) == pytest.approx([2, 3, 0])
+    assert len(faces) == 6
+
+
+def test_boxes_and_cylinders_have_their_volumes() -> None:
+    assert volume(box((1.0, 2.0, 3.0))) == pytest.approx(6)
+    assert volume(cylinder(0.5, 2.0)) == pytest.approx(np.pi / 2, rel=0.02)
+    for solid in (box((1.0, 2.0, 3.0)), cylinder(0.5, 2.0)):
+        for face, normal in zip(solid.faces, solid.normals, strict=True):
+            assert normal @ solid.corners_m[face[0]] > 0  # the origin is inside
+
+
+def chain(count: int, forks: int = 1) -> World:
+    """A base with chains of bodies that all touch the ground."""
+    base = Body("base", 1.0, Box((0.2, 0.2, 0.1)))
+    bodies, joints = [base], []
+    for fork in range(forks):
+        for place in range(count):
+            name, parent = f"l{fork}_{place}", "base" if place == 0 else f"l{fork}_{place - 1}"
+            bodies.append(Body(name, 0.1, (Part(Capsule(0.02, 0.1), (0.0, 0.0, -0.05)),), inertia=EVEN))
+            joints.append(Joint(f"j{fork}_{place}", parent, name, (0.0, 0.0, -0.1), (0.0, 1.0, 0.0)))
+    return World(tuple(bodies), tuple(joints), start_height_m=1.0)
+
+
+def test_feet_are_the_outer_bodies_that_touch() -> None:
+    assert feet_of(chain(3, forks=4)) == (3, 6, 9, 12)
+    assert labels(chain(3, forks=2)) == ("l0", "l1")
+    assert len(feet_of(Quadruped().world)) == 4
+
+
+def test_all_links_of_a_snake_are_feet_but_not_too_many() -> None:
+    assert feet_of(chain(5)) == (1, 2, 3, 4, 5)
+    assert feet_of(replace(chain(5), fixed=True)) == (5,)  # an arm has a hand
+    long = feet_of(chain(30))
+    assert len(long) == MOST_FEET
+    assert (long[0], long[-1]) == (1, 30)
+
+
+def test_each_part_is_drawn_at_its_place_and_only_what_touches_is_a_foot() -> None:
+    leg = Body(
+        "leg",
+        1.0,
+        (
+            Part(Cylinder(0.01, 0.2), (0.0, 0.0, -0.1), collides=False),
+            Part(Hull(CUBE), (0.0, 0.0, -0.2), (0.0, 0.0, 1.0, 0.0)),
+        ),
+        inertia=EVEN,
+    )
+    world = World((Body("trunk", 1.0, Sphere(0.1)), leg), (Joint("hip", "trunk", "leg", (0, 0, 0), (0, 1, 0)),))
+
+    ground, trunk, bone, foot = shapes_of(world)
+
+    assert [each.kind for each in (ground, trunk, bone, foot)] == ["plane", "sphere", "cylinder", "hull"]
+    assert [each.role for each in (ground, trunk, bone, foot)] == ["ground", "trunk", "limb", "foot"]
+    assert (bone.size_m, bone.position_m) == ((0.01, 0.2), (0.0, 0.0, -0.1))
+    assert (foot.orientation, len(foot.vertices_m), len(foot.faces)) == ((0.0, 0.0, 1.0, 0.0), 8, 12)
+
+
+def test_a_body_whose_parts_are_all_far_from_its_joint_gets_one_strut_to_the_nearest() -> None:
+    parts = (Part(Sphere(0.02), (0.0, 0.0, -0.3)), Part(Capsule(0.02, 0.04), (0.0, 0.2, 0.0)))
+    world = World((Body("trunk", 1.0, Sphere(0.1)), Body("hand", 1.0, parts, inertia=EVEN)))
+
+    struts = [each for each in shapes_of(world) if each.role == "limb" and each.kind == "capsule"]
+
+    assert [each.position_m for each in struts] == [(0.0, 0.1, 0.0)]
+    assert struts[0].size_m == pytest.approx((0.008, 0.2))
+
+
+def test_the_observed_body_is_marked_in_place_of_the_base() -> None:
+    world = replace(chain(2), observed="l0_1")
+    free = replace(world, bodies=(world.bodies[0], *(replace(each, shape=_light(each)) for each in world.bodies[1:])))
+
+    assert observed_of(world) == 2
+    assert {shape.body for shape in shapes_of(free) if shape.role == "trunk"} == {2}
+
+
+def _light(body: Body) -> tuple[Part, ...]:
+    return tuple(replace(part, collides=False) for part in body.parts)
+
+
+def extent(shape: Any, turn: Any = UPRIGHT) -> tuple[Any, Any]:
+    body = Body("one", 1.0, (Part(shape, (0.1, 0.0, 0.0)),), inertia=EVEN)
+    return extent_of(shapes_of(World((body,))), np.array([[0.0, 0.0, 1.0]]), np.array([turn]))
+
+
+def test_the_extent_is_that_of_turned_shapes() -> None:
+    quarter = about(np.array([0.0, 1.0, 0.0]), np.array([np.pi / 2]))[0]
+
+    low, high = extent(Cylinder(0.1, 0.6), quarter)
+    assert high - low == pytest.approx([0.6, 0.2, 0.2])
+    assert (low + high) / 2 == pytest.approx([0, 0, 0.9])
+    low, high = extent(Capsule(0.1, 0.6))
+    assert high - low == pytest.approx([0.2, 0.2, 0.8])
+    low, high = extent(Hull(CUBE))
+    assert high - low == pytest.approx([1, 1, 1])
+
+
+@pytest.mark.parametrize(("size", "scale"), [(0.6, 1.0), (0.1, 0.125), (3.0, 4.0)])
+def test_the_camera_is_as_far_away_as_a_robot_is_large(size: float, scale: float) -> None:
+    edge = size / np.sqrt(3)
+
+    framing = framing_of(np.zeros(3), np.full(3, edge))
+
+    assert framing.scale == scale
+    assert framing.height_m >= edge / 2 - 1e-4
+
+
+def test_the_quadruped_is_seen_as_ever() -> None:
+    world = Quadruped().world
+    shapes = shapes_of(world)
+    positions = np.array([[0.0, 0.0, 0.175]] + [[0.15, 0.2, 0.175]] * 12)
+
+    framing = framing_of(*extent_of(shapes, positions, np.tile(UPRIGHT, (13, 1))))
+
+    assert (framing.scale, framing.height_m) == (1.0, 0.12)
+
+
+def test_a_portrait_depends_on_the_robot_and_on_the_theme_alone() -> None:
+    world = chain(2, forks=3)
+
+    light, dark = (portrait(world, theme, 160) for theme in (False, True))
+
+    assert light[:4] == dark[:4] == b"\x89PNG"
+    assert light == portrait(world, False, 160)
+    assert len({light, dark, portrait(chain(1), False, 160)}) == 3
+
+
+def test_a_shape_of_an_older_service_has_no_faces() -> None:
+    stored = {"kind": "box", "size_m": [1, 1, 1], "role": "trunk", "body": 0}
+
+    assert Shape.model_validate(stored).faces == ()
