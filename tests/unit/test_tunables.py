@@ -17,6 +17,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.noise_envelope import NoiseEnvelope, NoiseEnvelopeOptions
+from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.tunables.defaults import usual_tunables
 from gaplab.services.core.tunables.labels import label_of, proper, separated, tunable_of, unit_of
 from gaplab.services.core.world import Inertia, Material, Noise
@@ -248,6 +249,32 @@ def test_tunables_that_rebuild_edit_before_those_that_edit_in_place() -> None:
     in_place = frozenset({"body.mass_kg", "slope_rad"})
     assert world.built(in_place) == heavier.built(in_place)
     assert world.built(in_place).bodies[0].mass_kg == WORLD.bodies[0].mass_kg
+
+
+class Slimmer(Tunable):
+    """A tunable of a plug-in that knows of `dataclasses.replace` alone."""
+
+    name = "slimmer"
+    field = "body.shape"
+    unit = "m"
+    lower, upper, least, greatest = 0.01, 0.1, 0.0, 1.0
+
+    def read(self, world: Any) -> float:
+        return float(world.bodies[0].shape.size_m[2])
+
+    def edit(self, world: Any, value: float) -> Any:
+        return replace(world, bodies=(replace(world.bodies[0], shape=Box((0.3, 0.2, value))), *world.bodies[1:]))
+
+
+@pytest.mark.parametrize("other", ["mass(trunk)", "center_of_mass(rear_left_shin)", "slope"])
+def test_what_a_plug_in_replaces_is_built_whatever_else_is_tuned(other: str) -> None:
+    simulation = Simulation(Quadruped(), Analytic(), [tunable_of(other), Slimmer()])
+
+    world = simulation._edited((1.1 if other == "mass(trunk)" else 0.02, 0.05))
+
+    assert world.bodies[0].shape == Box((0.3, 0.2, 0.05))
+    everything = frozenset({"body.mass_kg", "body.center_m", "slope_rad"})
+    assert world.built(everything).bodies[0].shape == Box((0.3, 0.2, 0.05))
 
 
 def test_noise_and_latency_are_of_the_worlds_noise() -> None:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.tunables.base import Tunable, lacking, matching
+from gaplab.services.core.tunables.base import IN_PLACE, Tunable, lacking, matching
 from gaplab.services.core.world import Body, Joint, World
 
 Pattern = Annotated[str, Field(min_length=1, max_length=80)]
@@ -50,6 +50,7 @@ class Grouped(Tunable):
     """
 
     kind: ClassVar[str]
+    order = IN_PLACE
     value_unit: ClassVar[str]
     scale: ClassVar[Limits] = Limits(0.5, 1.5, 0.0, 100.0)
     value: ClassVar[Limits]
