@@ -287,6 +287,14 @@ def test_noise_and_latency_are_of_the_worlds_noise() -> None:
     assert unit_of("nothing(trunk)") == ""
 
 
+def test_default_bounds_have_the_robots_own_value_inside() -> None:
+    damped = replace(WORLD, joints=tuple(replace(joint, damping=0.8) for joint in WORLD.joints))
+
+    assert tunable_of("joint_damping").bounds(WORLD) == (0.0, 0.5)
+    assert tunable_of("joint_damping").bounds(damped) == (0.0, pytest.approx(1.6))
+    assert tunable_of("mass(trunk, as=value)").bounds(WORLD) == pytest.approx((0.7 * 1.5, 1.3 * 1.5))
+
+
 def test_an_engine_need_not_know_of_noise_but_of_all_else() -> None:
     assert resolved(robot="toy_function", engine="analytic", tunables=["noise"]).reality.parameters == {"noise": 0.0}
     found = refusals(robot="toy_function", engine="analytic", tunables=["slope"])
@@ -295,7 +303,8 @@ def test_an_engine_need_not_know_of_noise_but_of_all_else() -> None:
 
 def test_the_usual_tunables_follow_a_rule() -> None:
     assert usual_tunables(WORLD) == ("dynamic_friction", "mass(trunk)", "motor_gain", "joint_damping")
-    assert usual_tunables(arm()) == ("mass(link_0)", "kp", "joint_damping")
+    assert usual_tunables(arm()) == ("mass(link_2)", "kp", "joint_damping", "joint_friction")
+    assert usual_tunables(replace(arm(), observed="link_1"))[0] == "mass(link_1)"
     for world in (WORLD, arm()):
         assert all(tunable_of(label).lack(world) is None for label in usual_tunables(world))
 

@@ -46,7 +46,8 @@ class Grouped(Tunable):
         kind: what has the number, for errors.
         value_unit: unit of the number.
         scale: bounds and limits of a factor.
-        value: bounds and limits of the number; bounds of None are those of the factor times the mean of the group.
+        value: bounds and limits of the number.
+        from_the_mean: true if the default bounds of the number are those of the factor, times the mean of the group.
     """
 
     kind: ClassVar[str]
@@ -82,10 +83,15 @@ class Grouped(Tunable):
         return self._in_world(world, tuple(map(edited, self.members(world))))
 
     def bounds(self, world: World) -> tuple[float, float]:
-        """Return the default bounds; of a number whose size depends on the robot, from half to one and a half."""
-        if self.relative or not self.from_the_mean or not (mean := self.read(world)):
+        """Return the default bounds: of numbers whose size depends on the robot, factors of their mean.
+
+        The upper bound of others is at least twice their mean.
+        """
+        if self.relative or not (mean := self.read(world)):
             return self.lower, self.upper
-        return self.scale.lower * mean, self.scale.upper * mean
+        if self.from_the_mean:
+            return self.scale.lower * mean, self.scale.upper * mean
+        return self.lower, max(self.upper, 2 * mean)
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
         """Return that the robot has nothing of this name."""
