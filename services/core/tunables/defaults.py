@@ -6,8 +6,8 @@ from gaplab.services.core.world import Motor, World
 def usual_tunables(world: World) -> tuple[str, ...]:
     """Return the labels of three or four tunables that usually explain a reality gap of a robot.
 
-    A robot that moves about has the friction of its contacts and the mass of its base, which stands for the payload; one
-    on a fixed base has the mass of its tool, the observed body, and the dry friction of its joints. Both have:
+    A robot that moves about has the friction of its contacts, and the mass of its base, which stands for the payload.
+    One on a fixed base has the mass of its tool, the observed body, and the dry friction of its joints. Both have:
 
     - the response of their motors: the gain of most of them, the damping of those that follow speeds, the largest
       torque of those that follow torques,
