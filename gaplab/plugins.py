@@ -44,6 +44,7 @@ from gaplab.services.core.strategies.base import Search as Search
 from gaplab.services.core.strategies.base import Strategy as Strategy
 from gaplab.services.core.strategies.base import Untuned as Untuned
 from gaplab.services.core.tasks.base import Task as Task
+from gaplab.services.core.tunables.base import IN_PLACE as IN_PLACE
 from gaplab.services.core.tunables.base import MaterialTunable as MaterialTunable
 from gaplab.services.core.tunables.base import Tunable as Tunable
 from gaplab.services.core.tuners.base import Tuner as Tuner

@@ -16,6 +16,7 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
+from gaplab.services.core.alike import alike
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.sensitivity import VERSION, Effort, warning
 from gaplab.services.experiments.idempotency import Once, once
@@ -143,7 +144,8 @@ def warnings(check: SensitivityRow) -> tuple[str, ...]:
     """Return warnings about these tunables, as sentences."""
     if check.state is State.FAILED:
         return (f"the sensitivity check failed, so that nothing is known of the tunables: {check.error}",)
-    return tuple(sentence for finding in _findings(check) if (sentence := warning(finding)))
+    findings = _findings(check)
+    return (*(sentence for finding in findings if (sentence := warning(finding))), *alike(findings))
 
 
 def id_of(spec: Checked, external: Mapping[str, str] | None = None) -> str:

@@ -29,7 +29,7 @@ class Simulation:
         self._robot = robot
         self._engine = engine
         self._edits = tuple(edits)
-        self._order = sorted(range(len(self._edits)), key=lambda place: not self._edits[place].rebuilds)
+        self._order = sorted(range(len(self._edits)), key=lambda place: self._edits[place].order)
         self._world = lru_cache(maxsize=WORLDS_KEPT)(self._edited)
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:

@@ -1,7 +1,7 @@
 import "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { draftOf, specOf, ticked } from "../../api/dashboard/views/new/draft.js";
+import { addTunable, draftOf, plainName, specOf, ticked } from "../../api/dashboard/views/new/draft.js";
 import { specIn, studyOf } from "../../api/dashboard/views/new/paste.js";
 import { nearestPlace } from "../../api/dashboard/views/new/fields.js";
 import { exampleOf, hintOf, keptText } from "../../api/dashboard/views/new/samples_field.js";
@@ -25,6 +25,19 @@ test("a spec goes through the form unchanged", () => {
     iterations: 3, repetitions: 4, direct_repetitions: 8, seed: 18446744073709551615n, priority: -10, max_parallel: 2,
   };
   assert.deepEqual(specOf(draftOf(spec, CATALOGUE)), spec);
+});
+
+test("a tunable of a part goes through the form by its label, and is added once", () => {
+  const spec = { strategies: ["one"], tunables: [{ name: "mass(trunk)", lower: 0.5, upper: 2 }, "grip"], reality: { parameters: { "mass(trunk)": 1.2 } } };
+  const draft = draftOf(spec, CATALOGUE);
+  assert.deepEqual(specOf(draft).tunables, spec.tunables);
+  assert.deepEqual(specOf(draft).reality, spec.reality);
+  addTunable(draft, " mass(*_shin, as=value) ");
+  addTunable(draft, "mass(*_shin, as=value)");
+  addTunable(draft, "mass");
+  addTunable(draft, "");
+  assert.deepEqual(ticked(draft.tunables).map(({ name }) => name), ["mass(trunk)", "grip", "mass", "mass(*_shin, as=value)"]);
+  assert.deepEqual(["mass", "mass(trunk)", "kp (*, as=value)"].map(plainName), ["mass", "mass", "kp"]);
 });
 
 test("a physical reality goes through the form unchanged, and one that becomes simulated leaves out what only a bench has", () => {

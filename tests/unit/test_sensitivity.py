@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.sensitivity import Verdict
+from gaplab.services.core.alike import alike
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import (
     Effort,
@@ -191,3 +192,35 @@ def test_evolved_controllers_are_fitter_than_random_ones() -> None:
     np.testing.assert_array_equal(genomes[0], [0.3, 0.6])
     assert len(genomes) == 8
     assert fitness[4:].min() > fitness[1:4].max()
+
+
+def summing(weights: Any) -> Any:
+    """The second tunable adds to the first, times a weight of each controller, which the first gene decides."""
+
+    def simulate(genomes: Any, parameters: Any) -> Any:
+        sizes = np.sin(9 * genomes[:, :1]) + 0.2
+        return sizes * parameters[:, 0] + weights(genomes[:, :1]) * parameters[:, 1] + 0.1 * genomes[:, 1:]
+
+    return simulate
+
+
+def test_tunables_that_stand_in_for_each_other_are_told() -> None:
+    (sentence,) = alike(found(summing(lambda first: -3 * (np.sin(9 * first) + 0.2))))
+
+    assert sentence.startswith(
+        "first and second act alike on the fitness of all controllers of the check (cosine 1.00)"
+    )
+
+
+def test_tunables_that_act_on_other_controllers_are_told_apart() -> None:
+    assert alike(found(summing(lambda first: np.cos(9 * first)))) == ()
+
+
+def test_failed_physics_and_profiles_that_are_no_lines_say_nothing() -> None:
+    known = found(summing(lambda first: -3 * (np.sin(9 * first) + 0.2)))
+    broken = [each.model_copy(update={"fitness": ((None,) * 17,) * 5 + each.fitness[5:]}) for each in known]
+    curved = found(lambda genomes, parameters: (genomes[:, :1] + 1) * np.cos(6.3 * parameters.sum(axis=1)))
+
+    assert alike(known) != ()
+    assert alike(broken) == ()
+    assert alike(curved) == ()

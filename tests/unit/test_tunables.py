@@ -17,6 +17,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.noise_envelope import NoiseEnvelope, NoiseEnvelopeOptions
+from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.tunables.defaults import usual_tunables
 from gaplab.services.core.tunables.labels import label_of, proper, separated, tunable_of, unit_of
 from gaplab.services.core.world import Inertia, Material, Noise
@@ -250,6 +251,32 @@ def test_tunables_that_rebuild_edit_before_those_that_edit_in_place() -> None:
     assert world.built(in_place).bodies[0].mass_kg == WORLD.bodies[0].mass_kg
 
 
+class Slimmer(Tunable):
+    """A tunable of a plug-in that knows of `dataclasses.replace` alone."""
+
+    name = "slimmer"
+    field = "body.shape"
+    unit = "m"
+    lower, upper, least, greatest = 0.01, 0.1, 0.0, 1.0
+
+    def read(self, world: Any) -> float:
+        return float(world.bodies[0].shape.size_m[2])
+
+    def edit(self, world: Any, value: float) -> Any:
+        return replace(world, bodies=(replace(world.bodies[0], shape=Box((0.3, 0.2, value))), *world.bodies[1:]))
+
+
+@pytest.mark.parametrize("other", ["mass(trunk)", "center_of_mass(rear_left_shin)", "slope"])
+def test_what_a_plug_in_replaces_is_built_whatever_else_is_tuned(other: str) -> None:
+    simulation = Simulation(Quadruped(), Analytic(), [tunable_of(other), Slimmer()])
+
+    world = simulation._edited((1.1 if other == "mass(trunk)" else 0.02, 0.05))
+
+    assert world.bodies[0].shape == Box((0.3, 0.2, 0.05))
+    everything = frozenset({"body.mass_kg", "body.center_m", "slope_rad"})
+    assert world.built(everything).bodies[0].shape == Box((0.3, 0.2, 0.05))
+
+
 def test_noise_and_latency_are_of_the_worlds_noise() -> None:
     world = edited("latency", 0.04, edited("noise(tilt)", 0.2, edited("noise", 0.1)))
 
@@ -260,6 +287,14 @@ def test_noise_and_latency_are_of_the_worlds_noise() -> None:
     assert unit_of("nothing(trunk)") == ""
 
 
+def test_default_bounds_have_the_robots_own_value_inside() -> None:
+    damped = replace(WORLD, joints=tuple(replace(joint, damping=0.8) for joint in WORLD.joints))
+
+    assert tunable_of("joint_damping").bounds(WORLD) == (0.0, 0.5)
+    assert tunable_of("joint_damping").bounds(damped) == (0.0, pytest.approx(1.6))
+    assert tunable_of("mass(trunk, as=value)").bounds(WORLD) == pytest.approx((0.7 * 1.5, 1.3 * 1.5))
+
+
 def test_an_engine_need_not_know_of_noise_but_of_all_else() -> None:
     assert resolved(robot="toy_function", engine="analytic", tunables=["noise"]).reality.parameters == {"noise": 0.0}
     found = refusals(robot="toy_function", engine="analytic", tunables=["slope"])
@@ -268,7 +303,8 @@ def test_an_engine_need_not_know_of_noise_but_of_all_else() -> None:
 
 def test_the_usual_tunables_follow_a_rule() -> None:
     assert usual_tunables(WORLD) == ("dynamic_friction", "mass(trunk)", "motor_gain", "joint_damping")
-    assert usual_tunables(arm()) == ("mass(link_0)", "kp", "joint_damping")
+    assert usual_tunables(arm()) == ("mass(link_2)", "kp", "joint_damping", "joint_friction")
+    assert usual_tunables(replace(arm(), observed="link_1"))[0] == "mass(link_1)"
     for world in (WORLD, arm()):
         assert all(tunable_of(label).lack(world) is None for label in usual_tunables(world))
 

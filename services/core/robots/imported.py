@@ -8,6 +8,7 @@ from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.robot_files import RobotFile
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.tunables.defaults import usual_tunables
 
 
 class ImportedOptions(Frozen):
@@ -40,6 +41,7 @@ class Imported(Robot):
             raise InvalidSpec([Violation("/robot/options/sha256", self.options.sha256, message, "the hash of a robot")])
         self.label, self.world = file.name, file.world
         self.usual_controller, self.usual_task = file.usual_controller, file.usual_task
+        self.usual_tunables = usual_tunables(self.world)
         self.perform_as_usual()
 
     @classmethod

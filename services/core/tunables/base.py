@@ -13,6 +13,9 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.world import World
 
+REBUILDS, SHARES, IN_PLACE = 0, 1, 2
+"""Places in the order of edits."""
+
 
 class Tunable(Plugin):
     """One parameter of the simulator.
@@ -25,7 +28,9 @@ class Tunable(Plugin):
         also: names of other values of a World that it edits, so that they fit its field.
         relative: true if it changes what it finds, by a factor or a shift; then it always reads as the value that
             changes nothing.
-        rebuilds: true if it may edit what engines build, so that it must edit before those that edit in place.
+        order: when it edits, among the tunables of a spec: `REBUILDS`, before all others, if it replaces what engines
+            build; `SHARES` if what it replaces is the same for all its values; `IN_PLACE` if it replaces only what it
+            names to `World.edited`.
     """
 
     field: str
@@ -36,7 +41,7 @@ class Tunable(Plugin):
     greatest: float
     also: ClassVar[frozenset[str]] = frozenset()
     relative: bool = False
-    rebuilds: ClassVar[bool] = False
+    order: ClassVar[int] = REBUILDS
 
     @abstractmethod
     def read(self, world: World) -> float:
@@ -89,6 +94,7 @@ class MaterialTunable(Tunable):
     """A coefficient of the material that robot and ground share, or of surfaces of the robot."""
 
     unit = "1"
+    order = IN_PLACE
     Options = SurfaceOptions
     options: SurfaceOptions
 

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.inertias import inertia_of
-from gaplab.services.core.tunables.base import Tunable, lacking, matching
+from gaplab.services.core.tunables.base import SHARES, Tunable, lacking, matching
 from gaplab.services.core.tunables.groups import ALL, Pattern
 from gaplab.services.core.world import Body, World
 
@@ -29,7 +29,7 @@ class CenterOfMass(Tunable):
     lower, upper = -0.05, 0.05
     least, greatest = -10.0, 10.0
     relative = True
-    rebuilds = True
+    order = SHARES
     Options = CenterOptions
     options: CenterOptions
 

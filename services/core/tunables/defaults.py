@@ -6,19 +6,20 @@ from gaplab.services.core.world import Motor, World
 def usual_tunables(world: World) -> tuple[str, ...]:
     """Return the labels of three or four tunables that usually explain a reality gap of a robot.
 
-    - the friction of its contacts, if its base is free, or any body but a fixed base touches the ground,
-    - the mass of its base, if it is free, else that of its heaviest moving body, which stands for the payload,
-    - the response of its motors: their gain, or the damping of those that follow speeds; the largest torque, if they
-      follow torques,
-    - the damping of its joints, which no data sheet has.
+    A robot that moves about has the friction of its contacts, and the mass of its base, which stands for the payload.
+    One on a fixed base has the mass of its tool, the observed body, and the dry friction of its joints. Both have:
+
+    - the response of their motors: the gain of most of them, the damping of those that follow speeds, the largest
+      torque of those that follow torques,
+    - the damping of their joints, which no data sheet has.
     """
-    moving = world.bodies[1:] if world.fixed else world.bodies
-    if not moving:
+    if not world.bodies or (world.fixed and not world.joints):
         return ()
-    heaviest = max(moving, key=lambda body: body.mass_kg) if world.fixed else world.bodies[0]
-    touching = ["dynamic_friction"] if any(body.touches for body in moving) else []
-    damping = ["joint_damping"] if world.joints else []
-    return (*touching, f"mass({heaviest.name})", *_response(world), *damping)
+    damping = ("joint_damping",) if world.joints else ()
+    if not world.fixed:
+        return ("dynamic_friction", f"mass({world.bodies[0].name})", *_response(world), *damping)
+    tool = world.observed if world.observed not in {"", world.bodies[0].name} else world.bodies[-1].name
+    return (f"mass({tool})", *_response(world), *damping, "joint_friction")
 
 
 def _response(world: World) -> tuple[str, ...]:

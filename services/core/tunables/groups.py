@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.tunables.base import Tunable, lacking, matching
+from gaplab.services.core.tunables.base import IN_PLACE, Tunable, lacking, matching
 from gaplab.services.core.world import Body, Joint, World
 
 Pattern = Annotated[str, Field(min_length=1, max_length=80)]
@@ -46,10 +46,12 @@ class Grouped(Tunable):
         kind: what has the number, for errors.
         value_unit: unit of the number.
         scale: bounds and limits of a factor.
-        value: bounds and limits of the number; bounds of None are those of the factor times the mean of the group.
+        value: bounds and limits of the number.
+        from_the_mean: true if the default bounds of the number are those of the factor, times the mean of the group.
     """
 
     kind: ClassVar[str]
+    order = IN_PLACE
     value_unit: ClassVar[str]
     scale: ClassVar[Limits] = Limits(0.5, 1.5, 0.0, 100.0)
     value: ClassVar[Limits]
@@ -81,10 +83,15 @@ class Grouped(Tunable):
         return self._in_world(world, tuple(map(edited, self.members(world))))
 
     def bounds(self, world: World) -> tuple[float, float]:
-        """Return the default bounds; of a number whose size depends on the robot, from half to one and a half."""
-        if self.relative or not self.from_the_mean or not (mean := self.read(world)):
+        """Return the default bounds: of numbers whose size depends on the robot, factors of their mean.
+
+        The upper bound of others is at least twice their mean.
+        """
+        if self.relative or not (mean := self.read(world)):
             return self.lower, self.upper
-        return self.scale.lower * mean, self.scale.upper * mean
+        if self.from_the_mean:
+            return self.scale.lower * mean, self.scale.upper * mean
+        return self.lower, max(self.upper, 2 * mean)
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
         """Return that the robot has nothing of this name."""

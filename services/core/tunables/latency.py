@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.tunables.base import IN_PLACE, Tunable
 from gaplab.services.core.world import World
 
 
@@ -10,6 +10,7 @@ class Latency(Tunable):
     """Age of what a controller in a loop observes, rounded to whole time steps of the simulator."""
 
     name = "latency"
+    order = IN_PLACE
     field = "noise"
     also = frozenset({"latency_s"})
     unit = "s"

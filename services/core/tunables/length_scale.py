@@ -39,7 +39,6 @@ class LengthScale(Tunable):
     lower, upper = 0.9, 1.1
     least, greatest = 0.05, 20.0
     relative = True
-    rebuilds = True
     Options = LengthOptions
     options: LengthOptions
 

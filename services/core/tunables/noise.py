@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.tunables.base import IN_PLACE, Tunable
 from gaplab.services.core.world import World
 
 UNITS = {"target": "", "angle_rad": "rad", "speed_rad_s": "rad/s", "tilt": "1", "turning_rad_s": "rad/s"}
@@ -26,6 +26,7 @@ class NoiseDeviation(Tunable):
 
     name = "noise"
     source = "Jakobi, Husbands and Harvey 1995; the bounds are gaplab's"
+    order = IN_PLACE
     field = "noise"
     lower, upper = 0.0, 0.1
     least, greatest = 0.0, 100.0

@@ -1,6 +1,6 @@
 """Slope of the ground."""
 
-from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.tunables.base import IN_PLACE, Tunable
 from gaplab.services.core.world import World
 
 
@@ -8,6 +8,7 @@ class Slope(Tunable):
     """Angle by which the ground rises along x."""
 
     name = "slope"
+    order = IN_PLACE
     field = "slope_rad"
     unit = "rad"
     lower, upper = -0.1, 0.1

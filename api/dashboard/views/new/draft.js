@@ -91,6 +91,26 @@ function tunableDrafts(given, catalogue) {
 }
 
 /**
+ * Return the name of the plug-in that a label like `mass(trunk)` names.
+ *
+ * @param {string} label
+ */
+export const plainName = (label) => label.split("(")[0].trim();
+
+/**
+ * Add a tunable by its label, ticked; one that is there is only ticked.
+ *
+ * @param {Page.Draft} draft
+ * @param {string} label
+ */
+export function addTunable({ tunables }, label) {
+  const name = label.trim();
+  const given = tunables.find((tunable) => tunable.name === name);
+  if (given) given.on = true;
+  else if (name) tunables.push({ name, on: true, lower: "", upper: "" });
+}
+
+/**
  * Return the strategies or tunables that are ticked, in their order in the spec.
  *
  * @template {{ on?: boolean }} Ticked

@@ -4,7 +4,7 @@
 import { h } from "../../lib/dom.js";
 import { count, readableName } from "../../lib/format.js";
 import { robotPicture } from "../../lib/robot_picture.js";
-import { EVALUATIONS, ticked } from "./draft.js";
+import { EVALUATIONS, addTunable, plainName, ticked } from "./draft.js";
 import { errorRoom, field, numberField, optionFields, tickField } from "./fields.js";
 
 /** @typedef {import("../new.js").Form} Form */
@@ -161,7 +161,13 @@ export function tunablesPart(form) {
   const room = errorRoom();
   const list = h("div", {}, ...form.draft.tunables.map((tunable) => tunableField(form, tunable)));
   form.places.add(() => "/tunables", list, room);
-  return part("What is tuned", room, list);
+  const label = h("input", { type: "text", placeholder: "mass(trunk)", maxlength: 100, "aria-label": "Tunable of a part of the robot" });
+  const add = () => {
+    addTunable(form.draft, label.value);
+    form.remake();
+  };
+  return part("What is tuned", room, list,
+    h("p", { class: "note" }, "Of a part of the robot, by pattern: ", label, " ", linkButton("Add", add)));
 }
 
 /**
@@ -171,7 +177,7 @@ export function tunablesPart(form) {
 function tunableField(form, tunable) {
   const { draft, places, catalogue } = form;
   const { name, on } = tunable;
-  const plugin = catalogue.tunables.find((other) => other.name === name);
+  const plugin = catalogue.tunables.find((other) => other.name === plainName(name));
   const pointer = () => (tunable.on ? `/tunables/${ticked(draft.tunables).indexOf(tunable)}` : null);
   const tick = (/** @type {boolean} */ isOn) => {
     tunable.on = isOn;
@@ -182,7 +188,7 @@ function tunableField(form, tunable) {
   const room = errorRoom();
   places.add(pointer, box, room);
   const bound = (/** @type {"lower" | "upper"} */ side, /** @type {string} */ label) => numberField({
-    label, "aria-label": `${readableName(name)} ${label.toLowerCase()}`, class: "short", placeholder: String(plugin?.details[side]),
+    label, "aria-label": `${readableName(name)} ${label.toLowerCase()}`, class: "short", placeholder: plugin && !name.includes("=") ? String(plugin.details[side]) : "",
     value: tunable[side], set: form.setter(tunable, side), places, pointer: () => (pointer() === null ? null : `${pointer()}/${side}`),
   });
   const unit = plugin?.details.unit === "1" ? "" : plugin?.details.unit;

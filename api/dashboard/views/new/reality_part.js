@@ -3,7 +3,7 @@
 
 import { h } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
-import { LIMITS } from "./draft.js";
+import { LIMITS, plainName } from "./draft.js";
 import { field, numberField } from "./fields.js";
 import { part, pluginField } from "./form_parts.js";
 import { samplesField } from "./samples_field.js";
@@ -46,10 +46,14 @@ export function realityPart(form) {
  * @param {Form} form
  */
 function simulated(form) {
-  const { draft: { realityEngine, realityParameters }, places, catalogue } = form;
-  const fields = catalogue.tunables.filter(({ available }) => available).map(({ name, details }) => numberField({
-    label: readableName(name), value: realityParameters[name], set: form.setter(realityParameters, name), places, placeholder: "the robot’s own",
-    pointer: `/reality/parameters/${name}`, hint: `${details.least} to ${details.greatest}` }));
+  const { draft: { realityEngine, realityParameters, tunables }, places, catalogue } = form;
+  const named = [...new Set([...tunables.map(({ name }) => name), ...Object.keys(realityParameters)])];
+  const fields = named.flatMap((name) => {
+    const plugin = catalogue.tunables.find((other) => other.name === plainName(name));
+    return plugin?.available ? [numberField({
+      label: readableName(name), value: realityParameters[name], set: form.setter(realityParameters, name), places, placeholder: "the robot’s own",
+      pointer: `/reality/parameters/${name}`, hint: name.includes("=") ? "" : `${plugin.details.least} to ${plugin.details.greatest}` })] : [];
+  });
   return [
     h("p", { class: "note" }, "Hidden from the strategies, and from everybody until the study has ended."),
     pluginField(form, "Engine of reality", realityEngine, catalogue.engines, "/reality/engine", "The engine of the simulators"),
