@@ -13,7 +13,6 @@ from gaplab.services.engines.stepped import SteppedEngine
 
 IN_PLACE = frozenset(
     {
-        "body.center_m",
         "body.inertia",
         "body.mass_kg",
         "joint.armature",

@@ -62,12 +62,10 @@ def build_robot(sapien: ModuleType, world: World, materials: Mapping[str, Handle
     return PhysXRobot(links, entities, articulation, tuple(links[joint.child].joint for joint in world.joints))
 
 
-def set_masses(sapien: ModuleType, link: Handle, body: Body) -> None:
-    """Set mass, centre of mass and inertia of a body."""
-    inertia = inertia_of(body)
+def set_masses(link: Handle, body: Body) -> None:
+    """Set mass and moments of inertia of a body; a new centre of mass would leave rounding errors in PhysX's joints."""
     link.mass = body.mass_kg
-    link.inertia = np.array(inertia.moments_kg_m2)
-    link.cmass_local_pose = pose_of(sapien, body.center_m, inertia.turn)
+    link.inertia = np.array(inertia_of(body).moments_kg_m2)
 
 
 def _outwards(world: World) -> Iterator[Joint]:
@@ -87,7 +85,8 @@ def _link(sapien: ModuleType, body: Body, parent: Handle | None, materials: Mapp
     for part in body.parts:
         if part.collides:
             link.attach(build_shape(sapien, part, materials[body.surface], number))
-    set_masses(sapien, link, body)
+    set_masses(link, body)
+    link.cmass_local_pose = pose_of(sapien, body.center_m, inertia_of(body).turn)
     link.linear_damping = link.angular_damping = 0.0
     link.max_linear_velocity = link.max_angular_velocity = UNLIMITED
     return link

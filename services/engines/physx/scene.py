@@ -5,9 +5,10 @@ from types import ModuleType
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.inertias import inverse_inertias
+from gaplab.services.core.inertias import inertia_of, inverse_inertias
 from gaplab.services.core.kinematics import inverse, rotated
 from gaplab.services.core.observations import gravity_m_s2
+from gaplab.services.core.shapes import Quaternion, Vector
 from gaplab.services.core.world import Material, Motor, World
 from gaplab.services.engines.physx.drives import JointDrive, resists
 from gaplab.services.engines.physx.handles import Handle
@@ -41,31 +42,49 @@ class PhysXScene:
 
     def __init__(self, sapien: ModuleType, world: World) -> None:
         self._sapien = sapien
+        self._crowded = any(sum(part.collides for part in body.parts) > 1 for body in world.bodies)
+        self._build(world)
+
+    def _build(self, world: World) -> None:
         self.world = world
-        self._bodies = world.bodies
-        names = surface_names(world)
-        self._materials = {name: sapien.physx.PhysxMaterial(0.0, 0.0, 0.0) for name in names}
-        self._system = _system(sapien, world)
-        self._scene = sapien.Scene([self._system])
-        for number, material in enumerate(self._materials.values()):
-            ground = self._scene.add_ground(0.0, render=False, material=material)
-            set_offsets(ground.components[0].collision_shapes[0])
-            ground.components[0].collision_shapes[0].set_collision_groups(ground_groups(number))
-        self.robot = build_robot(sapien, world, self._materials)
-        for entity in self.robot.entities:
-            self._scene.add_entity(entity)
+        self._bodies, self._frames = world.bodies, _frames(world)
+        physx = self._sapien.physx
+        self._materials = {name: physx.PhysxMaterial(0.0, 0.0, 0.0) for name in surface_names(world)}
+        self.robot = build_robot(self._sapien, world, self._materials)
+        self._enter_scene()
         self.articulation = self.robot.articulation
         active = self.articulation.active_joints
         self._places = [active.index(joint) for joint in self.robot.joints]
         self._links = [self.articulation.links.index(self.robot.links[joint.child]) for joint in world.joints]
         self._axes = [ALONG_AXIS if joint.slides else ABOUT_AXIS for joint in world.joints]
+        self._forces = [0.0] * len(world.joints)
         if any(joint.start for joint in world.joints):
             self.articulation.qpos = self._in_order([joint.start for joint in world.joints])
-        self._forces: list[float] = [0.0] * len(world.joints)
         self._initial: bytes = self._system.pack()
 
+    def _enter_scene(self) -> None:
+        """Put the robot into a new scene on the grounds of all surfaces."""
+        self._system = _system(self._sapien, self.world)
+        self._scene = self._sapien.Scene([self._system])
+        for number, material in enumerate(self._materials.values()):
+            ground = self._scene.add_ground(0.0, render=False, material=material)
+            set_offsets(ground.components[0].collision_shapes[0])
+            ground.components[0].collision_shapes[0].set_collision_groups(ground_groups(number))
+        for entity in self.robot.entities:
+            self._scene.add_entity(entity)
+
     def start(self, world: World) -> None:
-        """Reset to time 0 of a world. PhysX itself drops contacts when bodies are moved."""
+        """Reset to time 0 of a world.
+
+        PhysX itself drops contacts when bodies are moved. But it solves those of several shapes of a body in an order
+        that depends on all earlier contacts in the scene: such a robot moves to a new scene.
+        """
+        if world.bodies != self._bodies and _frames(world) != self._frames:  # set in place, they would leave rounding errors in PhysX's joints
+            self._build(world)
+        elif self._crowded:
+            for entity in self.robot.entities:
+                self._scene.remove_entity(entity)
+            self._enter_scene()
         self.world = world
         named = dict(world.surfaces)
         for name, ours in self._materials.items():
@@ -73,7 +92,7 @@ class PhysXScene:
         if world.bodies != self._bodies:
             self._bodies = world.bodies
             for body in world.bodies:
-                set_masses(self._sapien, self.robot.links[body.name], body)
+                set_masses(self.robot.links[body.name], body)
         self._set_joints()
         self._system.unpack(self._initial)
 
@@ -89,7 +108,8 @@ class PhysXScene:
             drive for drive, joint in zip(self._drives, world.joints, strict=True) if joint.motor is not None
         ]
         self._stepped = [(place, drive) for place, drive in enumerate(self._drives) if drive.steps]
-        self._push()
+        self._forces = [0.0] * len(self._drives)
+        self.articulation.qf = self._in_order(self._forces)
 
     def command(self, actuator: int, target: float) -> None:
         """Set a new target for a motor, in its unit."""
@@ -182,6 +202,11 @@ def _system(sapien: ModuleType, world: World) -> Handle:
 def surface_names(world: World) -> tuple[str, ...]:
     """Return the names of the surfaces of bodies, in their order; first "" for the ground's own material."""
     return tuple(dict.fromkeys(["", *(body.surface for body in world.bodies)]))
+
+
+def _frames(world: World) -> list[tuple[Vector, Quaternion]]:
+    """Return centre of mass and turn of the principal axes of each body."""
+    return [(body.center_m, inertia_of(body).turn) for body in world.bodies]
 
 
 def _set_material(ours: Handle, material: Material) -> None:

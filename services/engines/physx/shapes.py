@@ -12,10 +12,6 @@ from gaplab.services.engines.physx.handles import Handle
 CONTACT_OFFSET_M = 0.01
 """Distance below which surfaces are candidates for contact; they touch at distance 0."""
 
-SIDES = 32
-"""Number of sides of a cylinder, which is a hull: 64 vertices are the most that all of PhysX accepts. The middle of a
-side is 0.5 % of the radius inside the cylinder."""
-
 MOST_SURFACES = 31
 """Largest number of surfaces that have a ground of their own: one bit of PhysX's collision groups each."""
 
@@ -31,41 +27,31 @@ def build_shape(sapien: ModuleType, part: Part, material: Handle, surface: int) 
         material: material of its contacts.
         surface: number of the ground that it touches: see `robot_groups`.
     """
-    shape, turn = _geometry(sapien, part.shape, material)
+    lies = isinstance(part.shape, Capsule | Cylinder)  # along x, in PhysX
+    turn = turn_from_x(Z) if lies else np.array(UNTURNED)
     place = product(np.array(part.turn), turn) if part.turn != UNTURNED else turn
+    shape = _geometry(sapien, part.shape, material)
     shape.local_pose = pose_of(sapien, part.center_m, place)
     set_offsets(shape)
     shape.set_collision_groups(robot_groups(surface))
     return shape
 
 
-def _geometry(sapien: ModuleType, shape: Shape, material: Handle) -> tuple[Handle, FloatArray]:
-    """Return PhysX's shape, and the rotation `(4,)` that turns its axis into the World's: a capsule lies along x."""
-    physx, unturned = sapien.physx, np.array(UNTURNED)
+def _geometry(sapien: ModuleType, shape: Shape, material: Handle) -> Handle:
+    """Return PhysX's shape; a cylinder is a prism of SAPIEN's."""
+    physx = sapien.physx
     match shape:
         case Box(size_m=edges):
-            return physx.PhysxCollisionShapeBox([edge / 2 for edge in edges], material), unturned
+            return physx.PhysxCollisionShapeBox([edge / 2 for edge in edges], material)
         case Sphere(radius_m=radius):
-            return physx.PhysxCollisionShapeSphere(radius, material), unturned
+            return physx.PhysxCollisionShapeSphere(radius, material)
         case Capsule(radius_m=radius, length_m=length):
-            return physx.PhysxCollisionShapeCapsule(radius, length / 2, material), turn_from_x(Z)
+            return physx.PhysxCollisionShapeCapsule(radius, length / 2, material)
         case Cylinder(radius_m=radius, length_m=length):
-            return _hull(sapien, _prism(radius, length), material), unturned
+            return physx.PhysxCollisionShapeCylinder(radius, length / 2, material)
         case Hull(points_m=points):
-            return _hull(sapien, np.array(points), material), unturned
-
-
-def _hull(sapien: ModuleType, points: FloatArray, material: Handle) -> Handle:
-    vertices, scale = points.astype(np.float32), np.ones(3, np.float32)
-    return sapien.physx.PhysxCollisionShapeConvexMesh(vertices=vertices, scale=scale, material=material)
-
-
-def _prism(radius: float, length: float) -> FloatArray:
-    """Return `(64, 3)`: the vertices of a regular prism within a cylinder along z."""
-    angles = 2 * np.pi * np.arange(SIDES) / SIDES
-    ring = radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    ends = (-length / 2, length / 2)
-    return np.vstack([np.column_stack([ring, np.full(SIDES, end)]) for end in ends])
+            vertices, scale = np.array(points, np.float32), np.ones(3, np.float32)
+            return physx.PhysxCollisionShapeConvexMesh(vertices=vertices, scale=scale, material=material)
 
 
 def pose_of(sapien: ModuleType, position: Vector, turn: FloatArray | Quaternion) -> Handle:
