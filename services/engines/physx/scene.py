@@ -3,6 +3,7 @@
 from types import ModuleType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.inertias import inertia_of, inverse_inertias
@@ -79,7 +80,9 @@ class PhysXScene:
         PhysX itself drops contacts when bodies are moved. But it solves those of several shapes of a body in an order
         that depends on all earlier contacts in the scene: such a robot moves to a new scene.
         """
-        if world.bodies != self._bodies and _frames(world) != self._frames:  # set in place, they would leave rounding errors in PhysX's joints
+        if (
+            world.bodies != self._bodies and _frames(world) != self._frames
+        ):  # set in place, they would leave rounding errors in PhysX's joints
             self._build(world)
         elif self._crowded:
             for entity in self.robot.entities:
@@ -123,7 +126,7 @@ class PhysXScene:
             self._forces = forces
             self.articulation.qf = self._in_order(forces)
 
-    def _in_order(self, values: list[float]) -> FloatArray:
+    def _in_order(self, values: list[float]) -> NDArray[np.float32]:
         """Return values `(joints,)` of the world's joints in PhysX's order."""
         ordered = np.zeros(len(values), np.float32)
         ordered[self._places] = values
