@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ def test_dry_friction_carries_a_weight_up_to_its_threshold(engine: PhysX, fricti
 
 
 @pytest.mark.parametrize("resistance", [{"damping": 2.0}, {"dry_friction": 2.0}])
-def test_a_servo_is_slowed_only_if_resistance_takes_its_torque(engine: PhysX, resistance: dict[str, float]) -> None:
+def test_a_servo_is_slowed_only_if_resistance_takes_its_torque(engine: PhysX, resistance: dict[str, Any]) -> None:
     strong, weak = (rig(axis=X, slides=True, motor=Motor(0.5, force, 1.0), **resistance) for force in (100.0, 1.5))
 
     reached = angles(engine, strong, held(np.array([2.0]), 0.5))
