@@ -1,13 +1,15 @@
 """A robot with PD motors: Simulate against bare stepping, and 20 simulators by turns against one at a time.
 
 `python -m benchmarks.any_robot ENGINE` prints both, for an engine that advances step by step. The robot has the
-masses, moments, shapes and limits of a1 in pybullet_data, rounded. Bare stepping calls the same law of motors and
+masses, moments, shapes and limits of a1 in pybullet_data, rounded; `--robot FILE` takes a robot file in place of it,
+as `gaplab robot import` writes it. Bare stepping calls the same law of motors and
 contacts on the same scene, without Simulate, worlds, poses and checks.
 """
 
 from argparse import ArgumentParser
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from time import process_time
 from typing import Any
 
@@ -16,6 +18,7 @@ import numpy as np
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.controllers.square_pulses import SquarePulses
 from gaplab.services.core.motions import Motion
+from gaplab.services.core.robot_files import read_robot_file
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.shapes import Box, Cylinder, Part, Quaternion, Sphere
 from gaplab.services.core.tasks.walk import Walk
@@ -35,16 +38,16 @@ ROUNDS = 5
 
 
 class Dog(Robot):
-    """A robot like a1, from its usual stance."""
+    """A robot like a1, from its usual stance, or another one with PD motors."""
 
     name = "dog"
     engine = "pybullet"
     usual_controller = PluginRef(name="square_pulses")
     usual_task = PluginRef(name="walk")
 
-    def __init__(self) -> None:
+    def __init__(self, world: World | None = None) -> None:
         super().__init__()
-        self.world = dog()
+        self.world = world or dog()
         self.perform(SquarePulses(), Walk())
 
 
@@ -114,27 +117,34 @@ def simulators(world: World) -> list[World]:
     for number in range(TURNS):
         factor = 0.8 + 0.4 * number / TURNS
         bodies = tuple(replace(body, mass_kg=factor * body.mass_kg) for body in world.bodies)
-        motor = replace(MOTOR, kp=factor * MOTOR.kp)
         heavier = world.edited("body.mass_kg", bodies=bodies)
-        edited = heavier.edited("motor.kp", joints=tuple(replace(joint, motor=motor) for joint in world.joints))
+        edited = heavier.edited("motor.kp", joints=tuple(stiffer(joint, factor) for joint in world.joints))
         worlds.append(replace(edited, material=Material(factor, 0.8 * factor)))
     return worlds
+
+
+def stiffer(joint: Joint, factor: float) -> Joint:
+    """Return a joint whose PD motor, if it has one, is stiffer by a factor."""
+    motor = joint.motor
+    return replace(joint, motor=replace(motor, kp=factor * motor.kp)) if isinstance(motor, PDMotor) else joint
 
 
 def main() -> None:
     """Print both figures of an engine."""
     parser = ArgumentParser(prog="python -m benchmarks.any_robot", description=__doc__)
     parser.add_argument("engine", choices=[name for name, each in engines.items() if issubclass(each, SteppedEngine)])
-    engine = engines[parser.parse_args().engine]()
+    parser.add_argument("--robot", type=Path, help="robot file")
+    arguments = parser.parse_args()
+    engine = engines[arguments.engine]()
     assert isinstance(engine, SteppedEngine)
+    robot = Dog(read_robot_file(arguments.robot.read_bytes()).world if arguments.robot else None)
     for material in MATERIALS:
-        overhead(engine, material)
-    by_turns(engine)
+        overhead(engine, robot, material)
+    by_turns(engine, robot)
 
 
-def overhead(engine: SteppedEngine[Any], material: Material) -> None:
+def overhead(engine: SteppedEngine[Any], robot: Robot, material: Material) -> None:
     """Print the time of a rollout through Simulate, and of bare stepping."""
-    robot = Dog()
     robot.world = replace(robot.world, material=material)
     motion = robot.motion(robot.known)
     assert isinstance(motion, Motion)
@@ -144,9 +154,8 @@ def overhead(engine: SteppedEngine[Any], material: Material) -> None:
     print(f"{engine.name}, {material}: Simulate {1e3 * whole:.1f} ms, bare {1e3 * alone:.1f} ms, {alone / whole:.2f}")
 
 
-def by_turns(engine: Engine) -> None:
+def by_turns(engine: Engine, robot: Robot) -> None:
     """Print the time of a rollout in one of many simulators, by turns and one simulator at a time."""
-    robot = Dog()
     motion, worlds = robot.motion(robot.known), simulators(robot.world)
     turns, one_by_one = best(
         [

@@ -88,7 +88,7 @@ def feedback(robot: Robot, senses: str) -> None:
 def main() -> None:
     """Print all figures."""
     overhead(Dog())
-    by_turns(MuJoCo())
+    by_turns(MuJoCo(), Dog())
     for robot in (Dog(), Quadruped()):
         for senses in FEEDBACK:
             feedback(robot, senses)

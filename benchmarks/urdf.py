@@ -1,6 +1,6 @@
 """A World as a URDF file, as users give it to PyBullet."""
 
-from gaplab.services.core.shapes import Box
+from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.world import Body, Joint, World
 
 
@@ -16,6 +16,7 @@ def _link(body: Body, world: World) -> str:
     if isinstance(shape, Box):
         geometry, edges = f'<box size="{_numbers(shape.size_m)}"/>', shape.size_m
     else:
+        assert isinstance(shape, Sphere)
         geometry, edges = f'<sphere radius="{shape.radius_m}"/>', (2 * shape.radius_m,) * 3
     squares = [edge**2 for edge in edges]
     xx, yy, zz = (body.mass_kg / 12 * (sum(squares) - square) for square in squares)

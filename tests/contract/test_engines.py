@@ -11,6 +11,7 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Motion, Trajectory, open_loop
+from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Shape, Sphere, Vector
@@ -35,7 +36,7 @@ def flat(trajectory: Trajectory) -> FloatArray:
 
 def runnable() -> list[tuple[str, str]]:
     installed = {name: engine() for name, engine in engines.items() if engine.available()}
-    worlds = {name: robot().world for name, robot in robots.items()}
+    worlds = {name: robot().world for name, robot in robots.items() if name != IMPORTED}  # that is another quadruped
     return [(name, robot) for name, engine in installed.items() for robot in worlds if engine.runs(worlds[robot])]
 
 

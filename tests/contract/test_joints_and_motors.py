@@ -7,7 +7,7 @@ import pytest
 
 from gaplab.services.core.kinematics import about, product
 from gaplab.services.core.shapes import UNTURNED, Box, Capsule, Cylinder, Hull, Part, Shape, Sphere
-from gaplab.services.core.world import Body, Inertia, PDMotor
+from gaplab.services.core.world import Body, Inertia, Joint, PDMotor, World
 from gaplab.services.engines.base import Engine
 from tests.contract.textbook import (
     FRAME,
@@ -32,6 +32,7 @@ __all__ = ["engine"]
 KG = LOAD.mass_kg
 MOMENT = KG / 12 * (0.1**2 + 0.3**2)  # of the load about y
 PUSH = PDMotor("torque", max_torque_nm=100.0)
+QUARTER = (0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
 
 
 def test_a_push_against_damping_ends_at_their_balance_and_a_slide_runs_out(engine: Engine) -> None:
@@ -189,6 +190,28 @@ def test_a_motor_stiffer_than_a_step_can_follow_is_stable(engine: Engine) -> Non
     turned = angles(engine, world, held(times(1.0), 0.5))
 
     assert turned[1:] == pytest.approx(0.5, abs=0.05)
+
+
+def test_light_legs_with_strong_motors_keep_their_shape(engine: Engine) -> None:
+    """Joints that move each other, and are moved by the ground: four legs, stiffer than a step can follow."""
+    bodies, joints = [Body("trunk", 8.0, Box((0.4, 0.2, 0.1)))], []
+    motor = PDMotor("position", 100.0, kp=300.0, kd=5.0)
+    for leg, (x, y) in enumerate([(0.2, 0.15), (0.2, -0.15), (-0.2, 0.15), (-0.2, -0.15)]):
+        thigh, shin = f"thigh {leg}", f"shin {leg}"
+        bodies.append(Body(thigh, 0.5, Box((0.03, 0.03, 0.2)), (0.0, 0.0, -0.1), collides=False))
+        bodies.append(Body(shin, 0.05, Capsule(0.01, 0.2), (0.0, 0.0, -0.1)))
+        joints.append(Joint(f"hip {leg}", "trunk", thigh, (x, y, 0.0), Y, motor, start=0.5))
+        joints.append(Joint(f"knee {leg}", thigh, shin, (0.0, 0.0, -0.2), Y, motor, start=-0.7))
+    starts = [joint.start for joint in joints]
+    world = World(tuple(bodies), tuple(joints), start_height_m=0.5, start_turn=QUARTER, time_step_s=STEP_S)
+    honoured(engine, world)
+
+    recorded = engine.record(world, held(times(3.0, 40), *starts), times(3.0, 40))
+
+    assert recorded.angles_rad is None or np.abs(recorded.angles_rad - starts).max() < 0.2
+    assert recorded.angles_rad is None or np.abs(recorded.angles_rad[-10:] - starts).max() < 0.05
+    assert np.linalg.norm(recorded.poses[-1, :3]) < 2.0
+    assert np.ptp(recorded.poses[-10:, :3], axis=0).max() < 0.02
 
 
 def test_a_motor_gives_no_more_than_its_largest_torque(engine: Engine) -> None:

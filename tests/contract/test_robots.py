@@ -9,6 +9,6 @@ from gaplab.services.core.robots import robots
 
 @pytest.mark.parametrize("name", sorted(robots))
 def test_its_reality_is_the_papers(name: Any) -> None:
-    material = robots[name]().world.material
+    material = robots[name].example().world.material
 
     assert (material.static_friction, material.dynamic_friction, material.restitution) == (1.0, 0.8, 0.0)

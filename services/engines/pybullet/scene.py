@@ -31,6 +31,8 @@ class PyBulletScene:
         client: id of the server; every call names it, so scenes do not interfere.
         robot: Bullet's id of the robot.
         materials: material of each link that can touch the ground, by Bullet's index.
+        advance: function that steps Bullet once.
+        inner_steps: number of Bullet's steps in a time step of the world.
     """
 
     def __init__(self, bullet: ModuleType, world: World) -> None:
@@ -41,6 +43,7 @@ class PyBulletScene:
         self._robot = build_robot(bullet, self.client, world)
         self.robot = self._robot.robot
         self.materials: dict[int, Material] = {}
+        self.inner_steps = 1
         self._bare_step = partial(bullet.stepSimulation, physicsClientId=self.client)
         self._frame = self._from_center_of_mass()
         self._set_joints()
@@ -80,7 +83,7 @@ class PyBulletScene:
             self.bullet.POSITION_CONTROL,
             targetPosition=target,
             force=motor.max_torque_nm,
-            positionGain=motor.position_gain,
+            positionGain=_shared(motor.position_gain, self.inner_steps),
             velocityGain=1.0,
             maxVelocity=motor.max_speed_rad_s,
             physicsClientId=self.client,
@@ -89,7 +92,7 @@ class PyBulletScene:
     def step(self, count: int) -> None:
         """Advance by a number of time steps."""
         advance = self.advance
-        for _ in range(count):
+        for _ in range(count * self.inner_steps):
             advance()
 
     def pose(self) -> FloatArray:
@@ -158,6 +161,8 @@ class PyBulletScene:
         """Set dry friction, and choose how to step: with torques that Bullet has no motor for, or without."""
         numbers = {joint.name: number for number, joint in enumerate(self.world.joints)}
         self._motors = tuple((numbers[joint.name], joint.motor) for joint in self.world.actuators)
+        self._torques = Torques(self.world)
+        self._set_inner_steps(self._torques.inner_steps)
         for link, joint in zip(self._robot.joints, self.world.joints, strict=True):
             if not isinstance(joint.motor, Motor):
                 self.bullet.setJointMotorControl2(
@@ -168,9 +173,18 @@ class PyBulletScene:
                     force=joint.dry_friction,
                     physicsClientId=self.client,
                 )
-        self._torques = Torques(self.world)
         self._driven = [self._robot.joints[number] for number in self._torques.joints]
         self.advance = self._driven_step if self._driven else self._bare_step
+
+    def _set_inner_steps(self, count: int) -> None:
+        """Set the number of Bullet's steps, each of `advance`, in a time step of the world.
+
+        Bullet turns the force of a motor into an impulse when it is set, so this comes before.
+        """
+        if count != self.inner_steps:
+            step_s = self.world.time_step_s / count
+            self.bullet.setPhysicsEngineParameter(fixedTimeStep=step_s, physicsClientId=self.client)
+            self.inner_steps = count
 
     def _driven_step(self) -> None:
         bullet, robot, links, client = self.bullet, self.robot, self._driven, self.client
@@ -185,3 +199,8 @@ class PyBulletScene:
         if turn == UNTURNED:
             return (-center[0], -center[1], -center[2]), UNTURNED
         return self.bullet.invertTransform(center, turn)  # type: ignore[no-any-return]
+
+
+def _shared(gain: float, steps: int) -> float:
+    """Return the share of an error to close in each of some steps, so that a share `gain` of it is closed in all."""
+    return gain if steps == 1 else 1.0 - max(0.0, 1.0 - gain) ** (1.0 / steps)

@@ -51,7 +51,7 @@ class StickSlip:
         """Advance by a number of time steps."""
         bullet, robot, client = self._scene.bullet, self._scene.robot, self._scene.client
         advance, contacts = self._scene.advance, bullet.getContactPoints
-        for _ in range(count):
+        for _ in range(count * self._scene.inner_steps):
             advance()
             self._switch(contacts(robot, physicsClientId=client))
 

@@ -1,5 +1,6 @@
 """Torques that Bullet has no motor for: PD motors, damping, and dry friction beside a servo."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
@@ -12,6 +13,14 @@ States: TypeAlias = tuple[tuple[float, ...], ...]
 
 FREE = PDLaw(0.0, 0.0, 0.0, 0.0)
 """The law of a joint without a PD motor."""
+
+
+STIFFEST = 1.5
+"""Largest share (kd + h kp) h w of a joint's inertia that its motor may have in an inner step of length h: beyond it,
+motors of joints that move each other swing up."""
+
+MOST_INNER_STEPS = 16
+"""Largest number of Bullet's steps in one of the world's."""
 
 
 class _Resisted(NamedTuple):
@@ -40,13 +49,20 @@ class Torques:
 
     Args:
         world: world.
+
+    Attributes:
+        joints: numbers of the joints.
+        inner_steps: number of steps of Bullet's in a time step of the world: more than one where motors are too strong.
     """
 
     def __init__(self, world: World) -> None:
         self.joints = tuple(number for number, joint in enumerate(world.joints) if needs_torque(joint))
         self._places = {joint: place for place, joint in enumerate(self.joints)}
         inverse = inverse_inertias(_without_armature(world)).tolist() if self.joints else []
-        self._resisted = [_resisted(world.joints[number], inverse[number], world.time_step_s) for number in self.joints]
+        pairs = [(world.joints[number], inverse[number]) for number in self.joints]
+        self.inner_steps = _inner_steps(pairs, world.time_step_s)
+        step_s = world.time_step_s / self.inner_steps
+        self._resisted = [_resisted(joint, response, step_s) for joint, response in pairs]
         self.reset()
 
     def reset(self) -> None:
@@ -89,6 +105,23 @@ def needs_torque(joint: Joint) -> bool:
     """Return whether Bullet lacks a motor for what acts in a joint."""
     beside_servo = isinstance(joint.motor, Motor) and joint.dry_friction > 0
     return isinstance(joint.motor, PDMotor) or joint.damping > 0 or beside_servo
+
+
+def _inner_steps(pairs: Sequence[tuple[Joint, float]], step_s: float) -> int:
+    """Return the number of inner steps, given joints and their inverse inertias."""
+    for count in range(1, MOST_INNER_STEPS):
+        if all(_strength(joint, step_s / count) * inverse <= STIFFEST for joint, inverse in pairs):
+            return count
+    return MOST_INNER_STEPS if pairs else 1
+
+
+def _strength(joint: Joint, step_s: float) -> float:
+    """Return the inertia that a joint's motor and damping have in a step, kg m²."""
+    damping, stiffness = joint.damping, 0.0
+    if isinstance(joint.motor, PDMotor) and joint.motor.follows != "torque":
+        damping += joint.motor.kd
+        stiffness = joint.motor.kp if joint.motor.follows == "position" else 0.0
+    return step_s * (damping + step_s * stiffness)
 
 
 def _resisted(joint: Joint, inverse: float, step_s: float) -> _Resisted:
