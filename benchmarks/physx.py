@@ -25,7 +25,7 @@ def bare() -> Callable[[], int]:
     """Return work: `PhysxCpuSystem.step` in a loop, with new drive targets at pulse edges only."""
     world = ROBOT.world
     scene = PhysX()._scenes[world]
-    system, joints, start = scene._system, scene.robot.motors, scene._initial
+    system, joints, start = scene._system, scene.robot.joints, scene._initial
     scene.start(world)
     plans = [edges(open_loop(ROBOT.motion(genome)), world.time_step_s) for genome in genomes()]
 

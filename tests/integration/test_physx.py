@@ -158,6 +158,7 @@ def solid(body: Body) -> list[float]:
     """Principal moments of inertia of even density."""
     if isinstance(body.shape, Sphere):
         return [0.4 * body.mass_kg * body.shape.radius_m**2] * 3
+    assert isinstance(body.shape, Box)
     x, y, z = np.square(body.shape.size_m)
     return [body.mass_kg / 12 * (y + z), body.mass_kg / 12 * (x + z), body.mass_kg / 12 * (x + y)]
 

@@ -22,6 +22,7 @@ from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments import stored_robots, submission
 from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import ExperimentRow, RobotRow
 from gaplab.services.store.session import Store
 
@@ -135,7 +136,7 @@ def test_a_robot_from_a_file_has_the_numbers_of_the_plug_in_to_the_last_bit(stor
     made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
     with store.reading() as session:
         from_file = spec_to_run(session.get_one(ExperimentRow, made.id).spec)
-    plug_in = submission.resolve_experiment(ExperimentSpec.model_validate(SPEC | {"robot": Quadruped.name}))
+    plug_in = resolve_experiment(ExperimentSpec.model_validate(SPEC | {"robot": Quadruped.name}))
 
     ours, theirs = (list(repetition(setting(spec, 0))) for spec in (from_file, plug_in))
     assert [repr(step) for step in ours] == [repr(step) for step in theirs]

@@ -7,25 +7,53 @@ from warnings import catch_warnings, simplefilter
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.world import World
-from gaplab.services.engines.physx.scene import PhysXScene
+from gaplab.services.engines.physx.scene import PhysXScene, surface_names
+from gaplab.services.engines.physx.shapes import MOST_SURFACES
 from gaplab.services.engines.stepped import SteppedEngine
+
+IN_PLACE = frozenset(
+    {
+        "body.inertia",
+        "body.mass_kg",
+        "joint.armature",
+        "joint.damping",
+        "joint.dry_friction",
+        "motor.delay_s",
+        "motor.follows",
+        "motor.kd",
+        "motor.kp",
+        "motor.max_speed_rad_s",
+        "motor.max_torque_nm",
+        "motor.position_gain",
+        "noise",
+        "surfaces",
+    }
+)
+"""Fields that PhysX lets us set in a scene; gravity, and so the slope, is given when a scene is created."""
 
 
 class PhysX(SteppedEngine[PhysXScene]):
     """PhysX on the CPU, the paper's own engine, which has all three coefficients itself.
 
     Deterministic within one version and architecture; single precision; needs neither a GPU nor Vulkan.
-    Restitution acts on impacts faster than 0.2 m/s.
+    Restitution acts on impacts faster than 0.2 m/s. Dry friction is a torque that is set before each step, by the load
+    of the step before.
     """
 
     name = "physx"
     source = "PhysX 5.3.1 through SAPIEN, https://sapien.ucsd.edu, version 3.0.3; docs/engines.md"
     library = "sapien"
+    in_place = IN_PLACE
     install = "pip install 'gaplab[physx]'"
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
         self._library = _sapien()
+
+    @classmethod
+    def runs(cls, world: World) -> bool:
+        """Return whether the world has bodies, with no more surfaces than PhysX can tell apart."""
+        return super().runs(world) and len(surface_names(world)) <= 1 + MOST_SURFACES
 
     def _build(self, world: World) -> PhysXScene:
         return PhysXScene(self._library, world)

@@ -3,17 +3,24 @@
 from types import ModuleType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.inertias import inertia_of, inverse_inertias
 from gaplab.services.core.kinematics import inverse, rotated
-from gaplab.services.core.world import World
-from gaplab.services.engines.physx.robot import Handle, build_robot, set_offsets
+from gaplab.services.core.observations import gravity_m_s2
+from gaplab.services.core.shapes import Quaternion, Vector
+from gaplab.services.core.world import Material, Motor, World
+from gaplab.services.engines.physx.drives import JointDrive, resists
+from gaplab.services.engines.physx.handles import Handle
+from gaplab.services.engines.physx.robot import build_robot, set_masses
+from gaplab.services.engines.physx.shapes import ground_groups, set_offsets
 
 BOUNCE_THRESHOLD_M_S = 0.2
 """Impacts slower than this do not bounce, as in Bullet. PhysX's default, 2 m/s, is faster than walking feet."""
 
-ABOUT_AXIS = 3
-"""Index of the torque about a hinge's axis: forces, then torques, in the joint's frame, whose x is the axis."""
+ALONG_AXIS, ABOUT_AXIS = 0, 3
+"""Indices of force along a joint's axis and torque about it, in the joint's frame, whose x is the axis."""
 
 LARGEST = float(np.finfo(np.float32).max)
 """Largest number in single precision, in which PhysX computes."""
@@ -23,46 +30,117 @@ class PhysXScene:
     """One world in one scene, with its saved state at time 0.
 
     Robot and ground share one material, as in the paper: PhysX averages the coefficients of two surfaces, so equal
-    ones stay unchanged. Source: the PhysX 5.3 guide; SAPIEN's `physx_system.cpp`.
+    ones stay unchanged. Each surface has a ground and a material of its own, for the same reason; collision groups
+    keep the shapes of all others off that ground. Source: the PhysX 5.3 guide; SAPIEN's `physx_system.cpp`.
 
     Args:
         sapien: the library module.
-        world: world to build; `start` sets its material.
+        world: world to build.
+
+    Attributes:
+        world: the world that the scene is now.
     """
 
     def __init__(self, sapien: ModuleType, world: World) -> None:
+        self._sapien = sapien
+        self._crowded = any(sum(part.collides for part in body.parts) > 1 for body in world.bodies)
+        self._build(world)
+
+    def _build(self, world: World) -> None:
         self.world = world
-        self._material = sapien.physx.PhysxMaterial(0.0, 0.0, 0.0)
-        self._system = _system(sapien, world)
-        self._scene = sapien.Scene([self._system])
-        ground = self._scene.add_ground(0.0, render=False, material=self._material)
-        set_offsets(ground.components[0].collision_shapes[0])
-        self.robot = build_robot(sapien, world, self._material)
-        for entity in self.robot.entities:
-            self._scene.add_entity(entity)
+        self._bodies, self._frames = world.bodies, _frames(world)
+        physx = self._sapien.physx
+        self._materials = {name: physx.PhysxMaterial(0.0, 0.0, 0.0) for name in surface_names(world)}
+        self.robot = build_robot(self._sapien, world, self._materials)
+        self._enter_scene()
         self.articulation = self.robot.articulation
         active = self.articulation.active_joints
-        self._places = [active.index(self.robot.links[joint.child].joint) for joint in world.joints]
+        self._places = [active.index(joint) for joint in self.robot.joints]
         self._links = [self.articulation.links.index(self.robot.links[joint.child]) for joint in world.joints]
+        self._axes = [ALONG_AXIS if joint.slides else ABOUT_AXIS for joint in world.joints]
+        self._forces = [0.0] * len(world.joints)
+        if any(joint.start for joint in world.joints):
+            self.articulation.qpos = self._in_order([joint.start for joint in world.joints])
         self._initial: bytes = self._system.pack()
 
+    def _enter_scene(self) -> None:
+        """Put the robot into a new scene on the grounds of all surfaces."""
+        self._system = _system(self._sapien, self.world)
+        self._scene = self._sapien.Scene([self._system])
+        for number, material in enumerate(self._materials.values()):
+            ground = self._scene.add_ground(0.0, render=False, material=material)
+            set_offsets(ground.components[0].collision_shapes[0])
+            ground.components[0].collision_shapes[0].set_collision_groups(ground_groups(number))
+        for entity in self.robot.entities:
+            self._scene.add_entity(entity)
+
     def start(self, world: World) -> None:
-        """Reset to time 0 of a world. PhysX itself drops contacts when bodies are moved."""
+        """Reset to time 0 of a world.
+
+        PhysX itself drops contacts when bodies are moved. But it solves those of several shapes of a body in an order
+        that depends on all earlier contacts in the scene: such a robot moves to a new scene.
+        """
+        if (
+            world.bodies != self._bodies and _frames(world) != self._frames
+        ):  # set in place, they would leave rounding errors in PhysX's joints
+            self._build(world)
+        elif self._crowded:
+            for entity in self.robot.entities:
+                self._scene.remove_entity(entity)
+            self._enter_scene()
         self.world = world
-        ours, material = self._material, world.material
-        ours.static_friction = max(material.static_friction, material.dynamic_friction)
-        ours.dynamic_friction = material.dynamic_friction
-        ours.restitution = material.restitution
+        named = dict(world.surfaces)
+        for name, ours in self._materials.items():
+            _set_material(ours, named.get(name, world.material))
+        if world.bodies != self._bodies:
+            self._bodies = world.bodies
+            for body in world.bodies:
+                set_masses(self.robot.links[body.name], body)
+        self._set_joints()
         self._system.unpack(self._initial)
 
+    def _set_joints(self) -> None:
+        """Set motors, damping, dry friction and armature, and forget those of the last rollout."""
+        world = self.world
+        inverse_of = inverse_inertias(world).tolist() if any(resists(joint) for joint in world.joints) else None
+        self._drives = [
+            JointDrive(handle, joint, inverse_of[place] if inverse_of else 0.0, world.time_step_s)
+            for place, (handle, joint) in enumerate(zip(self.robot.joints, world.joints, strict=True))
+        ]
+        self._motors = [
+            drive for drive, joint in zip(self._drives, world.joints, strict=True) if joint.motor is not None
+        ]
+        self._stepped = [(place, drive) for place, drive in enumerate(self._drives) if drive.steps]
+        self._forces = [0.0] * len(self._drives)
+        self.articulation.qf = self._in_order(self._forces)
+
     def command(self, actuator: int, target: float) -> None:
-        """Set a new target for a motor, rad."""
-        self.robot.motors[actuator].set_drive_target(target)
+        """Set a new target for a motor, in its unit."""
+        self._motors[actuator].command(target)
+        self._push()
+
+    def _push(self) -> None:
+        """Give PhysX the torques beside the drives, which it keeps from step to step."""
+        forces = [drive.force for drive in self._drives]
+        if forces != self._forces:
+            self._forces = forces
+            self.articulation.qf = self._in_order(forces)
+
+    def _in_order(self, values: list[float]) -> NDArray[np.float32]:
+        """Return values `(joints,)` of the world's joints in PhysX's order."""
+        ordered = np.zeros(len(values), np.float32)
+        ordered[self._places] = values
+        return ordered
 
     def step(self, count: int) -> None:
         """Advance by a number of time steps."""
-        advance = self._system.step
+        advance, stepped = self._system.step, self._stepped
         for _ in range(count):
+            if stepped:
+                angles, speeds = self.angles().tolist(), self.speeds().tolist()
+                for place, drive in stepped:
+                    drive.update(angles[place], speeds[place])
+                self._push()
             advance()
 
     def pose(self) -> FloatArray:
@@ -72,7 +150,7 @@ class PhysXScene:
         return np.array([*pose.p, x, y, z, w], dtype=float)
 
     def angles(self) -> FloatArray:
-        """Return the joint angles `(joints,)`, rad, in the world's order, which is not PhysX's."""
+        """Return the joint angles `(joints,)`, rad or m, in the world's order, which is not PhysX's."""
         return np.asarray(self.articulation.qpos, dtype=float)[self._places]
 
     def speeds(self) -> FloatArray:
@@ -85,8 +163,18 @@ class PhysXScene:
         return rotated(inverse(self.pose()[3:]), turning)
 
     def torques(self) -> FloatArray:
-        """Return the torques of the motors in the last step, `(joints,)`, N·m: all that acts about a hinge's axis."""
-        return np.asarray(self.articulation.link_incoming_joint_forces, dtype=float)[self._links, ABOUT_AXIS]
+        """Return the torques of the motors in the last step, `(joints,)`, N·m or N.
+
+        Those of servos are all that acts about a joint's axis, less what is set beside its drive.
+        """
+        measured = np.asarray(self.articulation.link_incoming_joint_forces, dtype=float)[self._links, self._axes]
+        angles, speeds = self.angles().tolist(), self.speeds().tolist()
+        for place, (joint, drive) in enumerate(zip(self.world.joints, self._drives, strict=True)):
+            if isinstance(joint.motor, Motor):
+                measured[place] -= drive.force
+            else:
+                measured[place] = drive.motor_nm(angles[place], speeds[place])
+        return measured
 
     def close(self) -> None:
         """Close the scene; PhysX frees it with the last reference."""
@@ -101,7 +189,7 @@ def _system(sapien: ModuleType, world: World) -> Handle:
     physx = sapien.physx
     before = physx.get_scene_config()
     physx.set_scene_config(
-        gravity=[0.0, 0.0, -float(np.clip(world.gravity_m_s2, -LARGEST, LARGEST))],
+        gravity=np.clip(gravity_m_s2(world), -LARGEST, LARGEST).tolist(),
         bounce_threshold=BOUNCE_THRESHOLD_M_S,
         enable_tgs=False,
         enable_enhanced_determinism=True,
@@ -112,3 +200,19 @@ def _system(sapien: ModuleType, world: World) -> Handle:
         physx.set_scene_config(before)
     system.timestep = world.time_step_s
     return system
+
+
+def surface_names(world: World) -> tuple[str, ...]:
+    """Return the names of the surfaces of bodies, in their order; first "" for the ground's own material."""
+    return tuple(dict.fromkeys(["", *(body.surface for body in world.bodies)]))
+
+
+def _frames(world: World) -> list[tuple[Vector, Quaternion]]:
+    """Return centre of mass and turn of the principal axes of each body."""
+    return [(body.center_m, inertia_of(body).turn) for body in world.bodies]
+
+
+def _set_material(ours: Handle, material: Material) -> None:
+    ours.static_friction = max(material.static_friction, material.dynamic_friction)
+    ours.dynamic_friction = material.dynamic_friction
+    ours.restitution = material.restitution
