@@ -19,8 +19,8 @@ from gaplab.services.core.arrays import Genomes
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.robots.imported import Imported, ImportedOptions
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.robots.robot_file import Imported, ImportedOptions
 from gaplab.services.core.tasks.walk import Walk
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines.mujoco import MuJoCo

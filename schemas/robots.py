@@ -6,6 +6,36 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Moment
 
+EXAMPLE: dict[str, Any] = {
+    "format_version": 1,
+    "name": "hopper",
+    "usual_controller": {"name": "square_pulses"},
+    "usual_task": {"name": "walk"},
+    "world": {
+        "bodies": [
+            {"name": "trunk", "mass_kg": 1.0, "shape": {"kind": "box", "size_m": [0.3, 0.2, 0.05]}},
+            {
+                "name": "leg",
+                "mass_kg": 0.1,
+                "shape": {"kind": "sphere", "radius_m": 0.03},
+                "center_m": [0.0, 0.0, -0.12],
+            },
+        ],
+        "joints": [
+            {
+                "name": "hip",
+                "parent": "trunk",
+                "child": "leg",
+                "origin_m": [0.0, 0.0, 0.0],
+                "axis": [0.0, 1.0, 0.0],
+                "motor": {"position_gain": 0.1, "max_torque_nm": 4.0},
+            }
+        ],
+        "start_height_m": 0.15,
+    },
+}
+"""A robot file: a trunk on one leg."""
+
 MOST_LOSSES = 2_000
 """Largest number of lines in which a robot file says what its import lost or changed."""
 
@@ -28,6 +58,6 @@ class RobotRead(Frozen):
     file: str | None = Field(description="file that it was imported from", examples=["a1.urdf"])
     bodies: int
     actuators: int
-    mass_kg: float
+    mass_kg: float = Field(examples=[12.5])
     lost: tuple[str, ...] = Field(description="what its import lost or changed", examples=[("transmission: hip",)])
     created_at: Moment

@@ -47,8 +47,8 @@ class Checked(Frozen):
 
     robot: PluginRef = Field(examples=["quadruped"])
     engine: PluginRef = Field(examples=["pybullet"])
-    controller: PluginRef | None = Field(default=None, description="null: the robot's own")
-    task: PluginRef | None = Field(default=None, description="null: the robot's own")
+    controller: PluginRef | None = Field(default=None, description="null: the robot's own", examples=["square_pulses"])
+    task: PluginRef | None = Field(default=None, description="null: the robot's own", examples=["walk"])
     tunables: tuple[ResolvedTunable, ...] = Field(examples=[("restitution",)])
     points: int = POINTS
     evaluations: int = EVALUATIONS

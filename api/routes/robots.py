@@ -1,36 +1,37 @@
 """Robots from files."""
 
-from typing import Annotated
+import json
+from typing import Annotated, Any
 
-from anyio.to_thread import run_sync
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Body, Path, Response
 
 from gaplab.api.http.dependencies import StoreDep
 from gaplab.api.http.problems import Responses, documented
-from gaplab.schemas.robots import RobotRead
+from gaplab.schemas.robots import EXAMPLE, RobotRead
 from gaplab.services.experiments import stored_robots
 
 router = APIRouter(prefix="/robots", tags=["catalogue"])
 
-_JSON = {"application/json": {"schema": {"type": "object"}, "example": {"format_version": 1, "name": "a1", "…": "…"}}}
+_EXAMPLES: dict[str, Any] = {"hopper": {"summary": "A trunk on one leg", "value": EXAMPLE}}
 
-_FILE: Responses = {200: {"description": "the robot file", "content": _JSON}}
+_FILE: Responses = {
+    200: {
+        "description": "the robot file",
+        "content": {"application/json": {"schema": {"type": "object"}, "example": EXAMPLE}},
+    }
+}
+
+Named = Annotated[str, Path(description="hash or name of the robot", max_length=100)]
 
 
-@router.post(
-    "",
-    status_code=201,
-    summary="Add a robot",
-    responses=documented(413, 422),
-    openapi_extra={"requestBody": {"required": True, "content": _JSON}},
-)
-async def add_robot(request: Request, store: StoreDep) -> RobotRead:
+@router.post("", status_code=201, summary="Add a robot", responses=documented(413, 415, 422))
+def add_robot(file: Annotated[dict[str, Any], Body(openapi_examples=_EXAMPLES)], store: StoreDep) -> RobotRead:
     """Store a robot file under its hash. `gaplab robot import` writes such a file from URDF or MJCF.
 
     A file is data: its world, and the names of its usual controller and task. Specs name the robot by its name; of
     several with one name, the one that was added last is meant.
     """
-    return await run_sync(stored_robots.add_robot, store, await request.body())
+    return stored_robots.add_robot(store, json.dumps(file))
 
 
 @router.get("", summary="List the stored robots", responses=documented())
@@ -40,6 +41,6 @@ def list_robots(store: StoreDep) -> tuple[RobotRead, ...]:
 
 
 @router.get("/{robot}", summary="Read a robot file", response_class=Response, responses={**_FILE, **documented(404)})
-def read_robot(robot: Annotated[str, Path(description="hash or name of the robot")], store: StoreDep) -> Response:
+def read_robot(robot: Named, store: StoreDep) -> Response:
     """Return the canonical text of a robot file."""
     return Response(stored_robots.robot_text(store, robot), media_type="application/json")

@@ -12,7 +12,7 @@ from weakref import WeakSet
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.robot_files import RobotFile, read_robot_file
 
-IMPORTED = "imported"
+IMPORTED = "robot_file"
 """Name of the plug-in of all robots from files."""
 
 MOST_KNOWN = 64

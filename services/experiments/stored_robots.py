@@ -7,7 +7,7 @@ from gaplab.schemas.plugin import PluginRead, PluginRef
 from gaplab.schemas.robots import RobotRead
 from gaplab.schemas.spec import SharedSettings
 from gaplab.services.core import robot_library
-from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, unknown_name
+from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
 from gaplab.services.core.robot_files import RobotFile, read_robot_file
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
@@ -68,14 +68,11 @@ def with_stored_robot(store: Store, spec: S) -> S:
     """Return the spec with the hash of the stored robot that it means by a name; unchanged if a plug-in has the name.
 
     Raises:
-        InvalidSpec: no robot has the name, or the robot has options, which one from a file does not have.
+        InvalidSpec: the robot has options, which one from a file does not have.
     """
     name = spec.robot.name
-    if name in robots or name in robots.unusable:
+    if name in robots or name in robots.unusable or (found := _newest(store, name)) is None:
         return spec
-    found, names = _newest(store, name)
-    if found is None:
-        raise InvalidSpec([unknown_name("/robot", "robot", name, [*robots, *names])])
     if spec.robot.options:
         message = f"the robot {name} comes from a file, which has no options"
         raise InvalidSpec([Violation("/robot/options", spec.robot.options, message, "left out")])
@@ -83,10 +80,9 @@ def with_stored_robot(store: Store, spec: S) -> S:
 
 
 @snapshot
-def _newest(session: Session, name: str) -> tuple[PluginRef | None, list[str]]:
+def _newest(session: Session, name: str) -> PluginRef | None:
     row = rows.newest(session, storable(name))
-    names = sorted({each.name for each in rows.all_(session)}) if row is None else []
-    return None if row is None else _ref(row.sha256, row.name), names
+    return None if row is None else _ref(row.sha256, row.name)
 
 
 def _ref(sha256: str, name: str) -> PluginRef:

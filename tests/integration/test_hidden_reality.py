@@ -16,11 +16,12 @@ from pyarrow import parquet
 
 from gaplab.api.app import create_app
 from gaplab.schemas.access import Role
+from gaplab.schemas.robots import EXAMPLE
 from gaplab.schemas.spec import StudySpec
 from gaplab.schemas.views import ViewSpec
 from gaplab.services.access import create_token
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import saved_views, submission
+from gaplab.services.experiments import saved_views, stored_robots, submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Limits
 from gaplab.services.specs.assembly import setting
@@ -72,6 +73,7 @@ def running(store: Store, log: pytest.LogCaptureFixture) -> dict[str, str]:
     study = submission.submit_study(store, StudySpec.model_validate(STUDY))
     run_halfway(store)
     saved_views.save_view(store, "mine", ViewSpec(query="strategy = random"))
+    stored_robots.add_robot(store, json.dumps(EXAMPLE))
     first, second, _ = study.experiments
     return {"studies": study.id, "experiments": first.id, "other": second.id, "sensitivity": first.sensitivity or ""}
 
@@ -86,6 +88,7 @@ def addresses(document: dict[str, Any], ids: dict[str, str]) -> Iterator[str]:
             continue  # of a physical reality, which has no parameters
         address = path.replace("{id}", ids.get(noun, ids["experiments"])).replace("{number}", "0")
         address = address.replace("{name}", "quadruped" if noun == "catalogue" else "mine")
+        address = address.replace("{robot}", "hopper")
         assert "{" not in address, f"{path} has a parameter that this test does not know"
         names = {each["name"]: str(each["schema"]) for each in operations["get"].get("parameters", ())}
         queries = [""]
