@@ -45,8 +45,12 @@ def read_catalogue(request: Request, store: StoreDep) -> Response:
     responses=conditional.CACHED | {200: conditional.TAGGED[200] | {"content": _PNG}} | documented(404, 422, 429),
 )
 def draw_robot(
-    request: Request, name: RobotInPath, drawing: DrawingProcessDep, query: Annotated[PictureQuery, Query()]
+    request: Request,
+    name: RobotInPath,
+    drawing: DrawingProcessDep,
+    store: StoreDep,
+    query: Annotated[PictureQuery, Query()],
 ) -> Response:
     """Draw a robot of the catalogue with its default options, on its ground; a robot without bodies has no picture."""
-    drawn = robot_picture(drawing, name, dark=query.theme == "dark", width_px=query.width)
+    drawn = robot_picture(drawing, store, name, dark=query.theme == "dark", width_px=query.width)
     return conditional.tagged_response(request, Response(drawn, media_type="image/png"))

@@ -60,7 +60,9 @@ def robot_text(session: Session, named: str) -> str:
     """
     row = session.get(RobotRow, storable(named)) or rows.newest(session, storable(named))
     if row is None:
-        raise NotFound(f"there is no robot {named!r}; `gaplab robot list` lists those that are stored")
+        raise NotFound(
+            f"there is no robot {named[:64]!r}; permitted: {', '.join(robots)}, and what `gaplab robot list` lists"
+        )
     return row.text
 
 

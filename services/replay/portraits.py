@@ -8,31 +8,34 @@ import numpy as np
 from gaplab.schemas.replays import Framing
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
+from gaplab.services.core.robot_files import read_robot_file
 from gaplab.services.core.robots import robots
 from gaplab.services.core.world import World
+from gaplab.services.experiments import stored_robots
 from gaplab.services.replay.film import DARK, LIGHT, camera_at, colour_of, solid
 from gaplab.services.replay.painting import paint
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.shapes import USUAL_SIZE_M, extent_of, feet_of, shapes_of
+from gaplab.services.store.session import Store
 
 
-def robot_picture(drawing: RolloutProcess, name: str, *, dark: bool, width_px: int) -> bytes:
+def robot_picture(drawing: RolloutProcess, store: Store, name: str, *, dark: bool, width_px: int) -> bytes:
     """Return a picture of a robot of the catalogue as PNG.
 
     Args:
         drawing: the process that draws.
-        name: name of the robot.
+        store: has the robots from files.
+        name: name of the robot, or the hash of its file.
         dark: true for the dark colours of the page.
         width_px: width of the picture.
 
     Raises:
-        NotFound: no usable robot has this name, or it has no body.
+        NotFound: no usable robot has this name or hash, or it has no body.
         EngineInterrupted: drawing took too long.
         LimitReached: too many callers wait.
     """
-    if name not in robots:
-        raise NotFound(f"no usable robot is called {name[:64]!r}; permitted: {', '.join(robots)}")
-    world = robots[name].example().world
+    own = robots[name].example().world if name in robots else None
+    world = own if own is not None else read_robot_file(stored_robots.robot_text(store, name)).world
     if not world.bodies:
         raise NotFound(f"the robot {name!r} has no body, so there is no picture of it")
     return world_picture(drawing, world, dark=dark, width_px=width_px)

@@ -12,7 +12,7 @@ from gaplab.services.core.tunables.defaults import usual_tunables
 
 
 class ImportedOptions(Frozen):
-    """Options of `imported`."""
+    """Options of `robot_file`."""
 
     sha256: str = Field(default="", max_length=64, description="hash of the robot file")
     name: str = Field(default="", max_length=60, description="name of the robot, for people")
