@@ -1,7 +1,5 @@
 """Robots from files stand, or hold still, in each engine that honours what they need."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -12,19 +10,10 @@ from gaplab.services.engines import engines
 from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.specs.assembly import engine_of
-from tests.unit.test_robot_import import FILES, path_of
+from tests.real_robots import FILES, STANCES
+from tests.unit.test_robot_import import path_of
 
 pytest.importorskip("mujoco")
-STANCES: dict[str, dict[str, Any]] = {
-    "a1": {"start": {"*_upper_joint": 0.9, "*_lower_joint": -1.8}},
-    "laikago": {"turn": (np.pi / 2, 0, 0), "start": {"*_upper_leg_2*": 0.6, "*_lower_leg_2*": -1.2}},
-    "aliengo": {"start": {"*_upper_joint": 0.8, "*_lower_joint": -1.6}},
-    "mini_cheetah": {"start": {"abduct*": -0.8, "thigh*": 1.6}},
-    "vision60": {"start": {"[0246]": 0.8, "[1357]": 1.5}},
-    "minitaur": {},
-    "kuka_iiwa": {"start": {"*_2": 0.5, "*_4": -1.0}},
-    "franka_panda": {},
-}
 
 
 @pytest.mark.parametrize("engine", ["pybullet", "mujoco", "physx"])

@@ -1,7 +1,6 @@
 """Imported robots against MuJoCo's own compiled model of the same file: masses, inertia and forward kinematics."""
 
 from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -18,22 +17,13 @@ from gaplab.services.core.world import Joint, Motor, PDMotor, World
 from gaplab.services.robots.hulls import simplify
 from gaplab.services.robots.importing import ImportedFile, import_robot
 from gaplab.services.robots.options import ImportOptions
+from tests import real_robots
+from tests.real_robots import FILES
 from tests.robot_texts import MJCF
 
 mujoco = pytest.importorskip("mujoco")
 pybullet = pytest.mark.skipif(find_spec("pybullet_data") is None, reason="PyBullet is not installed")
 
-FILES: dict[str, tuple[str, dict[str, Any]]] = {
-    "a1": ("a1/a1.urdf", {}),
-    "laikago": ("laikago/laikago_toes_limits.urdf", {"mend": True}),
-    "minitaur": ("quadruped/minitaur.urdf", {}),
-    "aliengo": ("aliengo/aliengo.urdf", {}),
-    "mini_cheetah": ("mini_cheetah/mini_cheetah.urdf", {"mend": True}),
-    "vision60": ("quadruped/vision60.urdf", {}),
-    "kuka_iiwa": ("kuka_iiwa/model.urdf", {"fixed": True}),
-    "franka_panda": ("franka_panda/panda.urdf", {"fixed": True, "lock": ("panda_finger*",)}),
-    "ant": ("ant.xml", {}),
-}
 MASSES_KG = {  # the sums of the masses in the files
     "a1": 12.458,
     "laikago": 25.567,
@@ -47,12 +37,10 @@ MASSES_KG = {  # the sums of the masses in the files
 
 
 def path_of(name: str) -> Path:
-    if name.endswith(".xml"):
-        gymnasium = pytest.importorskip("gymnasium")
-        return Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / name
-    if find_spec("pybullet_data") is None:
-        pytest.skip("PyBullet is not installed")
-    return Path(import_module("pybullet_data").getDataPath()) / name
+    try:
+        return real_robots.path_of(name)
+    except ModuleNotFoundError as error:
+        pytest.skip(f"{error.name} is not installed")
 
 
 @cache
