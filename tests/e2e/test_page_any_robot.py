@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gaplab.services.core import external_plugins
+from gaplab.services.core import external_plugins, robot_library
+from gaplab.services.core.robots.robot_file import Imported
 from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.store.session import Store
 from tests.drawn_robot import FILES, strode
@@ -106,6 +107,26 @@ def test_the_form_shows_the_chosen_robot(visit: Any, strider: Any) -> None:
     page.wait_for_function("(before) => document.querySelector('.robot-picture').src !== before", arg=light)
     page.get_by_label("Robot", exact=True).select_option("toy_function")
     page.wait_for_selector(".robot-picture", state="detached")
+
+
+def test_the_form_tunes_what_is_usual_for_the_robot_until_the_reader_chooses(visit: Any, strider: Any) -> None:
+    example = robot_library.robot_file(Imported.example().options.sha256)
+    assert example is not None
+    strider[0].http.post("/robots", json=example.content | {"name": "walker"}).raise_for_status()
+    page = visit(f"{strider[0].url}/#/new")
+    chosen = page.get_by_label("Robot", exact=True)
+    ticked = ".tunable:has(input:checked)"
+
+    chosen.select_option("walker")
+    page.wait_for_selector(f"{ticked}:has-text('Mass of bodies')")
+    assert page.locator(ticked).count() == 4
+
+    chosen.select_option("strider")
+    page.wait_for_selector(f"{ticked}:has-text('Restitution')")
+    page.locator(".tunable").filter(has_text="Restitution").get_by_role("checkbox").uncheck()
+    chosen.select_option("walker")
+    page.wait_for_selector(".robot-picture[alt='The robot Walker'][src]")
+    assert page.locator(ticked).count() == 2
 
 
 def test_it_can_be_seen_by_all(visit: Any, strider: Any) -> None:

@@ -1,7 +1,7 @@
 import "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { addTunable, draftOf, plainName, specOf, ticked } from "../../api/dashboard/views/new/draft.js";
+import { addTunable, draftOf, followRobot, plainName, specOf, ticked } from "../../api/dashboard/views/new/draft.js";
 import { specIn, studyOf } from "../../api/dashboard/views/new/paste.js";
 import { nearestPlace } from "../../api/dashboard/views/new/fields.js";
 import { exampleOf, hintOf, keptText } from "../../api/dashboard/views/new/samples_field.js";
@@ -10,6 +10,7 @@ import { curlLines, pythonLines } from "../../api/dashboard/views/new/panel.js";
 const CATALOGUE = {
   strategies: [{ name: "one" }, { name: "two" }, { name: "own" }],
   tunables: [{ name: "grip" }, { name: "mass" }],
+  robots: [{ name: "legs", details: {} }, { name: "wheels", details: { tunables: ["mass(axle)", "grip"] } }],
   defaults: {
     strategies: [{ name: "two", options: {} }, { name: "one", options: {} }], robot: { name: "legs", options: {} },
     optimizer: { name: "climber", options: {} }, discrepancy: { name: "squares", options: {} }, tuner: { name: "hill", options: {} }, tunables: [{ name: "grip" }], budget: { preset: "paper", reuse_transfer: false },
@@ -25,6 +26,22 @@ test("a spec goes through the form unchanged", () => {
     iterations: 3, repetitions: 4, direct_repetitions: 8, seed: 18446744073709551615n, priority: -10, max_parallel: 2,
   };
   assert.deepEqual(specOf(draftOf(spec, CATALOGUE)), spec);
+});
+
+test("a robot's usual tunables are ticked when it is chosen, unless others are", () => {
+  const names = () => ticked(draft.tunables).map(({ name }) => name);
+  const draft = draftOf({}, CATALOGUE);
+  assert.deepEqual(names(), ["grip"]);
+
+  draft.robot.name = "wheels";
+  followRobot(draft, CATALOGUE);
+  assert.deepEqual(names(), ["mass(axle)", "grip"]);
+  assert.deepEqual(ticked(draftOf({ robot: "wheels" }, CATALOGUE).tunables), ticked(draft.tunables));
+
+  draft.tunables[0].upper = "2";
+  draft.robot.name = "legs";
+  followRobot(draft, CATALOGUE);
+  assert.deepEqual(names(), ["mass(axle)", "grip"]);
 });
 
 test("a tunable of a part goes through the form by its label, and is added once", () => {

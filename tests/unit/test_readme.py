@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 
 
-@pytest.mark.parametrize("kind", ["strategies", "robots", "engines", "tunables", "optimizers"])
+@pytest.mark.parametrize("kind", ["strategies", "robots", "controllers", "tasks", "engines", "tunables", "optimizers"])
 def test_it_lists_every_plugin_of_a_kind_and_no_other(kind: Any) -> None:
     (row,) = re.findall(rf"^\| {kind} \| (.*) \|$", README, re.MULTILINE)
 

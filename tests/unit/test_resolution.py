@@ -216,7 +216,7 @@ def test_a_strategy_that_selects_by_readings_is_refused_for_a_robot_without_sens
 
     violation = refused(strategy=by_readings, robot="toy_function")["/strategy"]
 
-    assert violation.permitted == ["quadruped"]
+    assert violation.permitted == ["quadruped", "robot_file"]
     assert "toy_function has no sensors" in violation.message
     assert resolve_experiment(experiment(strategy=by_readings))
     assert resolve_experiment(experiment(strategy="estimation_exploration", robot="toy_function"))

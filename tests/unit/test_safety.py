@@ -1,5 +1,6 @@
 """The safety forecast: extremes of rollouts, limits in words, and physics that fails."""
 
+from dataclasses import replace
 from math import cos, inf, nan, pi, sin
 from typing import Any
 
@@ -40,6 +41,15 @@ def test_extremes_are_the_worst_of_a_rollout() -> None:
     assert found.height == 0.2
     assert found.clearance == pytest.approx(0.2 - 0.1 * sin(0.6) - 0.03 * cos(0.6))
     assert np.isnan(found.torque)
+
+
+def test_a_robot_that_starts_turned_is_upright_there() -> None:
+    lying = tilted(pi / 2, pi / 2 + 0.3, pi / 2 - 0.6)
+
+    world = replace(ROBOT.world, start_turn=tuple(lying.poses[0, 3:].tolist()))
+
+    assert extremes(world, lying, 0.4).tilt == pytest.approx(0.6)
+    assert extremes(ROBOT.world, lying, 0.4).tilt == pytest.approx(pi / 2 + 0.3)
 
 
 def test_failed_physics_has_no_extremes() -> None:

@@ -153,6 +153,8 @@ declare namespace Page {
     discrepancy: PluginDraft;
     tuner: PluginDraft;
     tunables: TunableDraft[];
+    /** The robot that the tunables were ticked for. */
+    tunablesOf: string;
     realityEngine: PluginDraft;
     realityParameters: Record<string, any>;
     bench: BenchDraft;

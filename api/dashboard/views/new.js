@@ -4,7 +4,7 @@
 import { get, post } from "../lib/api.js";
 import { h } from "../lib/dom.js";
 import { stringify } from "../lib/json.js";
-import { draftOf, specOf } from "./new/draft.js";
+import { draftOf, followRobot, specOf } from "./new/draft.js";
 import { ErrorPlaces } from "./new/fields.js";
 import { budgetPart, simulationPart, strategiesPart, studyPart, tunablesPart } from "./new/form_parts.js";
 import { realityPart } from "./new/reality_part.js";
@@ -91,6 +91,7 @@ export class Form {
     const details = () => [...this.parts.querySelectorAll("details")];
     const focused = inputs().findIndex((input) => input === document.activeElement);
     const isOpen = details().map(({ open }) => open);
+    followRobot(this.draft, this.catalogue);
     this.parts.replaceChildren(...PARTS.map((make) => make(this)));
     if (focused >= 0) inputs()[focused]?.focus();
     if (details().length === isOpen.length) details().forEach((element, index) => { element.open ||= isOpen[index]; });

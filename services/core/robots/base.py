@@ -104,7 +104,7 @@ class Robot(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return engine, controller, task, unit, genes, sensors, and whether it is a function, for the catalogue."""
+        """Return what the catalogue tells of the robot."""
         return {"engine": cls.engine, **cls.told(cls.example())}
 
     @staticmethod
@@ -115,6 +115,7 @@ class Robot(Plugin):
             "task": _named(robot.usual_task),
             "unit": robot.unit,
             "genes": robot.space.size,
+            "tunables": list(robot.usual_tunables),
             "function": robot.is_function,
             "bodies": len(robot.world.bodies),
             **robot.sensors.details(),

@@ -48,10 +48,10 @@ class LengthScale(Tunable):
 
     def edit(self, world: World, value: float) -> World:
         """Return the world with bodies of other dimensions."""
-        if value == 1.0:
+        chosen = matching(self.options.of, [body.name for body in world.bodies])
+        if value == 1.0 or not chosen:
             return world
         factor = float(value)
-        chosen = matching(self.options.of, [body.name for body in world.bodies])
         bodies = tuple(self._scaled(body, factor) if body.name in chosen else body for body in world.bodies)
         joints = tuple(self._moved(joint, factor) if joint.parent in chosen else joint for joint in world.joints)
         edited = replace(world, bodies=bodies, joints=joints, origin=None, edits=frozenset())

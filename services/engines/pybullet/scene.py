@@ -2,6 +2,7 @@
 
 from functools import partial
 from types import ModuleType
+from weakref import finalize
 
 import numpy as np
 
@@ -33,12 +34,14 @@ class PyBulletScene:
         materials: material of each link that can touch the ground, by Bullet's index.
         advance: function that steps Bullet once.
         inner_steps: number of Bullet's steps in a time step of the world.
+        close: function that closes the server; a scene that nothing refers to closes by itself.
     """
 
     def __init__(self, bullet: ModuleType, world: World) -> None:
         self.bullet = bullet
         self.world = world
         self.client: int = bullet.connect(bullet.DIRECT)
+        self.close = finalize(self, bullet.disconnect, physicsClientId=self.client)
         self._set_up_physics()
         self._robot = build_robot(bullet, self.client, world)
         self.robot = self._robot.robot
@@ -121,10 +124,6 @@ class PyBulletScene:
             if not isinstance(joint.motor, Motor):  # Bullet's motor is the dry friction there
                 torques[number] = self._torques.motor_nm(number)
         return torques
-
-    def close(self) -> None:
-        """Close the server."""
-        self.bullet.disconnect(physicsClientId=self.client)
 
     def _states(self, place: int) -> FloatArray:
         """Return one of Bullet's numbers about each joint, `(joints,)`."""

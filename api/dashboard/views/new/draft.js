@@ -41,7 +41,8 @@ export function draftOf(spec, catalogue) {
     controllerOptimizer: pluginDraft(spec.controller_optimizer ?? ""),
     discrepancy: pluginDraft(spec.discrepancy ?? defaults.discrepancy),
     tuner: pluginDraft(spec.tuner ?? defaults.tuner),
-    tunables: tunableDrafts(spec.tunables ?? defaults.tunables, catalogue),
+    tunables: tunableDrafts(spec.tunables ?? usualTunables(pluginDraft(spec.robot ?? defaults.robot).name, catalogue), catalogue),
+    tunablesOf: pluginDraft(spec.robot ?? defaults.robot).name,
     ...realityDraft(spec.reality ?? {}),
     budget: {
       preset: budget.preset ?? defaults.budget.preset,
@@ -88,6 +89,32 @@ function tunableDrafts(given, catalogue) {
     ...named.map(({ name, lower = "", upper = "" }) => ({ name, on: true, lower, upper })),
     ...others.map(({ name }) => ({ name, on: false, lower: "", upper: "" })),
   ];
+}
+
+/**
+ * Return what a spec tunes that names a robot and no tunables.
+ *
+ * @param {string} robot
+ * @param {Api.Catalogue} catalogue
+ * @returns {(string | { name: string })[]}
+ */
+function usualTunables(robot, { robots, defaults }) {
+  const usual = /** @type {string[] | undefined} */ (robots.find(({ name }) => name === robot)?.details.tunables);
+  return usual?.length ? usual : defaults.tunables;
+}
+
+/**
+ * Tick the usual tunables of a newly chosen robot, unless the reader has chosen others than those of the robot before.
+ *
+ * @param {Page.Draft} draft
+ * @param {Api.Catalogue} catalogue
+ */
+export function followRobot(draft, catalogue) {
+  if (draft.tunablesOf === draft.robot.name) return;
+  const usual = tunableDrafts(usualTunables(draft.tunablesOf, catalogue), catalogue);
+  const isUsual = JSON.stringify(ticked(draft.tunables)) === JSON.stringify(ticked(usual));
+  if (isUsual) draft.tunables = tunableDrafts(usualTunables(draft.robot.name, catalogue), catalogue);
+  draft.tunablesOf = draft.robot.name;
 }
 
 /**
