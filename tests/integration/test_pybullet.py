@@ -4,6 +4,8 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from gc import collect
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -45,6 +47,19 @@ def test_importing_the_engine_does_not_load_its_library() -> None:
     )
 
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_a_server_closes_when_nothing_refers_to_its_scene() -> None:
+    bullet, engine = import_module("pybullet"), PyBullet()
+    engine.rollout(ROBOT.world, MOTION)
+    (scene,) = engine._scenes._scenes.values()
+    client = scene.client
+    assert bullet.getConnectionInfo(client)["isConnected"]
+
+    del scene, engine
+    collect()
+
+    assert not bullet.getConnectionInfo(client)["isConnected"]
 
 
 def test_static_friction_below_dynamic_friction_acts_as_if_equal_to_it(engine: PyBullet) -> None:
