@@ -28,11 +28,9 @@ from gaplab.services.core.search import Question, maximise
 from gaplab.services.core.world import World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-from gaplab.services.robots.importing import import_robot
-from gaplab.services.robots.options import ImportOptions
 from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.simulation import Simulation
-from tests.real_robots import FILES, STANCES, path_of
+from tests.real_robots import FILES, imported
 
 NOTHING = np.empty((1, 0))
 """The simulator without tunables: the robot as its file has it."""
@@ -95,10 +93,9 @@ def main() -> None:
 
 def prepared(name: str) -> tuple[Imported, World, str]:
     """Return a robot with its usual controller and task, its world, and the unit of its fitness."""
-    file, options = FILES[name]
-    imported = import_robot(path_of(file), ImportOptions(name=name, **options, **STANCES.get(name, {})))
-    robot_library.learn([imported.robot.text])
-    robot = Imported(ImportedOptions(sha256=imported.robot.sha256, name=name))
+    file = imported(name).robot
+    robot_library.learn([file.text])
+    robot = Imported(ImportedOptions(sha256=file.sha256, name=name))
     return robot, robot.world, robot.unit
 
 

@@ -7,11 +7,12 @@ reports any error on the page. Look at the pictures before you keep them.
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from PIL import Image
+from PIL import Image, ImageDraw
 from playwright.sync_api import Page
 
 from gaplab import migrations
@@ -19,7 +20,7 @@ from gaplab.api.process.local_service import start_service
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import import_archive
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.experiments.submission import submit_experiment, submit_study
 from gaplab.services.replay.portraits import portrait
 from gaplab.services.running.execution import claim, record_all
@@ -27,6 +28,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.store.lease import Pulse
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
+from tests import real_robots
 from tests.e2e.browser import Chromium
 from tests.experiments import run
 
@@ -36,6 +38,9 @@ STUDIES = ("mujoco-in-mujoco", "pybullet-in-pybullet", "mujoco-in-physx")
 """The archives to import; the last one is shown."""
 
 LONGEST_S = 600
+
+TILE_PX = 426
+"""Width of the picture of a robot from a file."""
 
 
 class View(NamedTuple):
@@ -134,12 +139,27 @@ def take(page: Page, view: View, path: Path) -> None:
 
 def paint_robots() -> None:
     """Store the pictures of the robots, which the service paints."""
-    for name, robot in robots.items():
-        if (world := robot().world).bodies:
-            for dark in (False, True):
-                path = FOLDER / f"{name}-{'dark' if dark else 'light'}.png"
-                path.write_bytes(portrait(world, dark, 640))
-                print(f"Wrote {path}.")  # noqa: T201
+    imported = {name: real_robots.imported(name).robot.world for name in real_robots.FILES}
+    for dark in (False, True):
+        theme = "dark" if dark else "light"
+        path = FOLDER / f"quadruped-{theme}.png"
+        path.write_bytes(portrait(Quadruped().world, dark, 640))
+        print(f"Wrote {path}.")  # noqa: T201
+        path = FOLDER / f"robots-{theme}.png"
+        sheet({name: portrait(world, dark, TILE_PX) for name, world in imported.items()}).save(path, optimize=True)
+        print(f"Wrote {path}.")  # noqa: T201
+
+
+def sheet(pictures: dict[str, bytes]) -> Image.Image:
+    """Return pictures of one size in rows of three, each with its name."""
+    tiles = {name: Image.open(BytesIO(data)).convert("RGB") for name, data in pictures.items()}
+    width, height = next(iter(tiles.values())).size
+    whole = Image.new("RGB", (3 * width, -(-len(tiles) // 3) * height))
+    for place, (name, tile) in enumerate(tiles.items()):
+        brightness = sum(tile.getpixel((2, 2))) / 3  # type: ignore[arg-type]
+        ImageDraw.Draw(tile).text((12, 10), name, fill="black" if brightness > 128 else "white", font_size=20)
+        whole.paste(tile, (place % 3 * width, place // 3 * height))
+    return whole.quantize(256)
 
 
 def main() -> None:

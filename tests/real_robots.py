@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from gaplab.services.robots.importing import ImportedFile, import_robot
+from gaplab.services.robots.options import ImportOptions
+
 FILES: dict[str, tuple[str, dict[str, Any]]] = {
     "a1": ("a1/a1.urdf", {}),
     "laikago": ("laikago/laikago_toes_limits.urdf", {"mend": True}),
@@ -25,11 +28,17 @@ STANCES: dict[str, dict[str, Any]] = {
     "aliengo": {"start": {"*_upper_joint": 0.8, "*_lower_joint": -1.6}},
     "mini_cheetah": {"start": {"abduct*": -0.8, "thigh*": 1.6}},
     "vision60": {"start": {"[0246]": 0.8, "[1357]": 1.5}},
-    "minitaur": {},
+    "minitaur": {"start": {"motor_*": np.pi / 2, "knee_*": -2.1834}},
     "kuka_iiwa": {"start": {"*_2": 0.5, "*_4": -1.0}},
     "franka_panda": {},
 }
 """Options that let each robot start where it can stay, with its motors at rest."""
+
+
+def imported(name: str) -> ImportedFile:
+    """Return a robot as it can stay at its start."""
+    file, options = FILES[name]
+    return import_robot(path_of(file), ImportOptions(name=name, **options, **STANCES.get(name, {})))
 
 
 def path_of(file: str) -> Path:

@@ -7,11 +7,8 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.motions import Motion
 from gaplab.services.engines import engines
-from gaplab.services.robots.importing import import_robot
-from gaplab.services.robots.options import ImportOptions
 from gaplab.services.specs.assembly import engine_of
-from tests.real_robots import FILES, STANCES
-from tests.unit.test_robot_import import path_of
+from tests.real_robots import STANCES, imported
 
 pytest.importorskip("mujoco")
 
@@ -22,8 +19,8 @@ def test_a_robot_with_its_motors_at_rest_stays_as_it_starts(name: str, engine: s
     """For three seconds. Gains are those that the import computes, and the largest torques those of the file."""
     if engine not in engines or not engines[engine].available():
         pytest.skip(f"{engine} is not installed")
-    file, options = FILES[name]
-    world = import_robot(path_of(file), ImportOptions(**options, **STANCES[name])).robot.world
+    pytest.importorskip("pybullet_data")
+    world = imported(name).robot.world
     if lacks := engines[engine].lacks(world):
         pytest.skip(f"{engine} does not honour {lacks}")
     starts = np.array([joint.start for joint in world.joints])
