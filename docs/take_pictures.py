@@ -140,13 +140,13 @@ def take(page: Page, view: View, path: Path) -> None:
 def paint_robots() -> None:
     """Store the pictures of the robots, which the service paints."""
     imported = {name: real_robots.imported(name).robot.world for name in real_robots.FILES}
+    path = FOLDER / "robots-light.png"
+    sheet({name: portrait(world, False, TILE_PX) for name, world in imported.items()}).save(path, optimize=True)
+    print(f"Wrote {path}.")  # noqa: T201
     for dark in (False, True):
         theme = "dark" if dark else "light"
         path = FOLDER / f"quadruped-{theme}.png"
         path.write_bytes(portrait(Quadruped().world, dark, 640))
-        print(f"Wrote {path}.")  # noqa: T201
-        path = FOLDER / f"robots-{theme}.png"
-        sheet({name: portrait(world, dark, TILE_PX) for name, world in imported.items()}).save(path, optimize=True)
         print(f"Wrote {path}.")  # noqa: T201
 
 
@@ -156,8 +156,7 @@ def sheet(pictures: dict[str, bytes]) -> Image.Image:
     width, height = next(iter(tiles.values())).size
     whole = Image.new("RGB", (3 * width, -(-len(tiles) // 3) * height))
     for place, (name, tile) in enumerate(tiles.items()):
-        brightness = sum(tile.getpixel((2, 2))) / 3  # type: ignore[arg-type]
-        ImageDraw.Draw(tile).text((12, 10), name, fill="black" if brightness > 128 else "white", font_size=20)
+        ImageDraw.Draw(tile).text((12, 10), name, fill="black", font_size=20)
         whole.paste(tile, (place % 3 * width, place // 3 * height))
     return whole.quantize(256)
 
