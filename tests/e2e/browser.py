@@ -33,6 +33,9 @@ FLAGS = [
 AXE = Path(axe_playwright_python.__file__).with_name("axe.min.js")
 SERIOUS = {"serious", "critical"}
 
+BUSY = (r"^429 ", r"^console: .* status of 429 ")
+"""Troubles of a slow machine: the page then asks again."""
+
 
 def chromium() -> Any:
     """The path of the machine's Chromium; None: Playwright's own, which `make test` installs where there is none."""
@@ -51,7 +54,7 @@ class Chromium:
             raise
         self._contexts: list[Any] = []
         self._troubles: list[str] = []
-        self._forgiven: list[str] = []
+        self._forgiven: list[str] = [*BUSY]
 
     def visit(self, url: Any, *, beside: Any = None, **how: Any) -> Any:
         """A page at the address: in another tab of the window of the page `beside`, or in a window of its own."""
@@ -72,7 +75,7 @@ class Chromium:
         for context in self._contexts:
             context.close()
         troubles = [each for each in self._troubles if not any(re.search(one, each) for one in self._forgiven)]
-        self._contexts, self._troubles, self._forgiven = [], [], []
+        self._contexts, self._troubles, self._forgiven = [], [], [*BUSY]
         assert not troubles, "\n".join(troubles)
 
     def close(self) -> None:
