@@ -9,6 +9,9 @@ from pydantic_core import CoreSchema
 
 from gaplab.schemas.base import Frozen, Real
 
+LONGEST_NAME = 100
+"""Largest number of characters of a plug-in's name."""
+
 
 def tunable_label(name: str, options: Mapping[str, Any]) -> str:
     """Return the label of a tunable with options, like `mass(trunk)` or `kp(*_knee, as=value)`.
@@ -25,7 +28,7 @@ def tunable_label(name: str, options: Mapping[str, Any]) -> str:
 class Named(Frozen):
     """A reference by name: `"x"` is short for `{"name": "x"}`."""
 
-    name: str = Field(min_length=1, max_length=100)
+    name: str = Field(min_length=1, max_length=LONGEST_NAME)
 
     @model_validator(mode="before")
     @classmethod

@@ -137,5 +137,7 @@ def test_the_documents_have_code_and_what_is_not_run_says_why() -> None:
     every = {path.stem: blocks(path) for path in DOCUMENTS}
 
     assert sum(each.mark is None for found in every.values() for each in found) > 12
-    assert {"spread.py", "tug.py", "motor_torque.py", "molasses.py", "scout.py"} == set(plugins_of_documents())
+    assert {"spread.py", "tug.py", "motor_torque.py", "molasses.py", "scout.py", "hopper.py"} == set(
+        plugins_of_documents()
+    )
     assert all(text.count("```") % 2 == 0 for text in (path.read_text() for path in DOCUMENTS))

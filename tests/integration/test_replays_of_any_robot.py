@@ -145,7 +145,7 @@ def test_what_has_no_picture_says_why(api: TestClient) -> None:
     nobody, toy = api.get("/catalogue/robots/nobody/picture"), api.get("/catalogue/robots/toy_function/picture")
 
     assert (nobody.status_code, toy.status_code) == (404, 404)
-    assert "no usable robot is called 'nobody'; permitted: quadruped" in nobody.json()["detail"]
+    assert "there is no robot 'nobody'; permitted: quadruped" in nobody.json()["detail"]
     assert "'toy_function' has no body" in toy.json()["detail"]
     assert api.get("/catalogue/robots/quadruped/picture?theme=pink").status_code == 422
 

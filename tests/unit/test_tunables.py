@@ -142,6 +142,13 @@ def test_wrong_labels_are_refused_with_the_reason(label: str, why: str) -> None:
         resolved(tunables=[label])
 
 
+@pytest.mark.parametrize("label", ["", " ", "a" * 101])
+def test_a_hidden_parameter_needs_the_name_of_a_tunable(label: str) -> None:
+    found = refusals(reality={"parameters": {label: 0.5}})
+
+    assert "unknown tunable" in found[f"/reality/parameters/{label}"].message
+
+
 def test_a_tunable_in_two_spellings_is_there_twice() -> None:
     found = refusals(tunables=["mass(trunk)", "mass(trunk, as=scale)"])
 

@@ -7,8 +7,8 @@ are not in it, so equal tunables have equal labels, and a tunable without option
 import re
 from typing import Any
 
-from gaplab.schemas.plugin import PluginRef, tunable_label
-from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.schemas.plugin import LONGEST_NAME, PluginRef, tunable_label
+from gaplab.services.core.errors import InvalidSpec, Violation, unknown_name
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.base import Tunable
 
@@ -31,7 +31,10 @@ def tunable_of(label: str, pointer: str = "") -> Tunable:
     Raises:
         InvalidSpec: no tunable has this name, or it refuses the options.
     """
-    return tunables.create(PluginRef(name=plain_name(label), options=_options(label, pointer)), pointer)
+    name, options = plain_name(label), _options(label, pointer)
+    if not 1 <= len(name) <= LONGEST_NAME:
+        raise InvalidSpec([unknown_name(pointer, "tunable", name[:LONGEST_NAME], list(tunables))])
+    return tunables.create(PluginRef(name=name, options=options), pointer)
 
 
 def label_of(tunable: Tunable) -> str:
