@@ -84,17 +84,17 @@ def engine_violations(robot: Robot, places: Mapping[type[Engine], str]) -> Itera
     for engine, pointer in places.items():
         for field in engine.lacks(robot.world):
             others = [name for name, each in able.items() if field not in each.lacks(robot.world)]
-            message = f"the {robot.label} uses {field}, which {engine.name} does not honour; {listed(others)} does"
+            message = f"the {robot.label} uses {field}, which {engine.name} does not honour; {able_to(others)}"
             yield Violation(pointer, engine.name, message, others)
         if robot.loops and not engine.closes_loops:
             others = [name for name, each in able.items() if each.closes_loops]
             message = f"the controller of the {robot.label} observes while it acts, and {engine.name} closes no loop"
-            yield Violation(pointer, engine.name, f"{message}; {listed(others)} does", others)
+            yield Violation(pointer, engine.name, f"{message}; {able_to(others)}", others)
 
 
-def listed(able: Sequence[str]) -> str:
-    """Return names of plug-ins for a sentence."""
-    return " and ".join(able) or "no engine"
+def able_to(able: Sequence[str]) -> str:
+    """Return which engines do what another does not, for a sentence."""
+    return f"{' and '.join(able) or 'no engine'} {'do' if len(able) > 1 else 'does'}"
 
 
 def _bound_violations(ref: TunableRef, tunable: Tunable, robot: Robot, pointer: str) -> Iterator[Violation]:
@@ -120,7 +120,7 @@ def _place_violations(tunable: Tunable, robot: Robot, engine: type[Engine], poin
         yield Violation(pointer, name, f"{name}: {why}", permitted)
     if not honoured(tunable, engine):
         able = [each.name for each in engines.values() if honoured(tunable, each)]
-        message = f"{engine.name} does not honour {name}; {listed(able)} does"
+        message = f"{engine.name} does not honour {name}; {able_to(able)}"
         yield Violation(pointer, name, message, able)
 
 
