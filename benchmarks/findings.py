@@ -18,11 +18,15 @@ from benchmarks.archives import import_file, private_store
 from gaplab.schemas.comparisons import Comparison
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.figures.kinds.curves import curves_figure
+from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.results.comparisons import compare
 from gaplab.services.results.curves import curves
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator
 from gaplab.services.store.session import Store
+
+WIDTH_IN = 7.2
 
 Imported = dict[str, str]
 """Labels of experiments by their ids: the study's file, and the strategy."""
@@ -131,6 +135,12 @@ def difference_table(store: Store, labels: Imported, counts: Sequence[int]) -> T
     return table
 
 
+def drawn(store: Store, labels: Imported) -> bytes:
+    """Return the curves of all archives in one figure, as SVG."""
+    named = [curve.model_copy(update={"name": labels[curve.experiment]}) for curve in curves(store, list(labels))]
+    return render_file(curves_figure(named), "svg", width_in=WIDTH_IN)
+
+
 def _difference(pair: Comparison) -> Iterator[str]:
     test = pair.paired_t if pair.paired_t.p is not None else pair.student
     yield f"{_number(pair.difference)} ({_number(pair.lower)} to {_number(pair.upper)})"
@@ -158,6 +168,7 @@ def main() -> None:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("archives", nargs="+", type=Path)
     parser.add_argument("--after", type=int, nargs="+", default=[1, 3], help="numbers of evaluations to compare at")
+    parser.add_argument("--svg", type=Path, help="file to draw the curves into")
     arguments = parser.parse_args()
     with opened(arguments.archives) as (store, labels):
         console = Console(width=150)
@@ -165,6 +176,8 @@ def main() -> None:
         console.print(fitness_table(store, labels))
         if len(labels) > 1:
             console.print(difference_table(store, labels, arguments.after))
+        if arguments.svg:
+            arguments.svg.write_bytes(drawn(store, labels))
 
 
 if __name__ == "__main__":
