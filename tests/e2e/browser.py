@@ -90,7 +90,7 @@ class Chromium:
             reduced_motion="reduce",
         )
         context.grant_permissions(["clipboard-read", "clipboard-write"])
-        context.set_default_timeout(60_000)
+        context.set_default_timeout(180_000)
         self._contexts.append(context)
         return context
 

@@ -27,7 +27,7 @@ class Service:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
         self.url = f"http://127.0.0.1:{port}"
-        self.http = httpx2.Client(base_url=self.url, timeout=30)
+        self.http = httpx2.Client(base_url=self.url, timeout=120)
         self._log = folder / "service.log"
         self._environment = os.environ | {
             "GAPLAB_DATABASE_URL": database_url or f"sqlite:///{folder / 'gaplab.db'}",
@@ -101,8 +101,12 @@ class Service:
             return False
 
 
+PATIENCE = 5
+"""How many times as long as expected something may take: machines are shared."""
+
+
 def wait_until(condition: Any, within_s: Any, otherwise: Any = lambda: "it took too long") -> None:
-    deadline = time.monotonic() + within_s
+    deadline = time.monotonic() + PATIENCE * within_s
     while not condition():
         assert time.monotonic() < deadline, otherwise()
         time.sleep(0.1)

@@ -1,12 +1,13 @@
 """The bench on a phone: what to measure next, answers that outlive the network, and what is taken back."""
 
 import re
+from contextlib import suppress
 from datetime import timedelta
 from hashlib import sha256
 from typing import Any
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Error, expect
 from sqlalchemy import update
 
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
@@ -21,7 +22,7 @@ from tests.e2e.browser import axe, fits, screenshot
 from tests.integration.test_bench import bench, compute, finish
 
 PHONE = {"width": 390, "height": 844}
-expect.set_options(timeout=60_000)
+expect.set_options(timeout=180_000)
 MODES: dict[str, dict[str, Any]] = {"light": {}, "dark": {"dark": True}, "phone": PHONE}
 CUT = ("ERR_", "net::")
 KEYS = "() => Object.keys(localStorage).filter((key) => key.includes(' answer '))"
@@ -113,7 +114,8 @@ def test_an_answer_in_a_cut_network_waits_and_is_stored_once(visit: Any, api: An
         keys.append(route.request.headers["idempotency-key"])
         if moment == "before it is acknowledged":
             route.fetch()
-        route.abort("connectionreset")
+        with suppress(Error):  # on a slow machine the page has been loaded again meanwhile
+            route.abort("connectionreset")
 
     page.context.route("**/measurements", cut)
     take(page)

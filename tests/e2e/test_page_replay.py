@@ -50,7 +50,7 @@ def time_of(page: Any) -> Any:
 
 def eventually(page: Any, holds: Any) -> None:
     """Wait until it does; the page's policy forbids to wait for an expression of its own."""
-    until = monotonic() + 60
+    until = monotonic() + 300
     while not holds():
         assert monotonic() < until
         page.wait_for_timeout(50)

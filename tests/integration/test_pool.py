@@ -46,7 +46,7 @@ def asked(alone: Any, genomes: Any, simulators: Any) -> Any:
 def pool(alone: Any) -> Any:
     """A pool that knows how long a rollout takes, and has a helper."""
     warm = Pool(SPEC, alone.simulate, 1)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while warm.batch_size() < 2:
         assert time.monotonic() < deadline
         warm(*asked(alone, 2, 1))
@@ -81,7 +81,7 @@ def test_rollouts_are_spread_if_there_are_several(alone: Any, pool: Any, spreads
 
 def until(pool: Any, alone: Any, batch: Any) -> None:
     """Wait until so many rollouts are what keeps the cores busy; one call has said that there is work for them."""
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     pool(*asked(alone, batch, 1))
     while pool.batch_size() != batch:
         assert time.monotonic() < deadline
