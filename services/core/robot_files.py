@@ -4,7 +4,7 @@ The canonical text leaves out what has its default value, so that a field that t
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -60,6 +60,13 @@ class RobotFile(Frozen):
     lost: Annotated[tuple[Annotated[str, Field(max_length=1_000)], ...], Field(max_length=MOST_LOSSES)] = ()
     comments: Annotated[tuple[Annotated[str, Field(max_length=1_000)], ...], Field(max_length=MOST_LOSSES)] = ()
     world: World
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> "RobotFile":
+        """Return the file with other fields; what was computed of the old ones is computed again."""
+        found = super().model_copy(update=update, deep=deep)
+        for name in ("content", "text", "sha256"):
+            found.__dict__.pop(name, None)
+        return found
 
     @cached_property
     def content(self) -> dict[str, Any]:

@@ -67,5 +67,6 @@ def label_of(robot: PluginRef) -> str:
 
 def _remember(file: RobotFile) -> None:
     _known[file.sha256] = file
+    _known.move_to_end(file.sha256)
     while len(_known) > MOST_KNOWN:
         _known.popitem(last=False)

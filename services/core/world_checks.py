@@ -23,6 +23,11 @@ UNIT = 1e-6
 TRIANGLE = 1e-9
 """Share by which a moment of inertia may exceed the sum of the other two: rounding."""
 
+SHORTEST_STEP_S = 1e-5
+
+LATEST_S = 10.0
+"""Largest delay and latency, and largest noise in its unit."""
+
 FLAT = 1e-9
 """Thickness of a hull, as a share of its length, at which it has no volume."""
 
@@ -128,19 +133,21 @@ def _motor_checks(motor: Motor | PDMotor) -> Iterator[_Check]:
         yield "/motor/position_gain", motor.position_gain, 0 < motor.position_gain <= 1, "above 0 and at most 1"
         yield "/motor/max_speed_rad_s", motor.max_speed_rad_s, motor.max_speed_rad_s > 0, "above 0"
         return
-    for name in ("kp", "kd", "delay_s"):
+    for name in ("kp", "kd"):
         yield f"/motor/{name}", getattr(motor, name), getattr(motor, name) >= 0, "at least 0"
+    yield "/motor/delay_s", motor.delay_s, 0 <= motor.delay_s <= LATEST_S, f"0 to {LATEST_S:g}"
 
 
 def _world_checks(world: World) -> Iterator[_Check]:
-    yield "/time_step_s", world.time_step_s, 0 < world.time_step_s <= 0.1, "above 0 and at most 0.1"
+    permitted = f"{SHORTEST_STEP_S:g} to 0.1"
+    yield "/time_step_s", world.time_step_s, SHORTEST_STEP_S <= world.time_step_s <= 0.1, permitted
     yield "/gravity_m_s2", world.gravity_m_s2, world.gravity_m_s2 >= 0, "at least 0"
     yield "/solver_iterations", world.solver_iterations, 1 <= world.solver_iterations <= 1000, "1 to 1000"
     yield "/start_turn", world.start_turn, _is_unit(world.start_turn), "a quaternion of length 1"
     yield "/slope_rad", world.slope_rad, abs(world.slope_rad) < math.pi / 2, "between -π/2 and π/2"
     yield from _material_checks(world.material, "/material")
     for name, value in vars(world.noise).items():
-        yield f"/noise/{name}", value, value >= 0, "at least 0"
+        yield f"/noise/{name}", value, 0 <= value <= LATEST_S, f"0 to {LATEST_S:g}"
     names = ["", *(body.name for body in world.bodies)]
     yield "/observed", world.observed, world.observed in names, "empty, or the name of a body"
     yield "/joints", "no motor", bool(world.actuators), "joints of which at least one has a motor"

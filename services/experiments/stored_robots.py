@@ -98,15 +98,15 @@ def catalogued(found: Sequence[RobotRead]) -> tuple[PluginRead, ...]:
 
 
 def _entry(found: RobotRead) -> PluginRead:
-    robot = robots.create(_ref(found.sha256, found.name))
-    details = {
-        **robots[IMPORTED].told(robot),
-        "engine": default_engine(robot),
-        "sha256": found.sha256,
-    }
     source = f"robot file {found.sha256[:12]}" + (f", imported from {found.file}" if found.file else "")
     summary = f"{found.bodies} bodies, {found.actuators} actuators, {found.mass_kg:.3g} kg."
-    return PluginRead(name=found.name, summary=summary, source=source, options={}, details=details)
+    entry = PluginRead(name=found.name, summary=summary, source=source, options={}, details={"sha256": found.sha256})
+    try:
+        robot = robots.create(_ref(found.sha256, found.name))
+    except InvalidSpec as error:  # its usual controller or task is not installed here
+        return entry.model_copy(update={"available": False, "note": str(error)})
+    details = {**robots[IMPORTED].told(robot), "engine": default_engine(robot), **entry.details}
+    return entry.model_copy(update={"details": details})
 
 
 def _view(row: RobotRow, file: RobotFile) -> RobotRead:

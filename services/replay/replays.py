@@ -8,6 +8,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
 from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.experiments.hiding import hidden
 from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import ReplayChoice, ReplayRequest, compute_replay
@@ -91,6 +92,7 @@ def _request(session: Session, row: ExperimentRow, spec: ResolvedSpec, choice: R
         real=found.real,
         readings=None if found.readings is None else tuple(found.readings),
         known=None not in row.spec["reality"]["parameters"].values() and is_computed(spec),
+        revealed=row.id not in hidden(session, [row]),
     )
 
 

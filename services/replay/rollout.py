@@ -57,6 +57,7 @@ class ReplayRequest:
         real: the stored fitness in reality.
         readings: the stored readings in reality, if there are any.
         known: whether reality can be shown: the spec has its parameters, and it is no hardware.
+        revealed: whether its shapes and its slope are shown; those of the robot as it is, as long as reality is hidden.
     """
 
     experiment: str
@@ -69,6 +70,7 @@ class ReplayRequest:
     real: float | None
     readings: tuple[float | None, ...] | None
     known: bool
+    revealed: bool = True
 
 
 def compute_replay(request: ReplayRequest) -> bytes:
@@ -91,7 +93,8 @@ def compute_replay(request: ReplayRequest) -> bytes:
     if request.known and spec.reality.engine is not None:
         truth, real = reality_of(spec, robot)
         world, recording = real.record(genome, truth, times)
-        reality = _shown(robot, spec.reality.engine.name, world, recording, request.real)
+        drawn = world if request.revealed else robot.world
+        reality = _shown(robot, spec.reality.engine.name, drawn, recording, request.real)
     computed = Replay(
         experiment=request.experiment,
         repetition=choice.repetition,

@@ -66,12 +66,12 @@ def unit(spec: NamesARobot) -> str:
     """Return the unit of fitness; "" if the robot or the task is not installed."""
     if spec.task is not None:
         return tasks[spec.task.name].unit if spec.task.name in tasks else ""
-    return _own_unit(external_plugins.package(), spec.robot.model_dump_json())
+    try:
+        return _own_unit(external_plugins.package(), spec.robot.model_dump_json())
+    except InvalidSpec:
+        return ""
 
 
 @lru_cache
 def _own_unit(_package: ModuleType | None, ref: str) -> str:
-    try:
-        return robots.create(PluginRef.model_validate_json(ref)).unit
-    except InvalidSpec:
-        return ""
+    return robots.create(PluginRef.model_validate_json(ref)).unit

@@ -23,6 +23,7 @@ from gaplab.services.experiments import stored_robots, submission
 from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, RobotRow
 from gaplab.services.store.session import Store
 
@@ -161,6 +162,19 @@ def test_a_spec_whose_robot_is_gone_says_so(store: Store) -> None:
 
     with pytest.raises(InvalidSpec, match="the robot 'lost' with the hash"):
         setting(spec, 0)
+
+
+def test_a_robot_whose_usual_task_is_gone_is_unavailable_in_the_catalogue(store: Store, http: TestClient) -> None:
+    lost = read_robot_file(json.dumps(file_of("lost").content | {"usual_task": {"name": "fly", "options": {}}}))
+    with store.transaction() as session:
+        session.add(RobotRow(sha256=lost.sha256, name=lost.name, text=lost.text, created_at=now()))
+    stored_robots.add_robot(store, file_of().text)
+
+    entries = {each["name"]: each for each in http.get("/catalogue").json()["robots"]}
+
+    assert not entries["lost"]["available"]
+    assert "unknown task 'fly'" in entries["lost"]["note"]
+    assert entries["walker"]["available"]
 
 
 def test_queries_and_the_catalogue_know_it_by_its_name(store: Store, http: TestClient) -> None:

@@ -70,6 +70,17 @@ def test_the_hash_depends_on_values_and_not_on_spaces_order_or_how_the_world_was
     assert file_of(replace(EVERYTHING, slope_rad=0.2)).sha256 != robot.sha256
 
 
+def test_a_copy_with_another_world_is_another_file() -> None:
+    file = file_of(Quadruped().world)
+    before = file.sha256
+
+    copy = file.model_copy(update={"world": replace(file.world, start_height_m=0.5)})
+
+    assert copy.sha256 != before
+    assert read_robot_file(copy.text).world.start_height_m == 0.5
+    assert file.sha256 == before
+
+
 def test_values_that_are_the_defaults_are_not_in_the_text() -> None:
     """So a field that the World gets later does not change the hash of a stored robot."""
     world = file_of(Quadruped().world).content["world"]
@@ -131,7 +142,8 @@ REFUSED: dict[str, tuple[Callable[[Any], None], str, str]] = {
     "twice": (edit(*HIP, "child", to="slider"), "/world/joints/0/child", "carried by one joint"),
     "surface": (edit(*BASE, "surface", to="ice"), "/world/bodies/0/surface", "one of the world's surfaces"),
     "observed": (edit(*WORLD, "observed", to="tail"), "/world/observed", "the name of a body"),
-    "step": (edit(*WORLD, "time_step_s", to=0), "/world/time_step_s", "above 0"),
+    "step": (edit(*WORLD, "time_step_s", to=1e-6), "/world/time_step_s", "1e-05 to 0.1"),
+    "delay": (edit(*WORLD, "noise", to={"latency_s": 11}), "/world/noise/latency_s", "0 to 10"),
     "bodies": (edit(*WORLD, "bodies", to=[]), "/world/bodies", "1 to 200 bodies"),
     "edits": (edit(*WORLD, "origin", to=None), "/world/origin", "no field of a robot file"),
     "version": (edit("format_version", to=2), "/format_version", "at most 1"),

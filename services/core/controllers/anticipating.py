@@ -30,7 +30,7 @@ class AnticipatingOptions(Frozen):
     lag_s: Annotated[Real, Field(gt=0, le=10)] = Field(
         default=0.06, description="time constant with which an expected angle follows its target; gaplab's default"
     )
-    period_s: Annotated[Real, Field(gt=0, le=10)] = Field(default=0.02, description="interval between new targets")
+    period_s: Annotated[Real, Field(ge=0.001, le=10)] = Field(default=0.02, description="interval between new targets")
     pulse_s: Annotated[Real, Field(gt=0, le=60)] = Field(default=0.5, description="period of the pulses")
     amplitude: Annotated[Real, Field(gt=0, le=10)] = Field(
         default=1.0, description="amplitude of the pulses, as a factor of each joint's usual swing"

@@ -33,7 +33,7 @@ class CpgOptions(Frozen):
     )
     slowest_hz: Annotated[Real, Field(gt=0, le=50)] = Field(default=0.5, description="frequency at gene value 0")
     fastest_hz: Annotated[Real, Field(gt=0, le=50)] = Field(default=3.0, description="frequency at gene value 1")
-    coupling_hz: Annotated[Real, Field(ge=0, le=1_000)] = Field(
+    coupling_hz: Annotated[Real, Field(ge=0, le=60)] = Field(
         default=4.0, description="strength of the coupling of phases; gaplab's default"
     )
     convergence_hz: Annotated[Real, Field(gt=0, le=1_000)] = Field(
@@ -43,7 +43,7 @@ class CpgOptions(Frozen):
     amplitude: Annotated[Real, Field(gt=0, le=10)] = Field(
         default=1.0, description="largest amplitude and largest offset, as a factor of each joint's usual swing"
     )
-    command_s: Annotated[Real, Field(gt=0, le=1)] = Field(default=0.02, description="interval between new targets")
+    command_s: Annotated[Real, Field(ge=0.001, le=1)] = Field(default=0.02, description="interval between new targets")
 
 
 class Cpg(Controller):

@@ -28,7 +28,7 @@ class MlpOptions(Frozen):
     hidden: Annotated[int, Field(strict=True, ge=1, le=256)] = Field(
         default=8, description="neurons of the hidden layer"
     )
-    period_s: Annotated[Real, Field(gt=0, le=10)] = Field(default=0.02, description="interval between new targets")
+    period_s: Annotated[Real, Field(ge=0.001, le=10)] = Field(default=0.02, description="interval between new targets")
     clock_s: Annotated[Real, Field(ge=0, le=60)] = Field(
         default=0.5, description="period of the sine and the cosine of time among the inputs; 0: there is no clock"
     )

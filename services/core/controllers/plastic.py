@@ -46,7 +46,7 @@ class PlasticOptions(Frozen):
     gain: Annotated[Real, Field(gt=0, le=10)] = Field(
         default=0.5, description="farthest target of the network alone, as a factor of each joint's usual swing"
     )
-    period_s: Annotated[Real, Field(gt=0, le=10)] = Field(default=0.02, description="interval between new targets")
+    period_s: Annotated[Real, Field(ge=0.001, le=10)] = Field(default=0.02, description="interval between new targets")
     learning_s: Annotated[Real, Field(gt=0, le=10)] = Field(
         default=0.1, description="interval between changes of weights, rounded to whole `period_s`; authors': 0.1"
     )

@@ -27,7 +27,7 @@ class SineOptions(Frozen):
     amplitude: Annotated[Real, Field(gt=0, le=10)] = Field(
         default=1.0, description="largest amplitude and largest offset, as a factor of each joint's usual swing"
     )
-    command_s: Annotated[Real, Field(gt=0, le=1)] = Field(default=0.02, description="interval between new targets")
+    command_s: Annotated[Real, Field(ge=0.001, le=1)] = Field(default=0.02, description="interval between new targets")
 
 
 class Sine(Controller):

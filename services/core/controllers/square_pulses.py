@@ -20,7 +20,7 @@ NARROWEST, WIDEST = 0.1, 0.9
 class SquarePulsesOptions(Frozen):
     """Options of `square_pulses`."""
 
-    period_s: Annotated[Real, Field(gt=0, le=60)] = Field(default=0.5, description="period of all pulses")
+    period_s: Annotated[Real, Field(ge=0.001, le=60)] = Field(default=0.5, description="period of all pulses")
     amplitude: Annotated[Real, Field(gt=0, le=10)] = Field(
         default=1.0, description="amplitude, as a factor of each joint's usual swing"
     )
