@@ -21,6 +21,7 @@ from gaplab.services.robots.notes import Notes
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.poses import base_pose, start_angles, with_starts
 from gaplab.services.robots.reading import Source, body_name, read_source
+from gaplab.services.robots.xml import decoded
 
 URDF_STEP_S = 1 / 240
 """Time step of a URDF, which has none: Bullet's."""
@@ -74,7 +75,7 @@ def import_robot(file: Path, options: ImportOptions) -> ImportedFile:
     """
     notes = Notes()
     content = file.read_bytes()
-    source = read_source(file, content.decode("utf-8-sig", "replace"), options, notes)
+    source = read_source(file, decoded(content), options, notes)
     bodies = Bodies(source, options, notes)
     world = _world(source, bodies, options, notes)
     notes.check()

@@ -1,6 +1,7 @@
 """What an import says: what it lost or changed, and why it refuses a file."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from fnmatch import fnmatchcase
 
 from gaplab.services.core.errors import InvalidRobot
 
@@ -34,6 +35,12 @@ class Notes:
     def refuse(self, line: str) -> None:
         """Note a reason to refuse the file."""
         self.refused.append(line)
+
+    def refuse_unknown(self, option: str, patterns: Iterable[str], joints: Sequence[str]) -> None:
+        """Note each pattern of an option that matches no joint."""
+        for pattern in patterns:
+            if not any(fnmatchcase(name, pattern) for name in joints):
+                self.refuse(f"no joint is called like {pattern!r}, as --{option} says; joints: {listed(joints, 30)}")
 
     def check(self) -> None:
         """Raise all reasons to refuse the file so far.

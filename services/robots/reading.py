@@ -64,7 +64,7 @@ def read_source(file: Path, text: str, options: ImportOptions, notes: Notes) -> 
         else:
             spec = mujoco.MjSpec.from_file(str(file))
             masses, speeds, name = {}, {}, spec.modelname
-            _lock(spec, options)
+            _lock(spec, options, notes)
         return _compiled(spec, options, notes, Source(None, is_urdf, name, masses, speeds, fixed=options.fixed))
     except (ValueError, SyntaxError) as error:
         raise InvalidRobot([*notes.refused, " ".join(str(error).split())]) from error
@@ -105,8 +105,9 @@ def _root(spec: Any, notes: Notes) -> Any:  # noqa: ANN401
     return roots[0]
 
 
-def _lock(spec: Any, options: ImportOptions) -> None:  # noqa: ANN401
+def _lock(spec: Any, options: ImportOptions, notes: Notes) -> None:  # noqa: ANN401
     """Fix joints at their reference angles, and delete their actuators."""
+    notes.refuse_unknown("lock", options.lock, [joint.name for joint in spec.joints])
     for joint in list(spec.joints):
         if any(fnmatchcase(joint.name, pattern) for pattern in options.lock):
             for actuator in [each for each in spec.actuators if each.target == joint.name]:

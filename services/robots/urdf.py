@@ -51,7 +51,7 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
         InvalidRobot: a mesh is missing.
     """
     root = tree(text)
-    _lock(root, options.lock)
+    _lock(root, options.lock, notes)
     _refuse(root, notes)
     _note_losses(root, notes)
     if not options.visuals:
@@ -73,8 +73,9 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
     )
 
 
-def _lock(root: Element, patterns: Sequence[str]) -> None:
+def _lock(root: Element, patterns: Sequence[str], notes: Notes) -> None:
     """Fix joints at zero."""
+    notes.refuse_unknown("lock", patterns, [_name(joint) for joint in root.findall("joint")])
     for joint in root.findall("joint"):
         if any(fnmatchcase(_name(joint), pattern) for pattern in patterns):
             joint.set("type", "fixed")
@@ -110,15 +111,18 @@ def _speeds(root: Element) -> Iterator[tuple[str, float]]:
 
 def _resolve_meshes(root: Element, file: Path, notes: Notes) -> Iterator[tuple[str, bytes]]:
     """Replace the names of mesh files by absolute paths; return those that had to be converted."""
+    converted: dict[Path, str] = {}
     for mesh in root.iter("mesh"):
         given = mesh.get("filename", "")
         path = find_mesh(given, file.absolute().parent)
         if path is None:
             notes.refuse(f"mesh {given!r} was not found beside {file.name} or in a folder above it")
         elif path.suffix.lower() == ".dae":
-            name = f"{path.stem}.stl"
+            is_new = path not in converted
+            name = converted.setdefault(path, f"{len(converted)}_{path.stem}.stl")  # stems may be the same
             mesh.set("filename", name)
-            yield name, _converted(path, notes)
+            if is_new:
+                yield name, _converted(path, notes)
         else:
             mesh.set("filename", str(path))
 

@@ -18,6 +18,7 @@ from gaplab.services.robots.notes import Notes
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.reading import read_source
 from gaplab.services.robots.urdf_writing import UrdfDocument
+from gaplab.services.robots.xml import decoded
 
 T = TypeVar("T")
 
@@ -104,7 +105,7 @@ def write_xml(tuning: Tuning, original: Path, output: Path, accept: Accept) -> W
     """
     robot, tuned = tuning.robot, tuning.world
     options = _options(robot, original, output)
-    text, notes = original.read_text(encoding="utf-8-sig"), Notes()
+    text, notes = decoded(original.read_bytes()), Notes()
     source = read_source(original, text, options, notes)
     document: UrdfDocument | MjcfDocument = (
         UrdfDocument(text) if source.is_urdf else MjcfDocument(text, original.parent, source.model, options.lock)
@@ -138,6 +139,8 @@ def _options(robot: RobotFile, original: Path, output: Path) -> ImportOptions:
     digest = sha256(original.read_bytes()).hexdigest()
     if digest != robot.source.sha256:
         raise InvalidRobot([f"{original} is not the file that {robot.name} was imported from, or has changed since"])
+    if output.resolve() == original.resolve():
+        raise InvalidRobot([f"{output} is the original, which a later import or write-back needs: choose another name"])
     if original.suffix.lower() != output.suffix.lower():
         raise InvalidRobot([f"{output.name} must end in {original.suffix}, as {original.name} does, or in .json"])
     return ImportOptions.model_validate(robot.source.options)

@@ -7,6 +7,18 @@ from xml.etree import ElementTree
 Element = ElementTree.Element
 
 
+HEAD = re.compile(r"(\s|<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>\[]*(\[.*?\]\s*)?>)*", re.DOTALL)
+"""What may be before the root."""
+
+
+def decoded(content: bytes) -> str:
+    """Return a text in UTF-8, or else in Latin-1, which every file is in."""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
 class Document:
     """An XML text as a tree.
 
@@ -15,8 +27,8 @@ class Document:
     """
 
     def __init__(self, text: str) -> None:
-        start = re.search(r"<(robot|mujoco)\b", text)
-        at = start.start() if start else 0
+        found = HEAD.match(text)
+        at = found.end() if found else 0
         self._head, body = text[:at], text[at:]
         self.root = tree(body)
 

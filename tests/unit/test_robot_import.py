@@ -417,6 +417,33 @@ def test_a_dae_is_converted_to_metres(tmp_path: Path) -> None:
     assert max(np.ptp(np.array(duck.points_m), axis=0)) < 2.5
 
 
+def test_meshes_of_one_name_in_two_folders_stay_apart(tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    pytest.importorskip("collada")
+    for folder, size in (("a", 0.1), ("b", 0.4)):
+        (tmp_path / folder).mkdir()
+        trimesh.creation.box((size, size, size)).export(tmp_path / folder / "part.dae")
+    box = '<box size=".1 .1 1"/>'
+    text = URDF.format(kind="continuous").replace("package://two/meshes/cube.obj", "a/part.dae")
+    (tmp_path / "two.urdf").write_text(text.replace(box, '<mesh filename="b/part.dae"/>'))
+
+    base, arm = import_robot(tmp_path / "two.urdf", ImportOptions()).robot.world.bodies
+
+    shapes = [body.parts[0].shape for body in (base, arm)]
+    widths = [np.ptp(np.array(shape.points_m), axis=0).max() for shape in shapes if isinstance(shape, Hull)]
+    assert widths == pytest.approx([0.1, 0.4])
+
+
+@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
+def test_a_lock_that_fits_no_joint_is_refused(tmp_path: Path, suffix: str) -> None:
+    file = path_of("a1/a1.urdf") if suffix == ".urdf" else tmp_path / "m.xml"
+    if suffix == ".xml":
+        file.write_text(MJCF)
+
+    with pytest.raises(InvalidRobot, match=r"no joint is called like 'nope\*', as --lock says; joints: "):
+        import_robot(file, ImportOptions(lock=("nope*",)))
+
+
 def test_a_file_that_is_neither_is_refused(tmp_path: Path) -> None:
     (tmp_path / "x.urdf").write_text("hello")
     with pytest.raises(InvalidRobot, match=r"not well-formed|syntax error"):

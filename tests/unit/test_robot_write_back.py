@@ -205,8 +205,32 @@ def test_another_file_and_another_suffix_are_refused(tmp_path: Path) -> None:
         write_xml(tuning, original, tmp_path / "tuned.xml", fine)
 
 
+def test_the_original_is_not_overwritten(tmp_path: Path) -> None:
+    robot, original = small(tmp_path)
+    before = original.read_bytes()
+
+    with pytest.raises(InvalidRobot, match="is the original, which a later import or write-back needs"):
+        write_xml(Tuning(robot, robot.world, ()), original, original, fine)
+
+    assert original.read_bytes() == before
+
+
+def test_a_file_in_latin_1_with_a_robot_in_its_first_comment_is_written_back(tmp_path: Path) -> None:
+    text = path_of("a1/a1.urdf").read_text().replace("<robot ", "<!-- before <robot>: für alle -->\n<robot ", 1)
+    original = tmp_path / "latin.urdf"
+    original.write_bytes(text.encode("latin-1"))
+    robot = import_robot(original, ImportOptions()).robot
+    tuned = with_joint(robot.world, "FR_hip_joint", damping=0.25)
+
+    write_xml(Tuning(robot, tuned, COMMENTS), original, tmp_path / "tuned.urdf", fine)
+
+    assert "<!-- before <robot>: für alle -->" in (tmp_path / "tuned.urdf").read_text(encoding="utf-8")
+    assert 'damping="0.25"' in (tmp_path / "tuned.urdf").read_text(encoding="utf-8")
+
+
 def test_a_robot_file_holds_all_and_its_intervals(tmp_path: Path) -> None:
     robot, _ = small(tmp_path)
+    assert robot.sha256  # of the file before; the tuned one has its own
     tuned = with_joint(robot.world, "ja", armature=0.5, motor={"delay_s": 0.02})
     tuned = replace(tuned, slope_rad=0.1).edited("slope", slope_rad=0.2)
 
