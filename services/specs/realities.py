@@ -47,10 +47,14 @@ def physical_reality(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
 
 
 def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str, float]:
-    """Return the given parameters of reality, and the robot's for other tunables that reality's engine honours."""
+    """Return the given parameters of reality, and the robot's for other tunables that reality's engine honours.
+
+    A group of unequal parts has no number that would leave the robot as it is: reality has none then.
+    """
+    world = robot.world
     nominal = {
-        label_of(tunable): tunable.read(robot.world)
+        label_of(tunable): value
         for tunable in (tunable_of(ref.name) for ref in spec.tunables)
-        if honoured(tunable, engine)
+        if honoured(tunable, engine) and tunable.edit(world, value := tunable.read(world)) == world
     }
     return {**nominal, **{proper(label): value for label, value in spec.reality.parameters.items()}}

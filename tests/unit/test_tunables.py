@@ -101,6 +101,15 @@ def test_a_resolved_spec_has_proper_labels_and_reality_has_the_nominal_values() 
     assert not any("(" in plugin for plugin in named_in(spec.model_dump(mode="json")))
 
 
+def test_a_group_of_unequal_parts_leaves_reality_as_the_robot_is() -> None:
+    spec = resolved(tunables=["mass(*, as=value)", "slope"])
+
+    assert spec.reality.parameters == {"slope": 0.0}
+    assert resolved(
+        tunables=["mass(*, as=value)"], reality={"parameters": {"mass(*, as=value)": 0.5}}
+    ).reality.parameters
+
+
 def test_a_plain_spec_is_stored_as_before() -> None:
     stored = resolved().model_dump(mode="json")
 

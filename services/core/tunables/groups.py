@@ -69,7 +69,7 @@ class Grouped(Tunable):
         if self.relative:
             return 1.0
         numbers = [self.number(member) for member in self._group(world)]
-        return sum(numbers) / len(numbers)
+        return numbers[0] if len(set(numbers)) == 1 else sum(numbers) / len(numbers)  # a mean of equals may differ
 
     def edit(self, world: World, value: float) -> World:
         """Return the world with the number of each member replaced, or multiplied."""
