@@ -6,11 +6,11 @@ from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from pydantic import Field, Json
 
-from gaplab.api.http.dependencies import Parameters
+from gaplab.api.http.dependencies import Parameters, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.samples import SamplesRead
-from gaplab.services.specs import sample_tables
+from gaplab.services.experiments import stored_robots
 from gaplab.services.specs.robots import Driven
 
 router = APIRouter(prefix="/samples", tags=["bench"])
@@ -34,7 +34,7 @@ class SamplesQuery(Parameters):
     responses=documented(413, 422),
     openapi_extra={"requestBody": {"required": True, "content": _TABLE}},
 )
-async def check_samples(query: Annotated[SamplesQuery, Query()], request: Request) -> SamplesRead:
+async def check_samples(query: Annotated[SamplesQuery, Query()], request: Request, store: StoreDep) -> SamplesRead:
     """Read a CSV table line by line, and store nothing. Errors have the line, the column and what is permitted.
 
     Columns are `gene_0`, `gene_1` and so on; `value`, or `value_1`, `value_2` and so on for repeats; and optionally
@@ -42,4 +42,4 @@ async def check_samples(query: Annotated[SamplesQuery, Query()], request: Reques
     """
     text = (await request.body()).decode("utf-8", "replace")
     robot = Driven(PluginRef(name=query.robot, options=query.options), query.controller, query.task)
-    return await run_in_threadpool(sample_tables.check_samples, text, robot)
+    return await run_in_threadpool(stored_robots.check_samples, store, text, robot)

@@ -60,6 +60,13 @@ def observes_base(world: World) -> bool:
     return not world.observed or world.observed == world.bodies[0].name
 
 
+def from_start(world: World, orientations: FloatArray) -> FloatArray:
+    """Return `(..., 4)`: the rotations from the orientation of the base at the start, along the axes of the world."""
+    if world.start_turn == UNTURNED:
+        return orientations
+    return product(orientations, inverse(np.array(world.start_turn)))
+
+
 def _outwards(world: World) -> tuple[int, ...]:
     """Return the numbers of the joints, each after the joint of its parent, and else in the world's order."""
     placed = {world.bodies[0].name}

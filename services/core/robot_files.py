@@ -20,6 +20,9 @@ from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.world import World
 from gaplab.services.core.world_checks import world_violations
 
+LONGEST_NAME = 60
+"""Most characters of a robot's name."""
+
 MOST_BYTES = 2_000_000
 """Largest size of a robot file."""
 
@@ -53,7 +56,7 @@ class RobotFile(Frozen):
     model_config = ConfigDict(strict=True)
 
     format_version: Annotated[int, Field(ge=1, le=1)] = 1
-    name: Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,59}$")]
+    name: Annotated[str, StringConstraints(pattern=rf"^[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}$")]
     source: RobotSource | None = None
     usual_controller: PluginRef
     usual_task: PluginRef

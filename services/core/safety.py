@@ -9,9 +9,8 @@ import numpy as np
 
 from gaplab.schemas.safety import LimitsSpec, Safety
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.kinematics import clearances_m, inverse, product
+from gaplab.services.core.kinematics import clearances_m, from_start
 from gaplab.services.core.motions import Loop, Motion, Recording
-from gaplab.services.core.shapes import UNTURNED
 from gaplab.services.core.world import World
 
 MOST_SIMULATORS = 20
@@ -88,7 +87,7 @@ def extremes(world: World, recording: Recording, fitness: float) -> Extremes:
     poses = recording.poses
     if not (np.isfinite(fitness) and np.all(np.isfinite(poses))):
         return Extremes()
-    x, y = _turned(world, poses[:, 3:])
+    x, y = from_start(world, poses[:, 3:])[:, :2].T
     tilts = np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0))
     return Extremes(
         joint_speed=_joint_speed(recording),
@@ -98,13 +97,6 @@ def extremes(world: World, recording: Recording, fitness: float) -> Extremes:
         clearance=float(clearances_m(world.bodies[0], poses[:, :3], poses[:, 3:]).min()),
         fitness=fitness,
     )
-
-
-def _turned(world: World, orientations: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return x and y `(k,)` of the quaternions by which the base is turned from its orientation at the start."""
-    if world.start_turn != UNTURNED:
-        orientations = product(orientations, inverse(np.array(world.start_turn)))
-    return orientations[:, 0], orientations[:, 1]
 
 
 def safety(rollouts: Sequence[Extremes], limits: LimitsSpec | None, engine: str) -> Safety:

@@ -22,7 +22,7 @@ from gaplab.services.core.sensitivity import VERSION, Effort, warning
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move
-from gaplab.services.experiments.stored_robots import with_stored_robot
+from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.plugins.external import external_plugins, named_in
 from gaplab.services.specs.resolution import resolve_sensitivity
 from gaplab.services.specs.robots import unit
@@ -63,7 +63,7 @@ def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[Sens
         InvalidSpec: they are invalid; the error has every violation.
         KeyReused: the key was used for another request.
     """
-    resolved = resolve_sensitivity(with_stored_robot(store, spec))
+    resolved = resolved_here(store, spec, resolve_sensitivity)
     return once(store, admitted, spec, SensitivityRead, lambda session: _view(queue(session, resolved)))
 
 

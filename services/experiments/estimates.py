@@ -10,7 +10,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
-from gaplab.services.experiments.stored_robots import with_stored_robot
+from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.settings import Limits
 from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts
@@ -36,8 +36,7 @@ def estimate(
         InvalidSpec: the spec is invalid; the error has every violation, as on submission.
         StoreUnavailable: the database cannot be used now.
     """
-    meant = with_stored_robot(store, spec)
-    resolved = resolve_study(meant) if isinstance(meant, StudySpec) else (resolve_experiment(meant),)
+    resolved = resolved_here(store, spec, _resolve)
     check_extent(resolved, limits)
     with store.reading() as session:
         measured = _measured(costs.latest(session, LATEST))
@@ -55,6 +54,10 @@ def estimate(
         supervisors=working,
         specs=tuple(each.model_dump(mode="json") for each in resolved),
     )
+
+
+def _resolve(spec: StudySpec | ExperimentSpec) -> tuple[ResolvedSpec, ...]:
+    return resolve_study(spec) if isinstance(spec, StudySpec) else (resolve_experiment(spec),)
 
 
 def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[Key, float]:

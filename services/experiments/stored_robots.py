@@ -1,22 +1,28 @@
 """Robot files in the store: added once each, listed, and found by the names that specs give them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import TypeVar
 
 from gaplab.schemas.plugin import PluginRead, PluginRef
 from gaplab.schemas.robots import RobotRead
+from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.spec import SharedSettings
 from gaplab.services.core import robot_library
-from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
+from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, unknown_name
 from gaplab.services.core.robot_files import RobotFile, read_robot_file
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
+from gaplab.services.core.sample_tables import read_samples
 from gaplab.services.specs.default_engines import default_engine
+from gaplab.services.specs.robots import Driven, robot_of
 from gaplab.services.store.models import RobotRow
 from gaplab.services.store.queries import robots as rows
 from gaplab.services.store.session import Session, Store, snapshot, transaction
 from gaplab.services.store.texts import storable
 
+R = TypeVar("R")
 S = TypeVar("S", bound=SharedSettings)
 
 
@@ -66,19 +72,57 @@ def robot_text(session: Session, named: str) -> str:
     return row.text
 
 
-def with_stored_robot(store: Store, spec: S) -> S:
-    """Return the spec with the hash of the stored robot that it means by a name; unchanged if a plug-in has the name.
+def resolved_here(store: Store, spec: S, resolve: Callable[[S], R]) -> R:
+    """Return what a spec resolves to, where its robot's name may be that of a stored robot.
+
+    Raises:
+        InvalidSpec: with every violation; that of an unknown robot has the names of the stored ones too.
+    """
+    with _naming_stored(store):
+        return resolve(spec.model_copy(update={"robot": stored_ref(store, spec.robot)}))
+
+
+def stored_ref(store: Store, robot: PluginRef) -> PluginRef:
+    """Return the hash of the stored robot that a name means; unchanged if a plug-in has the name.
 
     Raises:
         InvalidSpec: the robot has options, which one from a file does not have.
     """
-    name = spec.robot.name
+    name = robot.name
     if name in robots or name in robots.unusable or (found := _newest(store, name)) is None:
-        return spec
-    if spec.robot.options:
+        return robot
+    if robot.options:
         message = f"the robot {name} comes from a file, which has no options"
-        raise InvalidSpec([Violation("/robot/options", spec.robot.options, message, "left out")])
-    return spec.model_copy(update={"robot": found})
+        raise InvalidSpec([Violation("/robot/options", robot.options, message, "left out")])
+    return found
+
+
+def check_samples(store: Store, text: str, driven: Driven) -> SamplesRead:
+    """Return the samples of a CSV table, or everything that is wrong with it.
+
+    Raises:
+        InvalidSpec: the robot, its controller or its task does not exist, or refuses its options.
+    """
+    with _naming_stored(store):
+        robot = robot_of(replace(driven, robot=stored_ref(store, driven.robot)))
+    return read_samples(text, robot)
+
+
+@contextmanager
+def _naming_stored(store: Store) -> Iterator[None]:
+    """Add the names of stored robots to the violation of a robot that is unknown."""
+    try:
+        yield
+    except InvalidSpec as error:
+        raise InvalidSpec(_with_stored_names(store, each) for each in error.violations) from error
+
+
+def _with_stored_names(store: Store, violation: Violation) -> Violation:
+    plugins = violation.permitted
+    if violation.pointer != "/robot" or isinstance(plugins, str) or IMPORTED not in (plugins or ()):
+        return violation
+    names = {*robots, *(each.name for each in list_robots(store))} - {IMPORTED}
+    return unknown_name("/robot", "robot", str(violation.value), sorted(names))
 
 
 @snapshot

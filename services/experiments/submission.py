@@ -9,7 +9,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
-from gaplab.services.experiments.stored_robots import with_stored_robot
+from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.experiments.views import view_experiments, view_studies
 from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study, takes_samples
@@ -36,7 +36,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
     """
-    resolved = resolve_experiment(with_stored_robot(store, spec))
+    resolved = resolved_here(store, spec, resolve_experiment)
     check_extent([resolved], admitted.limits)
 
     def create(session: Session) -> ExperimentRead:
@@ -65,7 +65,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
     """
-    resolved = resolve_study(with_stored_robot(store, spec))
+    resolved = resolved_here(store, spec, resolve_study)
     check_extent(resolved, admitted.limits)
 
     def create(session: Session) -> StudyRead:

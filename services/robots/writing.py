@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.robot_files import RobotFile, read_robot_file
+from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot_file
 from gaplab.services.core.world import World
 from gaplab.services.robots.bodies import Bodies
 from gaplab.services.robots.changes import Change, Place, changes
@@ -21,6 +21,8 @@ from gaplab.services.robots.urdf_writing import UrdfDocument
 from gaplab.services.robots.xml import decoded
 
 T = TypeVar("T")
+
+_TUNED = "_tuned"
 
 _OF_BODIES = {"mass_kg", "center_m", "inertia"}
 _COMPUTED = {"start_height_m", "swing", "motor.kp", "motor.kd", "motor.max_torque_nm"}
@@ -68,7 +70,7 @@ class Tuning:
 
 
 def write_json(tuning: Tuning, output: Path, accept: Accept) -> WrittenFile:
-    """Write a robot file whose world is the tuned one.
+    """Write a robot file whose world is the tuned one; its name ends in _tuned, so the robot keeps its own.
 
     Args:
         tuning: the tuned values.
@@ -80,7 +82,8 @@ def write_json(tuning: Tuning, output: Path, accept: Accept) -> WrittenFile:
         InvalidSpec: the tuned world is not possible.
     """
     world = replace(tuning.world, origin=None, edits=frozenset())
-    file = tuning.robot.model_copy(update={"world": world, "comments": tuning.comments})
+    name = tuning.robot.name.removesuffix(_TUNED)[: LONGEST_NAME - len(_TUNED)] + _TUNED
+    file = tuning.robot.model_copy(update={"name": name, "world": world, "comments": tuning.comments})
     text = json.dumps(file.content, ensure_ascii=False, indent=1) + "\n"
     again = read_robot_file(text).world
     if again != world:

@@ -133,6 +133,29 @@ def test_an_unknown_robot_is_told_with_every_other_mistake(store: Store) -> None
     assert {each.pointer for each in raised.value.violations} == {"/robot", "/optimizer"}
 
 
+def test_an_unknown_robot_is_told_with_the_names_of_the_stored_ones(store: Store, http: TestClient) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    specs = {"/experiments": {"strategy": "random", "robot": "wolker"}, "/studies": {"robot": "wolker"}}
+    answers = [http.post(path, json=spec) for path, spec in specs.items()]
+    answers.append(http.post("/samples/check?robot=wolker", content="gene_0,value_1\n", headers={"Content-Type": "text/csv"}))
+
+    for answer in answers:
+        (found,) = answer.json()["errors"]
+        assert (answer.status_code, found["pointer"]) == (422, "/robot")
+        assert found["permitted"] == ["quadruped", "toy_function", "walker"]
+        assert "did you mean 'walker'?" in found["message"]
+
+
+def test_a_table_of_samples_is_checked_for_a_stored_robot(store: Store, http: TestClient) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    table = ",".join([*(f"gene_{i}" for i in range(24)), "value_1"]) + "\n" + ",".join(["0.5"] * 24 + ["0.3"]) + "\n"
+
+    answer = http.post("/samples/check?robot=walker", content=table, headers={"Content-Type": "text/csv"})
+
+    assert answer.status_code == 200
+    assert [each["values"] for each in answer.json()["samples"]] == [[0.3]]
+
+
 def test_a_robot_from_a_file_takes_no_options(store: Store) -> None:
     stored_robots.add_robot(store, file_of().text)
     with pytest.raises(InvalidSpec, match="comes from a file, which has no options"):
@@ -204,4 +227,23 @@ def test_an_archive_has_its_robots_and_brings_them(store: Store, tmp_path: Path)
         import_archive(target, opened)
 
     assert read_robot_file(stored_robots.robot_text(target, "walker")).sha256 == file.sha256
+    target.dispose()
+
+
+def test_an_archive_gives_no_name_another_meaning(store: Store, tmp_path: Path) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    with export_experiment(store, made.id).file as exported:
+        (tmp_path / "walker.zip").write_bytes(exported.read())
+    other = f"sqlite:///{tmp_path / 'other.db'}"
+    migrations.upgrade(other)
+    target = Store(other)
+    own = json.loads(file_of().text)
+    own["world"]["bodies"][0]["mass_kg"] = 3.0
+    mine = stored_robots.add_robot(target, json.dumps(own))
+    with (tmp_path / "walker.zip").open("rb") as opened:
+        import_archive(target, opened)
+
+    assert [each.sha256 for each in stored_robots.list_robots(target)] == [mine.sha256, file_of().sha256]
+    assert read_robot_file(stored_robots.robot_text(target, "walker")).sha256 == mine.sha256
     target.dispose()

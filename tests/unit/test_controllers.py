@@ -1,5 +1,6 @@
 """What each controller computes: its equation, and what its options change."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,12 +9,13 @@ import pytest
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract import controllers as contract
 from gaplab.services.core.controllers import controllers
-from gaplab.services.core.controllers.actuation import Limbs
+from gaplab.services.core.controllers.actuation import Limbs, middles
 from gaplab.services.core.controllers.layers import weighted
 from gaplab.services.core.controllers.mlp import Mlp
 from gaplab.services.core.controllers.plastic import Plastic
 from gaplab.services.core.controllers.sine import Sine
 from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.kinematics import about, inverse, product, rotated
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines import engines
@@ -72,6 +74,41 @@ def test_a_gait_gives_each_leg_its_phase(gait: Any, phases: Any) -> None:
     assert limbs.phases(gait).tolist() == phases
     assert limbs.limb.tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3]
     assert limbs.depth.tolist() == [0, 1, 2] * 4
+
+
+def reframed(world: Any, turn: Any) -> Any:
+    """The same robot, the frame of whose base is turned by `turn` at the start."""
+    back = inverse(np.array(turn))
+    joints = tuple(
+        replace(joint, origin_m=tuple(rotated(back, np.array(joint.origin_m))), turn=tuple(product(back, np.array(joint.turn))))
+        if joint.parent == world.bodies[0].name
+        else joint
+        for joint in world.joints
+    )
+    return replace(world, joints=joints, start_turn=turn)
+
+
+def test_limbs_of_a_robot_do_not_depend_on_the_frame_of_its_base() -> None:
+    turn = tuple(about(np.array([0.6, 0.0, 0.8]), np.array([1.9]))[0])
+    plain, turned = Limbs.of(WORLD), Limbs.of(reframed(WORLD, turn))
+
+    assert turned.places_m == pytest.approx(plain.places_m, abs=1e-12)
+    assert turned.upward == pytest.approx(plain.upward, abs=1e-12)
+    for gait in ("trot", "pace", "bound", "walk"):
+        assert np.array_equal(turned.phases(gait), plain.phases(gait))
+
+
+def test_an_anticipating_robot_keeps_its_heading_in_any_frame_of_its_base() -> None:
+    turn = tuple(about(np.array([1.0, 0.0, 0.0]), np.array([np.pi / 2]))[0])
+    spin = np.array([0.1, -0.2, 0.7])
+    targets = []
+    for world, seen in ((WORLD, spin), (reframed(WORLD, turn), rotated(inverse(np.array(turn)), spin))):
+        controller = prepared("anticipating", world)
+        observed = [*middles(world), *seen]
+        _, memory = acted(controller, controller.known, observed)
+        targets.append(acted(controller, controller.known, observed, memory, 0.02)[0])
+
+    assert targets[1] == pytest.approx(targets[0], abs=1e-12)
 
 
 def test_a_cpg_grows_from_its_middle_to_the_genomes_amplitude() -> None:

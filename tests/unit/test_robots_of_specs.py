@@ -1,12 +1,15 @@
 """The robot of a spec: driven by its controller, rated by its task."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.kinematics import about, product
+from gaplab.services.core.motions import Motion, Trajectory
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.specs.resolution import resolve_experiment
@@ -87,3 +90,15 @@ def test_the_unit_is_that_of_the_task() -> None:
     assert unit(Driven(QUADRUPED)) == "m/s"
     assert unit(Driven(QUADRUPED, task=PluginRef(name="walk"))) == "m/s"
     assert unit(Driven(PluginRef(name="nobody"))) == ""
+
+
+def test_a_base_that_begins_turned_is_level_at_the_start() -> None:
+    turn = about(np.array([1.0, 0.0, 0.0]), np.array([np.pi / 2]))
+    tilts = about(np.array([1.0, 0.0, 0.0]), np.array([0.1, 0.2])), about(np.array([0.0, 1.0, 0.0]), np.array([0.3]))
+    robot = Quadruped()
+    robot.world = replace(robot.world, start_turn=tuple(turn[0]))
+
+    seen = product(np.concatenate(tilts), turn)
+    found = robot.sense(Trajectory(np.arange(3.0), np.zeros((3, 3)), seen))
+
+    assert found[:, :2] == pytest.approx(np.array([[0.1, 0.0], [0.2, 0.0], [0.0, 0.3]]))

@@ -17,7 +17,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.noise_envelope import NoiseEnvelope, NoiseEnvelopeOptions
-from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.tunables.base import Tunable, matching
 from gaplab.services.core.tunables.defaults import usual_tunables
 from gaplab.services.core.tunables.labels import label_of, proper, separated, tunable_of, unit_of
 from gaplab.services.core.world import Inertia, Material, Noise
@@ -323,6 +323,26 @@ def test_the_usual_tunables_follow_a_rule() -> None:
     assert usual_tunables(replace(arm(), observed="link_1"))[0] == "mass(link_1)"
     for world in (WORLD, arm()):
         assert all(tunable_of(label).lack(world) is None for label in usual_tunables(world))
+
+
+@pytest.mark.parametrize("name", ["trunk (2)", "link[1]", "a,b=c", "wheel*", "what?", "b" * 100])
+def test_any_name_of_a_body_can_be_in_a_label(name: str) -> None:
+    world = replace(WORLD, bodies=(replace(WORLD.bodies[0], name=name), *WORLD.bodies[1:]))
+    mass = tunable_of(usual_tunables(world)[1])
+
+    edited = mass.edit(world, 1.1)
+
+    assert label_of(mass) == usual_tunables(world)[1]
+    assert [body.mass_kg for body in edited.bodies[1:]] == [body.mass_kg for body in WORLD.bodies[1:]]
+    assert edited.bodies[0].mass_kg == pytest.approx(1.1 * WORLD.bodies[0].mass_kg)
+
+
+def test_a_name_that_is_a_pattern_too_means_itself() -> None:
+    names = ("link[1]", "link1", "link*")
+
+    assert matching("link[1]", names) == ("link[1]",)
+    assert matching("link*", names) == ("link*",)
+    assert matching("link?", names) == ("link1", "link*")
 
 
 def test_a_robot_has_its_usual_tunables_where_a_spec_names_none(monkeypatch: pytest.MonkeyPatch) -> None:

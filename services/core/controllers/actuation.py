@@ -50,8 +50,9 @@ class Limbs:
     Attributes:
         limb: `(a,)`: number of the limb of each actuator.
         depth: `(a,)`: number of actuators of the same limb between it and the base.
-        places_m: `(limbs, 3)`: place of the first joint of each limb at the start, in the frame of the base.
-        upward: `(a,)`: component along z, in the frame of the base, of the axis of each actuator at the start.
+        places_m: `(limbs, 3)`: place of the first joint of each limb at the start, from the base, along the axes of the
+            world.
+        upward: `(a,)`: vertical component of the axis of each actuator at the start.
     """
 
     limb: NDArray[np.int_]
@@ -64,7 +65,7 @@ class Limbs:
         """Return the limbs of a robot."""
         carriers = {joint.child: joint for joint in world.joints}
         starts = np.array([[joint.start for joint in world.joints]])
-        positions, turns = body_poses(world, np.array([[0.0, 0, 0, 0, 0, 0, 1]]), starts)
+        positions, turns = body_poses(world, np.array([[0.0, 0, 0, *world.start_turn]]), starts)
         places = {body.name: place for place, body in enumerate(world.bodies)}
         roots: list[str] = []
         limb, depth, upward = [], [], []

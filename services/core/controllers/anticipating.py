@@ -10,6 +10,7 @@ from gaplab.services.core.arrays import FloatArray, Genome, frozen
 from gaplab.services.core.controllers.actuation import Limbs, follows_angle, middles
 from gaplab.services.core.controllers.base import Controller
 from gaplab.services.core.controllers.pulsing import Pulses
+from gaplab.services.core.kinematics import inverse, rotated
 from gaplab.services.core.motions import Loop
 from gaplab.services.core.space import Space
 from gaplab.services.core.world import World
@@ -41,8 +42,8 @@ class Anticipating(Controller):
     """Pulses as in `square_pulses`, plus a share of the error between the expected and the observed motion.
 
     The expected angle e of a joint follows the pulses' target u, de/dt = (u - e) / `lag_s`, from the joint's start; the
-    expected heading is the first one. With the observed angle q, and the turn ψ about the upright axis of the base,
-    summed up from its angular velocity, the target is u + gain (e - q) - heading_gain · ψ · z, where z is 1 for an axis
+    expected heading is the first one. With the observed angle q, and the turn ψ about the axis of the base that was
+    upright at the start, summed up from its angular velocity, the target is u + gain (e - q) - heading_gain · ψ · z, where z is 1 for an axis
     that points upwards, -1 downwards, and 0 for one that is not upright.
 
     Joints whose motors follow speeds or torques are not corrected. Genes are those of the pulses.
@@ -67,6 +68,7 @@ class Anticipating(Controller):
         upright = np.where(follows & (np.abs(upward) > LEAST_UPRIGHT), np.sign(upward), 0.0)
         self._gains = frozen(options.gain * follows)
         self._turning_back = frozen(-options.heading_gain * upright)
+        self._up = rotated(inverse(np.array(world.start_turn)), np.array([0.0, 0.0, 1.0]))
         self._closer = 1 - float(np.exp(-options.period_s / options.lag_s))
         self._memory = frozen([*middles(world), 0.0])
         self._observe_s, self._act = observe_s, self.act
@@ -79,7 +81,8 @@ class Anticipating(Controller):
         self, genomes: FloatArray, observations: FloatArray, memory: FloatArray, time_s: float
     ) -> tuple[FloatArray, FloatArray]:
         """Return targets `(n, a)`, and the expected angles and the turn at the next call."""
-        angles, spin = observations[:, :-3], observations[:, -1:]
+        angles = observations[:, :-3]
+        spin = sum(observations[:, axis - 3, None] * self._up[axis] for axis in range(3))
         expected, turn = memory[:, :-1], memory[:, -1:]
         pulses = self._pulses.targets(genomes, time_s)
         targets = pulses + self._gains * (expected - angles) + self._turning_back * turn

@@ -1,6 +1,7 @@
 """The contract of a robot: a world, and what drives and rates it by default."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -9,6 +10,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import FloatArray, Genome
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.controllers.base import Controller
+from gaplab.services.core.kinematics import from_start, observes_base
 from gaplab.services.core.motions import Loop, Motion, Trajectory
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.sensors import Sensors as Sensors
@@ -88,8 +90,11 @@ class Robot(Plugin):
     def sense(self, trajectory: Trajectory) -> FloatArray:
         """Return `(..., r, s)`: what the sensors say, in their units, of trajectories observed at `sensors.times_s`.
 
-        By default they are those of the task; a robot with a task of its own that has sensors overrides it.
+        By default they are those of the task, which sees a base that begins turned as level at the start. A robot with
+        a task of its own that has sensors overrides it.
         """
+        if observes_base(self.world):
+            trajectory = replace(trajectory, orientations=from_start(self.world, trajectory.orientations))
         return self._task.sense(trajectory)
 
     @property

@@ -13,6 +13,8 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.world import World
 
+LONGEST_PATTERN = 80
+
 REBUILDS, SHARES, IN_PLACE = 0, 1, 2
 """Places in the order of edits."""
 
@@ -68,7 +70,9 @@ class Tunable(Plugin):
 
 
 def matching(pattern: str, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names that match a pattern of `fnmatch`, in their order."""
+    """Return the name that is the pattern itself, or else those that match it as one of `fnmatch`, in their order."""
+    if pattern in names:
+        return (pattern,)
     return tuple(name for name in names if fnmatchcase(name, pattern))
 
 
@@ -85,7 +89,7 @@ def lacking(kind: str, pattern: str, names: Sequence[str]) -> tuple[str, tuple[s
 class SurfaceOptions(Frozen):
     """Options of a coefficient of friction or restitution."""
 
-    of: Annotated[str, Field(max_length=80)] = Field(
+    of: Annotated[str, Field(max_length=LONGEST_PATTERN)] = Field(
         default="", description="pattern of the names of surfaces; empty: the material of robot and ground"
     )
 

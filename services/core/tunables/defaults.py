@@ -1,6 +1,12 @@
 """Which tunables an imported robot gets by default."""
 
+import re
+
+from gaplab.services.core.tunables.base import LONGEST_PATTERN
 from gaplab.services.core.world import Motor, World
+
+_SPECIAL = re.compile(r"[()\[\]*?,=]")
+"""Characters that mean something in a label or in a pattern."""
 
 
 def usual_tunables(world: World) -> tuple[str, ...]:
@@ -17,9 +23,9 @@ def usual_tunables(world: World) -> tuple[str, ...]:
         return ()
     damping = ("joint_damping",) if world.joints else ()
     if not world.fixed:
-        return ("dynamic_friction", f"mass({world.bodies[0].name})", *_response(world), *damping)
+        return ("dynamic_friction", _mass(world.bodies[0].name), *_response(world), *damping)
     tool = world.observed if world.observed not in {"", world.bodies[0].name} else world.bodies[-1].name
-    return (f"mass({tool})", *_response(world), *damping, "joint_friction")
+    return (_mass(tool), *_response(world), *damping, "joint_friction")
 
 
 def _response(world: World) -> tuple[str, ...]:
@@ -30,3 +36,9 @@ def _response(world: World) -> tuple[str, ...]:
     kinds = ["gain" if motor is None or isinstance(motor, Motor) else motor.follows for motor in motors]
     labels = {"gain": "motor_gain", "position": "kp", "velocity": "kd", "torque": "max_torque"}
     return (labels[max(labels, key=kinds.count)],)
+
+
+def _mass(body: str) -> str:
+    """Return the label of a body's mass, with ? for what a label cannot contain, and * for what is too long."""
+    pattern = _SPECIAL.sub("?", body)
+    return f"mass({pattern if len(pattern) <= LONGEST_PATTERN else pattern[: LONGEST_PATTERN - 1] + '*'})"

@@ -8,10 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.tunables.base import IN_PLACE, Tunable, lacking, matching
+from gaplab.services.core.tunables.base import IN_PLACE, LONGEST_PATTERN, Tunable, lacking, matching
 from gaplab.services.core.world import Body, Joint, World
 
-Pattern = Annotated[str, Field(min_length=1, max_length=80)]
+Pattern = Annotated[str, Field(min_length=1, max_length=LONGEST_PATTERN)]
 ALL = "names of bodies, joints or motors by a pattern with * ? and [ ], as in shells"
 HOW = "`scale`: a factor of each one's own number; `value`: the number itself, the same for all of the group"
 

@@ -1,6 +1,6 @@
 """Controllers in loops: all rollouts of a call are stepped together, with one call of the controller in each period."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -101,9 +101,9 @@ class _Run:
         self._length = int(lags.max()) + 1
         self._seen_at = np.arange(len(lags)), self._length - 1 - lags
         self.recent = np.tile(states.start, (len(lags), self._length, 1))
-        self._worlds: dict[float, tuple[World, list[int]]] = {}
+        self._worlds: dict[Hashable, tuple[World, list[int]]] = {}
         for row, each in enumerate([*prepared] * len(loops)):
-            self._worlds.setdefault(each.world.slope_rad, (each.world, []))[1].append(row)
+            self._worlds.setdefault(_looks(each.world), (each.world, []))[1].append(row)
 
     def see(self, states: FloatArray) -> None:
         """Remember the latest states `(rows, steps, state)`, as far back as they are observed."""
@@ -120,3 +120,9 @@ class _Run:
             ]
             order = np.argsort(np.concatenate([rows for _, rows in self._worlds.values()]), kind="stable")
             return self._acting.targets(tick, np.concatenate(found)[order])
+
+
+def _looks(world: World) -> Hashable:
+    """Return what decides the observations of a world, among those of one structure: its slope, and where shapes are."""
+    solids = [body.center_m for body in world.bodies if not isinstance(body.shape, tuple)]
+    return world.slope_rad, *solids

@@ -1,9 +1,10 @@
 """Robot files."""
 
 from collections.abc import Sequence
+from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import select, update
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from gaplab.services.store.clock import now
@@ -36,5 +37,8 @@ def put(session: Session, sha256: str, name: str, text: str) -> RobotRow:
 
 
 def insert_unless_there(session: Session, rows: Sequence[dict[str, Any]]) -> None:
-    """Insert robot files; one that is there already stays as it is."""
-    session.execute(insert_new(session, RobotRow).values(created_at=now()), list(rows))
+    """Insert robot files; one that is there already stays as it is, and no name gets another meaning."""
+    for row in rows:
+        oldest = session.scalar(select(func.min(RobotRow.created_at)).where(RobotRow.name == row["name"]))
+        at = now() if oldest is None else oldest - timedelta(microseconds=1)
+        session.execute(insert_new(session, RobotRow).values(**row, created_at=at))
