@@ -31,7 +31,7 @@ def add_robot(file: Annotated[dict[str, Any], Body(openapi_examples=_EXAMPLES)],
     A file is data: its world, and the names of its usual controller and task. Specs name the robot by its name; of
     several with one name, the one that was added last is meant.
     """
-    return stored_robots.add_robot(store, json.dumps(file))
+    return stored_robots.add_robot(store, json.dumps(file, separators=(",", ":"), ensure_ascii=False))
 
 
 @router.get("", summary="List the stored robots", responses=documented())

@@ -28,6 +28,12 @@ SHORTEST_STEP_S = 1e-5
 LATEST_S = 10.0
 """Largest delay and latency, and largest noise in its unit."""
 
+SHORTEST_M, LONGEST_M = 1e-6, 1e4
+"""Smallest and largest dimension of a shape."""
+
+SMALLEST_HULL_M = 1e-4
+"""Smallest length of a hull, which engines compute from its vertices."""
+
 FLAT = 1e-9
 """Thickness of a hull, as a share of its length, at which it has no volume."""
 
@@ -95,15 +101,23 @@ def _inertia_checks(inertia: Inertia) -> Iterator[_Check]:
 
 def _shape_checks(shape: Shape, place: str) -> Iterator[_Check]:
     if isinstance(shape, Box):
-        yield f"{place}/size_m", shape.size_m, min(shape.size_m) > 0, "above 0, each"
+        yield _length_check(f"{place}/size_m", shape.size_m)
     elif isinstance(shape, Hull):
         count = len(shape.points_m)
+        ends = np.ptp(np.array(shape.points_m), axis=0) if count else np.zeros(1)
+        permitted = f"points at most {SMALLEST_HULL_M:g} to {LONGEST_M:g} m apart along an axis"
+        yield f"{place}/points_m", float(ends.max()), SMALLEST_HULL_M <= ends.max() <= LONGEST_M, permitted
         yield f"{place}/points_m", count, 4 <= count <= MOST_VERTICES, f"4 to {MOST_VERTICES} points"
         yield f"{place}/points_m", count, count < 4 or _has_volume(shape), "points that enclose a volume"
     else:
-        yield f"{place}/radius_m", shape.radius_m, shape.radius_m > 0, "above 0"
-        length = getattr(shape, "length_m", 1.0)
-        yield f"{place}/length_m", length, length > 0, "above 0"
+        yield _length_check(f"{place}/radius_m", shape.radius_m)
+        yield _length_check(f"{place}/length_m", getattr(shape, "length_m", 1.0))
+
+
+def _length_check(place: str, length: float | tuple[float, ...]) -> _Check:
+    lengths = length if isinstance(length, tuple) else (length,)
+    good = SHORTEST_M <= min(lengths) and max(lengths) <= LONGEST_M
+    return place, length, good, f"{SHORTEST_M:g} to {LONGEST_M:g}" + (", each" if len(lengths) > 1 else "")
 
 
 def _has_volume(hull: Hull) -> bool:

@@ -86,9 +86,11 @@ def stored_ref(store: Store, robot: PluginRef) -> PluginRef:
     """Return the hash of the stored robot that a name means; unchanged if a plug-in has the name.
 
     Raises:
-        InvalidSpec: the robot has options, which one from a file does not have.
+        InvalidSpec: the robot has options, which one from a file does not have, or no robot with its hash is stored.
     """
     name = robot.name
+    if name == IMPORTED:
+        _check_stored(store, str(robot.options.get("sha256", "")))
     if name in robots or name in robots.unusable or (found := _newest(store, name)) is None:
         return robot
     if robot.options:
@@ -106,6 +108,14 @@ def check_samples(store: Store, text: str, driven: Driven) -> SamplesRead:
     with _naming_stored(store):
         robot = robot_of(replace(driven, robot=stored_ref(store, driven.robot)))
     return read_samples(text, robot)
+
+
+@snapshot
+def _check_stored(session: Session, sha256: str) -> None:
+    """Refuse a hash that is not stored; the process may know its robot, but forgets it when it ends."""
+    if session.get(RobotRow, storable(sha256)) is None:
+        message = f"no robot with the hash {sha256!r} is stored here; add its file: gaplab robot add"
+        raise InvalidSpec([Violation("/robot/options/sha256", sha256, message, "the hash of a stored robot")])
 
 
 @contextmanager

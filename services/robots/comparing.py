@@ -40,7 +40,8 @@ def check_rollouts(first: World, second: World, engine: Engine, controller: Plug
 
     Raises:
         InvalidSpec: the controller or the task is not installed here.
-        InvalidRobot: the distance is larger than rounding explains, or the physics fails in one of the worlds alone.
+        InvalidRobot: the distance is larger than rounding explains, or the physics fails in one of the worlds alone, or
+            in all rollouts.
     """
     driver = controllers.create(controller)
     driver.prepare(first, tasks.create(task).observe_s)
@@ -49,6 +50,8 @@ def check_rollouts(first: World, second: World, engine: Engine, controller: Plug
     paths = [engine.rollouts([world], motions).positions_m for world in (first, second)]
     if not np.array_equal(np.isnan(paths[0]), np.isnan(paths[1])):
         raise InvalidRobot(["the physics fails in the tuned world or in that of the new file, but not in both"])
+    if np.isnan(paths[0]).all():
+        raise InvalidRobot(["the physics fails in every rollout of the tuned world, so nothing can be compared"])
     largest = _distance_m(*paths)
     if largest > SAME_M:
         by_rounding = _distance_m(paths[0], engine.rollouts([_rounded(first)], motions).positions_m)

@@ -99,6 +99,8 @@ def import_robot(file: Path, options: ImportOptions) -> ImportedFile:
         return ImportedFile(read_robot_file(robot.text), masses)
     except InvalidSpec as error:
         raise InvalidRobot(f"{each.pointer}: {each.message}" for each in error.violations) from error
+    except ValueError as error:  # JSON has neither nan nor infinity
+        raise InvalidRobot(["a mass, a length or another number of the file is not finite"]) from error
 
 
 def _world(source: Source, bodies: Bodies, options: ImportOptions, notes: Notes) -> World:

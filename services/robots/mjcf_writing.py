@@ -13,7 +13,7 @@ from gaplab.services.core.world import World
 from gaplab.services.robots.bodies import Bodies, joint_name
 from gaplab.services.robots.changes import Change
 from gaplab.services.robots.inertials import Inertial, inertials
-from gaplab.services.robots.xml import Document, Element, child, numbers, tree
+from gaplab.services.robots.xml import Document, Element, child, decoded, numbers, tree
 
 _OF_JOINTS = {"damping": "damping", "dry_friction": "frictionloss", "armature": "armature"}
 _FILES = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin": "meshdir"}
@@ -31,7 +31,7 @@ class MjcfDocument(Document):
         joints = [each for body in self._bodies for each in body if each.tag in {"joint", "freejoint"}]
         self._joints = [each for each in joints if not _fits(each.get("name", ""), locked)]
         if len(self._joints) == model.njnt - 1:  # the import made the base free
-            self._joints.insert(0, Element("freejoint"))
+            self._joints.insert(0, tree("<freejoint/>"))
         drives = [each for group in self.root.findall("actuator") for each in group if isinstance(each.tag, str)]
         self._actuators = [each for each in drives if not _fits(each.get("joint", ""), locked)]
         self._check()
@@ -158,7 +158,7 @@ def _include(root: Element, folder: Path) -> None:
     for parent in list(root.iter()):
         for place, element in reversed(list(enumerate(parent))):
             if element.tag == "include":
-                included = tree((folder / element.get("file", "")).read_text(encoding="utf-8-sig"))
+                included = tree(decoded((folder / element.get("file", "")).read_bytes()))
                 _include(included, folder)
                 parent.remove(element)
                 for each in reversed(list(included)):

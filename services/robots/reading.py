@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gaplab.services.core.errors import EngineUnavailable, InvalidRobot
+from gaplab.services.engines.mujoco.logs import unlogged
 from gaplab.services.robots.mending import hold, mend
 from gaplab.services.robots.notes import Notes, listed
 from gaplab.services.robots.options import ImportOptions
@@ -56,18 +57,24 @@ def read_source(file: Path, text: str, options: ImportOptions, notes: Notes) -> 
     """
     mujoco = mujoco_library()
     try:
-        is_urdf = tree(text).tag == "robot"
-        if is_urdf:
-            urdf = read_urdf(file, text, options, notes)
-            spec = mujoco.MjSpec.from_string(urdf.text, assets=urdf.assets or None)
-            masses, speeds, name = urdf.masses_kg, urdf.speeds, urdf.name
-        else:
-            spec = mujoco.MjSpec.from_file(str(file))
-            masses, speeds, name = {}, {}, spec.modelname
-            _lock(spec, options, notes)
-        return _compiled(spec, options, notes, Source(None, is_urdf, name, masses, speeds, fixed=options.fixed))
+        with unlogged(mujoco):
+            return _read(mujoco, file, text, options, notes)
     except (ValueError, SyntaxError) as error:
-        raise InvalidRobot([*notes.refused, " ".join(str(error).split())]) from error
+        message = error.msg if isinstance(error, SyntaxError) else str(error)
+        raise InvalidRobot([*notes.refused, " ".join(message.split())]) from error
+
+
+def _read(mujoco: Any, file: Path, text: str, options: ImportOptions, notes: Notes) -> Source:  # noqa: ANN401
+    is_urdf = tree(text).tag == "robot"
+    if is_urdf:
+        urdf = read_urdf(file, text, options, notes)
+        spec = mujoco.MjSpec.from_string(urdf.text, assets=urdf.assets or None)
+        masses, speeds, name = urdf.masses_kg, urdf.speeds, urdf.name
+    else:
+        spec = mujoco.MjSpec.from_file(str(file))
+        masses, speeds, name = {}, {}, spec.modelname
+        _lock(spec, options, notes)
+    return _compiled(spec, options, notes, Source(None, is_urdf, name, masses, speeds, fixed=options.fixed))
 
 
 def _compiled(spec: Any, options: ImportOptions, notes: Notes, source: Source) -> Source:  # noqa: ANN401

@@ -10,11 +10,13 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
+
+from lxml import etree
 
 from gaplab.services.robots.notes import Notes
 from gaplab.services.robots.options import ImportOptions
-from gaplab.services.robots.xml import Element, tree
+from gaplab.services.robots.urdf_values import check_values
+from gaplab.services.robots.xml import Element, child, tree
 
 _LOST = {
     "transmission": "transmissions are lost, a motor moves its joint directly; of {}",
@@ -51,6 +53,8 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
         InvalidRobot: a mesh is missing.
     """
     root = tree(text)
+    check_values(root, notes)
+    notes.check()
     _lock(root, options.lock, notes)
     _refuse(root, notes)
     _note_losses(root, notes)
@@ -60,12 +64,12 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
                 link.remove(visual)
     assets = dict(_resolve_meshes(root, file, notes))
     notes.check()
-    compiler = ElementTree.SubElement(ElementTree.SubElement(root, "mujoco"), "compiler")
+    compiler = child(child(root, "mujoco"), "compiler")
     compiler.set("discardvisual", "false" if options.visuals else "true")
     compiler.set("strippath", "false")
     masses = {_name(link): _mass_kg(link) for link in root.iter("link")}
     return Urdf(
-        text=ElementTree.tostring(root, encoding="unicode"),
+        text=etree.tostring(root, encoding="unicode"),
         assets=assets,
         masses_kg={name: mass for name, mass in masses.items() if mass is not None},
         speeds=dict(_speeds(root)),

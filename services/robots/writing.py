@@ -124,7 +124,7 @@ def write_xml(tuning: Tuning, original: Path, output: Path, accept: Accept) -> W
         document.move(original.absolute().parent, output.absolute().parent)
     lines = [*tuning.comments, *(f"not in this file: {change}" for change in left_out)]
     beside = output.with_name(f".{output.stem}.unchecked{output.suffix}")
-    beside.write_text(document.text(lines), encoding="utf-8")
+    beside.write_text(document.text(lines), encoding="utf-8", newline="")
     try:
         again = import_robot(beside, options).robot.world
         computed = _computed(again, tuning, left_out)

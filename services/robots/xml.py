@@ -1,13 +1,14 @@
-"""XML that keeps its comments and its head while single values change."""
+"""XML that keeps its comments, its namespaces and its ends of lines while single values change."""
 
 import re
 from collections.abc import Sequence
-from xml.etree import ElementTree
+from typing import Any, TypeAlias
 
-Element = ElementTree.Element
+from lxml import etree
 
+Element: TypeAlias = Any  # lxml has no types
 
-HEAD = re.compile(r"(\s|<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>\[]*(\[.*?\]\s*)?>)*", re.DOTALL)
+_HEAD = re.compile(r"(\s|<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>\[]*(\[.*?\]\s*)?>)*", re.DOTALL)
 """What may be before the root."""
 
 
@@ -27,32 +28,40 @@ class Document:
     """
 
     def __init__(self, text: str) -> None:
-        found = HEAD.match(text)
+        self._line_end = "\r\n" if "\r\n" in text else "\n"
+        text = text.replace("\r\n", "\n")
+        found = _HEAD.match(text)
         at = found.end() if found else 0
-        self._head, body = text[:at], text[at:]
-        self.root = tree(body)
+        self._head, self.root = text[:at], tree(text[at:])
 
     def text(self, comments: Sequence[str]) -> str:
         """Return the text, with comments at the start of the root."""
+        before = self.root.text or "\n  "
         for comment in reversed(comments):
-            node = ElementTree.Comment(f" {comment.replace('--', '—')} ")
-            node.tail = "\n  "
+            node = etree.Comment(f" {comment.replace('--', '—')} ")
+            node.tail = before
             self.root.insert(0, node)
-        self.root.text = "\n  "
-        return self._head + ElementTree.tostring(self.root, encoding="unicode") + "\n"
+        self.root.text = before
+        parts = [self.root, *self.root.itersiblings()]
+        lines = [etree.tostring(each, encoding="unicode", with_tail=False) for each in parts]
+        return (self._head + "\n".join(lines) + "\n").replace("\n", self._line_end)
 
 
 def tree(text: str) -> Element:
-    """Return the root of an XML text, with comments."""
+    """Return the root of an XML text, with comments; no file is read, and nothing is fetched.
+
+    Raises:
+        SyntaxError: it is no XML; the message has the line.
+    """
     text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)  # some files declare a version of XML that does not exist
-    parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))  # noqa: S314 - the user's own
-    return ElementTree.fromstring(text, parser)  # noqa: S314
+    parser = etree.XMLParser(resolve_entities=False, no_network=True)
+    return etree.fromstring(text.encode(), parser)
 
 
 def child(parent: Element, tag: str) -> Element:
     """Return the first child with a tag, which is made if there is none."""
     found = parent.find(tag)
-    return ElementTree.SubElement(parent, tag) if found is None else found
+    return etree.SubElement(parent, tag) if found is None else found
 
 
 def numbers(*values: float) -> str:

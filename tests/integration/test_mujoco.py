@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from ctypes import c_double, c_int32, c_int64
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.world import Body, Joint, Material, Motor, World
 from gaplab.services.engines.mujoco import MuJoCo
+from gaplab.services.engines.mujoco import models as models_module
 from gaplab.services.engines.mujoco.callback import callbacks
 from gaplab.services.engines.mujoco.layout import layout
 from gaplab.services.engines.mujoco.model import named
@@ -213,6 +215,42 @@ def test_a_rollout_that_fails_does_not_harm_the_others_of_its_call(engine: MuJoC
 
     assert np.array_equal(together[[0, 2]], [path(engine, ROBOT.world)] * 2)
     assert np.all(np.isnan(together[1]))
+
+
+def test_a_rollout_at_which_mujoco_stops_does_not_harm_the_others_of_its_call(
+    engine: MuJoCo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heavy = ROBOT.world.edited("gravity_m_s2", gravity_m_s2=20.0)
+    alone = path(engine, ROBOT.world)
+    scene = engine._scenes[ROBOT.world.built(engine.in_place)]
+    plain = scene.pool._threads
+
+    class Stopping:
+        def rollout(self, models: Any, *args: Any, **options: Any) -> None:
+            if any(model.opt.gravity[2] == -20.0 for model in models):
+                raise mujoco.FatalError("stopped")
+            plain.rollout(models, *args, **options)
+
+        def close(self) -> None:
+            plain.close()
+
+    monkeypatch.setattr(scene.pool, "_threads", Stopping())
+    found = engine.rollouts([ROBOT.world, heavy], [MOTION, MOTION]).positions_m
+
+    assert np.array_equal(found[:, 0], [alone, alone])
+    assert np.isnan(found[:, 1]).all()
+
+
+def test_a_robot_of_large_models_keeps_few_of_them(engine: MuJoCo, monkeypatch: pytest.MonkeyPatch) -> None:
+    models = Models(mujoco, ROBOT.world)
+    monkeypatch.setattr(models_module, "KEPT_BYTES", 3 * models.structure.model.nbuffer)
+    worlds = [in_material(Material(0.1 * number, 0.1)) for number in range(5)]
+
+    for world in worlds:
+        models[[world]]
+
+    assert len(models._kept) == 3
+    assert [each.world for each in models[worlds]] == worlds
 
 
 def test_warnings_are_neither_printed_nor_written_to_a_file(tmp_path: Path) -> None:

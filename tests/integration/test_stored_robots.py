@@ -156,6 +156,14 @@ def test_a_table_of_samples_is_checked_for_a_stored_robot(store: Store, http: Te
     assert [each["values"] for each in answer.json()["samples"]] == [[0.3]]
 
 
+def test_a_robot_that_the_process_knows_but_that_is_not_stored_is_refused(store: Store) -> None:
+    robot_library.learn([file_of().text])
+    unstored = {"name": "robot_file", "options": {"sha256": file_of().sha256}}
+
+    with pytest.raises(InvalidSpec, match="no robot with the hash .* is stored here"):
+        submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC | {"robot": unstored}))
+
+
 def test_a_robot_from_a_file_takes_no_options(store: Store) -> None:
     stored_robots.add_robot(store, file_of().text)
     with pytest.raises(InvalidSpec, match="comes from a file, which has no options"):

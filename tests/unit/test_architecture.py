@@ -26,7 +26,7 @@ WEB = {"fastapi", "starlette", "pydantic", "anyio", "prometheus_client"}
 ROOMS = {
     "core": ((), {"numpy", "scipy", "pydantic", "cma"}),
     "engines": (("core",), {"numpy", "pydantic"}),
-    "robots": (("core", "engines"), {"numpy", "scipy", "pydantic"}),
+    "robots": (("core", "engines"), {"numpy", "scipy", "pydantic", "lxml"}),
     "store": (("core",), {"sqlalchemy", "psycopg"}),
     "figures": ((), {"plotly", "matplotlib"}),
     "specs": (("core", "engines"), {"numpy"}),

@@ -105,7 +105,7 @@ REFUSED: dict[str, tuple[Callable[[Any], None], str, str]] = {
     "nan": (edit(*BASE, "mass_kg", to=float("nan")), "/world/bodies/0/mass_kg", "a finite number"),
     "field": (edit(*BASE, "colour", to="red"), "/world/bodies/0/colour", "colour is no field here"),
     "kind": (edit(*BASE, "shape", 0, "shape", "kind", to="cone"), "/world/bodies/0/shape/0/shape", "box, sphere"),
-    "size": (edit(*BASE, "shape", 0, "shape", "size_m", 1, to=-1), "/world/bodies/0/shape/0/shape/size_m", "above 0"),
+    "size": (edit(*BASE, "shape", 0, "shape", "size_m", 1, to=-1), "/world/bodies/0/shape/0/shape/size_m", "1e-06 to"),
     "vertices": (
         edit(*BASE, "shape", 4, "shape", "points_m", to=[[0.01 * i, 0.1 * i * i, i**3] for i in range(65)]),
         "/world/bodies/0/shape/4/shape/points_m",

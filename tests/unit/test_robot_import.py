@@ -446,8 +446,54 @@ def test_a_lock_that_fits_no_joint_is_refused(tmp_path: Path, suffix: str) -> No
 
 def test_a_file_that_is_neither_is_refused(tmp_path: Path) -> None:
     (tmp_path / "x.urdf").write_text("hello")
-    with pytest.raises(InvalidRobot, match=r"not well-formed|syntax error"):
+    with pytest.raises(InvalidRobot, match="Start tag expected.*line 1, column 1$"):
         import_robot(tmp_path / "x.urdf", ImportOptions())
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "reason"),
+    [
+        ('effort="7"', 'effort="-7"', "line 5: joint hinge: limit effort '-7' is below 0"),
+        ('velocity="3"', 'velocity="fast"', "line 5: joint hinge: limit velocity 'fast' is no finite number"),
+        ('lower="-1" upper="2"', 'lower="2" upper="-1"', "line 5: joint hinge has limits 2 to -1; the smaller is first"),
+        ('xyz="0 1 0"/>', 'xyz="0 1"/>', "line 4: joint hinge: axis xyz '0 1' is not 3 finite numbers"),
+        ("</robot>", "<a>" * 300 + "</a>" * 300 + "</robot>", "Excessive depth"),
+        ("</robot>", "<b></robot>", "mismatch: b line 5"),
+    ],
+)
+def test_what_is_wrong_in_a_urdf_is_told_with_its_line(tmp_path: Path, before: str, after: str, reason: str) -> None:
+    two_links(tmp_path)
+    file = tmp_path / "two" / "urdf" / "two.urdf"
+    file.write_text(file.read_text().replace(before, after, 1))
+
+    with pytest.raises(InvalidRobot) as raised:
+        import_robot(file, ImportOptions())
+
+    assert any(reason in each for each in raised.value.reasons)
+
+
+def test_equal_limits_are_none_and_said_without_a_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    two_links(tmp_path)
+    file = tmp_path / "two" / "urdf" / "two.urdf"
+    file.write_text(file.read_text().replace('lower="-1" upper="2"', 'lower="0" upper="0"'))
+
+    robot = import_robot(file, ImportOptions()).robot
+
+    assert robot.world.joints[0].limits is None
+    assert "joints whose limits are equal have none: hinge" in robot.lost
+    assert [each.name for each in tmp_path.iterdir()] == ["two"]
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("value", ["inf", "nan"])
+def test_a_number_of_an_mjcf_that_is_not_finite_is_refused(tmp_path: Path, value: str) -> None:
+    (tmp_path / "m.xml").write_text(MJCF.format("").replace('armature=".01"', f'armature="{value}"'))
+
+    with pytest.raises(InvalidRobot):
+        import_robot(tmp_path / "m.xml", ImportOptions())
 
 
 def test_a_simple_hull_lies_inside_and_says_what_it_lacks() -> None:

@@ -102,6 +102,26 @@ def test_a_urdf_keeps_everything_else_of_its_text(tmp_path: Path) -> None:
     assert 'damping="0.25"' in text
 
 
+def test_a_urdf_keeps_its_namespaces_its_ends_of_lines_and_what_is_after_its_root(tmp_path: Path) -> None:
+    text = path_of("a1/a1.urdf").read_text().replace("<robot ", '<robot xmlns:other="http://other.example" ', 1)
+    text = f"<!-- first -->\n<!DOCTYPE robot>\n{text[text.index('<robot '):].rstrip()}\n<!-- last -->\n"
+    original = tmp_path / "crlf.urdf"
+    original.write_bytes(text.replace("\n", "\r\n").encode())
+    robot = import_robot(original, ImportOptions()).robot
+    tuned = with_joint(robot.world, "FR_hip_joint", damping=0.25)
+
+    write_xml(Tuning(robot, tuned, ()), original, tmp_path / "tuned.urdf", fine)
+    written = (tmp_path / "tuned.urdf").read_bytes()
+
+    assert b'xmlns:other="http://other.example"' in written
+    assert written.startswith(b"<!-- first -->\r\n<!DOCTYPE robot>\r\n<robot")
+    assert written.endswith(b"</robot>\r\n<!-- last -->\r\n")
+    assert written.count(b"\n") == written.count(b"\r\n")
+    changed = set(written.decode().split()) ^ set(text.split())
+    assert 'damping="0.25"' in changed
+    assert len(changed) < 6
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -238,6 +258,7 @@ def test_a_robot_file_holds_all_and_its_intervals(tmp_path: Path) -> None:
     again = read_robot_file((tmp_path / "tuned.json").read_bytes())
 
     assert again.world == tuned == written.world
+    assert again.name == f"{robot.name}_tuned"
     assert again.comments == COMMENTS
     assert again.sha256 != robot.sha256
     assert len(written.changes) == 3

@@ -14,8 +14,8 @@ from gaplab.services.engines.agenda import delays, first_targets
 from gaplab.services.engines.mujoco.model import compiled
 from gaplab.services.engines.mujoco.values import start, write
 
-KEPT = 64
-"""Worlds whose models are kept for the next call; a model of the quadruped takes 0.1 MB."""
+KEPT, KEPT_BYTES = 64, 256 * 2**20
+"""Largest number and size of the models that are kept for the next call; one of the quadruped takes 0.1 MB."""
 
 
 class Delays(NamedTuple):
@@ -58,7 +58,7 @@ class Models:
         for world in worlds:
             if id(world) in self._kept:  # the cache keeps the world, so its id is its own
                 self._kept.move_to_end(id(world))
-        most = max(KEPT, len(worlds))
+        most = max(min(KEPT, KEPT_BYTES // self.structure.model.nbuffer), len(worlds))
         for world in worlds:
             if id(world) not in self._kept:
                 spare = self._kept.popitem(last=False)[1] if len(self._kept) >= most else None

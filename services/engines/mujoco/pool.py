@@ -10,6 +10,7 @@ import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.mujoco.callback import Callbacks, callbacks
+from gaplab.services.engines.mujoco.logs import unlogged
 
 
 class Continued(NamedTuple):
@@ -113,7 +114,13 @@ class Pool:
                 sensordata=felt,
             )
         except self._mujoco.FatalError:
-            states.fill(np.nan)
+            if len(models) == 1:
+                states.fill(np.nan)
+                return
+            for row in range(len(models)):  # each alone, so that no rollout depends on another
+                at = slice(row, row + 1)
+                begin = None if accelerations is None else accelerations[at]
+                self._roll(models[at], starts[at], controls[at], begin, states[at], None if felt is None else felt[at])
 
     def _room(self, count: int, steps: int) -> FloatArray:
         """Return an array `(count, steps, state)`, in the memory of the last call if it is large enough."""
@@ -125,20 +132,14 @@ class Pool:
 
 @contextmanager
 def in_force(mujoco: ModuleType, these: Callbacks) -> Iterator[None]:
-    """Activate the law, and stop MuJoCo from printing warnings or writing them to a file.
-
-    These settings are process-wide, so they are restored.
-    """
+    """Activate the law, without warnings; the settings are process-wide, so they are restored."""
     before = mujoco.get_mjcb_control(), mujoco.get_mjcb_time(), mujoco.get_mjcb_sensor()
-    log, silent = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
-    silent.logto_console = silent.logto_file = False
-    silent.set()
-    _set(mujoco, these)
-    try:
-        yield
-    finally:
-        _set(mujoco, Callbacks(*before))
-        log.set()
+    with unlogged(mujoco):
+        _set(mujoco, these)
+        try:
+            yield
+        finally:
+            _set(mujoco, Callbacks(*before))
 
 
 def _set(mujoco: ModuleType, these: Callbacks) -> None:
