@@ -121,7 +121,10 @@ def _checked_spec(row: Row) -> Row:
         raise InvalidArchive(f"{place} is not a spec") from error
     names = [each.name for each in spec.tunables]
     wrong = [name for name in (*truth, *names) if plain_name(name) not in tunables]
-    wrong += [] if _is_known(spec.robot) else [label_of(spec.robot)]
+    wrong += [] if spec.robot.name in robots else [spec.robot.name]
+    if not _is_stored(spec.robot):
+        msg = f"{place} names the robot {label_of(spec.robot)!r}, whose file is neither in the archive nor stored here"
+        raise InvalidArchive(f"{msg}; add it before: gaplab robot add")
     if wrong or len(set(names)) < len(names) or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names plug-ins that are not installed here: {', '.join(wrong)[:200]}"
         raise InvalidArchive(msg)
@@ -133,9 +136,9 @@ def _checked_spec(row: Row) -> Row:
     return stored | {"reality": reality | {"parameters": truth | reality["parameters"]}}
 
 
-def _is_known(robot: PluginRef) -> bool:
-    """Return whether a robot is installed here, or its file is in the archive or stored here."""
-    return robot.name in robots and (robot.name != IMPORTED or bool(robot_library.needed_by(robot)))
+def _is_stored(robot: PluginRef) -> bool:
+    """Return whether the file of a robot is in the archive or stored here, or it needs none."""
+    return robot.name != IMPORTED or bool(robot_library.needed_by(robot))
 
 
 def _fields_of(given: Row, checked: Row) -> Row:

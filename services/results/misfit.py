@@ -16,12 +16,11 @@ from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.identification import Means, overfitting, verdicts
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.core.repeats import pooled_variance
-from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples
-from gaplab.services.specs.robots import robot_of, unit
+from gaplab.services.specs.robots import installed_robot, unit
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator, MeasuredIterations
 from gaplab.services.store.session import Store
@@ -118,7 +117,8 @@ def _deviations(members: list[list[float]], weights: list[float]) -> FloatArray 
 def _means(spec: ResolvedSpec) -> Means:
     """Return what the experiment has not used: readings that its robot has, and tuners with intervals."""
     sensing = spec.discrepancy.name in discrepancies and discrepancies[spec.discrepancy.name].senses
-    has_sensors = spec.robot.name in robots and robot_of(spec).sensors.size > 0
+    robot = installed_robot(spec)
+    has_sensors = robot is not None and robot.sensors.size > 0
     certain = spec.tuner.name in tuners and tuners[spec.tuner.name].intervals
     return Means(
         readings=() if sensing or not has_sensors else [name for name, each in discrepancies.items() if each.senses],

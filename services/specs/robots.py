@@ -62,6 +62,14 @@ def robot_of(spec: NamesARobot) -> Robot:
     return robot
 
 
+def installed_robot(spec: NamesARobot) -> Robot | None:
+    """Return the robot of a stored spec; None if it, its controller or its task is not installed, or its file gone."""
+    try:
+        return robot_of(spec)
+    except InvalidSpec:
+        return None
+
+
 def unit(spec: NamesARobot) -> str:
     """Return the unit of fitness; "" if the robot or the task is not installed."""
     if spec.task is not None:

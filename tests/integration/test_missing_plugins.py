@@ -15,29 +15,34 @@ from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 
+WHY = "'gone'; permitted: ", "the robot 'gone' with the hash"
+
 
 def experiment_without(store: Store, kind: str) -> str:
-    """The id of one that is computed, and whose plug-in of this kind is not installed any more."""
+    """The id of one that is computed, and whose plug-in of this kind, or whose robot's file, is gone."""
     made = submission.submit_experiment(store, toy(repetitions=1))
     (one,) = claim(store, "me", 1)
     run(store, one)
     with store.transaction() as session:
         row = session.get_one(ExperimentRow, made.id)
         spec = deepcopy(row.spec)
-        (spec["tunables"][0] if kind == "tunables" else spec[kind])["name"] = "gone"
+        if kind == "file":
+            spec["robot"] = {"name": "robot_file", "options": {"sha256": "0" * 64, "name": "gone"}}
+        else:
+            (spec["tunables"][0] if kind == "tunables" else spec[kind])["name"] = "gone"
         row.spec = spec
     return made.id
 
 
-@pytest.mark.parametrize("kind", ["robot", "engine", "tunables", "optimizer"])
-@pytest.mark.parametrize("path", ["", "/curve", "/misfit", "/simulators"])
+@pytest.mark.parametrize("kind", ["robot", "file", "engine", "tunables", "optimizer"])
+@pytest.mark.parametrize("path", ["", "/curve", "/misfit", "/simulators", "/report", "/export"])
 def test_what_is_stored_is_shown(sqlite_store: Store, kind: str, path: str) -> None:
     id_ = experiment_without(sqlite_store, kind)
 
     assert TestClient(create_app(sqlite_store)).get(f"/experiments/{id_}{path}").status_code == 200
 
 
-@pytest.mark.parametrize("kind", ["robot", "engine", "tunables"])
+@pytest.mark.parametrize("kind", ["robot", "file", "engine", "tunables"])
 @pytest.mark.parametrize(
     "path", ["/experiments/{}/predictions", "/figures/predictions?experiment={}", "/figures/toy?experiment={}"]
 )
@@ -47,14 +52,14 @@ def test_what_cannot_be_computed_any_more_says_why(sqlite_store: Store, kind: st
     answer = TestClient(create_app(sqlite_store)).get(path.format(id_))
 
     assert answer.status_code == 422
-    assert "'gone'; permitted: " in answer.text
+    assert WHY[kind == "file"] in answer.text
 
 
-@pytest.mark.parametrize("kind", ["robot", "engine", "tunables", "optimizer", "strategy"])
+@pytest.mark.parametrize("kind", ["robot", "file", "engine", "tunables", "optimizer", "strategy"])
 def test_a_repetition_of_it_fails_with_a_sentence(sqlite_store: Store, kind: str) -> None:
     id_ = experiment_without(sqlite_store, kind)
     with sqlite_store.reading() as session:
         spec = spec_of(session.get_one(ExperimentRow, id_).spec)
 
-    with pytest.raises(InvalidSpec, match="'gone'; permitted: "):
+    with pytest.raises(InvalidSpec, match=WHY[kind == "file"]):
         setting(spec, 0)
