@@ -10,11 +10,13 @@ from gaplab.schemas.robots import RobotRead
 from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.spec import SharedSettings
 from gaplab.services.core import robot_library
-from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, unknown_name
+from gaplab.services.core.controllers import controllers
+from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, gather, unknown_name
 from gaplab.services.core.robot_files import RobotFile, read_robot_file
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.core.sample_tables import read_samples
+from gaplab.services.core.tasks import tasks
 from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.specs.robots import Driven, robot_of
 from gaplab.services.store.models import RobotRow
@@ -37,6 +39,10 @@ def add_robot(store: Store, text: str | bytes) -> RobotRead:
     if file.name in robots:
         message = f"gaplab has a robot {file.name!r} already; choose another name"
         raise InvalidSpec([Violation("/name", file.name, message, "another name")])
+    gather(
+        lambda: controllers.create(file.usual_controller, "/usual_controller"),
+        lambda: tasks.create(file.usual_task, "/usual_task"),
+    )
     robot_library.learn([file.text])
     robots.create(_ref(file.sha256, file.name))
     return _insert(store, file)

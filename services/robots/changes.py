@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.shapes import UNTURNED
 from gaplab.services.core.world import Inertia, World
 
 Place = tuple[str, str, str]
@@ -86,4 +87,7 @@ def _short(value: Any) -> str:  # noqa: ANN401 - any value of a world
         return f"{value:.6g}"
     if isinstance(value, tuple) and all(isinstance(each, float) for each in value):
         return "(" + ", ".join(f"{each:.6g}" for each in value) + ")"
+    if isinstance(value, Inertia):
+        turned = "" if value.turn == UNTURNED else f" turned by {_short(value.turn)}"
+        return f"{_short(value.moments_kg_m2)}{turned}"
     return str(value)

@@ -13,7 +13,7 @@ import numpy as np
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import RobotSource
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
-from gaplab.services.core.robot_files import RobotFile, read_robot_file
+from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot_file
 from gaplab.services.core.world import Body, Joint, Material, Surfaces, World
 from gaplab.services.robots.bodies import Bodies
 from gaplab.services.robots.motors import with_motors, with_swings
@@ -174,7 +174,7 @@ def _note_losses(source: Source, notes: Notes) -> None:
         if count := int(getattr(model, field, 0)):
             notes.lose(f"{count} {what} are lost")
     if np.any(model.opt.gravity[:2]) or model.opt.gravity[2] > 0:
-        notes.refuse(f"gravity is {model.opt.gravity.tolist()}, but in a World it points down; --slope is a tunable")
+        notes.refuse(f"gravity is {model.opt.gravity.tolist()}, but in a World it points down; a slope is a tunable")
     for field, what in (("density", "air or water"), ("viscosity", "air or water"), ("wind", "wind")):
         if np.any(getattr(model.opt, field)):
             notes.lose(f"{what} ({field}) is lost")
@@ -189,4 +189,6 @@ def _masses(source: Source, bodies: Bodies) -> Iterator[MassRow]:
 
 def _name(given: str) -> str:
     name = re.sub(r"[^a-z0-9]+", "_", given.lower()).strip("_")
-    return (name if name[:1].isalpha() else f"robot_{name}")[:60]
+    if not name:
+        raise InvalidRobot([f"the name {given!r} has no letter from a to z and no digit; give one with --name"])
+    return (name if name[:1].isalpha() else f"robot_{name}")[:LONGEST_NAME]

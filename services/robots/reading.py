@@ -65,7 +65,10 @@ def read_source(file: Path, text: str, options: ImportOptions, notes: Notes) -> 
 
 
 def _read(mujoco: Any, file: Path, text: str, options: ImportOptions, notes: Notes) -> Source:  # noqa: ANN401
-    is_urdf = tree(text).tag == "robot"
+    root = tree(text).tag
+    if root not in {"robot", "mujoco"}:
+        raise InvalidRobot([f"the file is <{root}>, but an import reads URDF, <robot>, and MJCF, <mujoco>"])
+    is_urdf = root == "robot"
     if is_urdf:
         urdf = read_urdf(file, text, options, notes)
         spec = mujoco.MjSpec.from_string(urdf.text, assets=urdf.assets or None)

@@ -107,10 +107,11 @@ def test_what_is_no_robot_file_is_refused_with_its_place(
 
 def test_a_robot_cannot_have_the_name_of_a_plug_in_or_a_controller_that_is_not_there(http: TestClient) -> None:
     taken = http.post("/robots", json=file_of("quadruped").content).json()
-    content = file_of().content | {"usual_controller": {"name": "wings", "options": {}}}
-    winged = http.post("/robots", json=content).json()
+    unknown = {"usual_controller": {"name": "wings", "options": {}}, "usual_task": {"name": "fly", "options": {}}}
+    winged = http.post("/robots", json=file_of().content | unknown).json()
 
     assert "gaplab has a robot 'quadruped' already" in taken["errors"][0]["message"]
+    assert [each["pointer"] for each in winged["errors"]] == ["/usual_controller", "/usual_task"]
     assert "wings" in winged["errors"][0]["message"]
 
 

@@ -472,6 +472,18 @@ def test_what_is_wrong_in_a_urdf_is_told_with_its_line(tmp_path: Path, before: s
     assert any(reason in each for each in raised.value.reasons)
 
 
+def test_a_file_that_is_neither_says_what_it_is(tmp_path: Path) -> None:
+    (tmp_path / "m.sdf").write_text("<?xml version='1.0'?><sdf version='1.9'><model name='m'/></sdf>")
+    with pytest.raises(InvalidRobot, match="the file is <sdf>, but an import reads URDF, <robot>, and MJCF, <mujoco>"):
+        import_robot(tmp_path / "m.sdf", ImportOptions())
+
+
+def test_a_name_without_a_letter_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "m.xml").write_text(MJCF.format(""))
+    with pytest.raises(InvalidRobot, match="'日本' has no letter from a to z"):
+        import_robot(tmp_path / "m.xml", ImportOptions(name="日本"))
+
+
 def test_equal_limits_are_none_and_said_without_a_log(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

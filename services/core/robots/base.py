@@ -77,7 +77,7 @@ class Robot(Plugin):
         """Let the usual controller drive the robot, and the usual task rate it."""
         assert self.usual_controller is not None
         assert self.usual_task is not None
-        self.perform(controllers.create(self.usual_controller), tasks.create(self.usual_task))
+        self.perform(controllers.create(self.usual_controller, "/robot"), tasks.create(self.usual_task, "/robot"))
 
     def motion(self, genome: Genome) -> Motion | Loop:
         """Return the motion that the genome `(g,)` describes."""
