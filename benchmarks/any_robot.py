@@ -17,7 +17,7 @@ import numpy as np
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.controllers.square_pulses import SquarePulses
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.motions import LEVEL, Motion
 from gaplab.services.core.robot_files import read_robot_file
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.shapes import Box, Cylinder, Part, Quaternion, Sphere
@@ -90,7 +90,7 @@ def dog() -> World:
 def bare(engine: SteppedEngine[Any], world: World, motion: Motion) -> None:
     """Step a scene of the engine through a motion."""
     scene = engine._scenes[world.built(engine.in_place)]
-    advance = engine._start(scene, world)
+    advance = engine._start(scene, world, LEVEL)
     ends = np.rint(np.append(motion.times_s[1:], motion.observe_s[-1]) / world.time_step_s).astype(int).tolist()
     now = 0
     for targets, end in zip(motion.targets.tolist(), ends, strict=True):

@@ -92,6 +92,28 @@ def _carried(joint: Joint, position: FloatArray, turn: FloatArray, angles: Float
     return position, product(turn, about(axis, angles))
 
 
+def lowest_m(world: World, turn: FloatArray) -> float:
+    """Return the height of the lowest point that touches the ground, at the start, above the frame of the base.
+
+    Args:
+        world: bodies and joints.
+        turn: `(4,)`: rotation of the base.
+    """
+    pose = np.array([[0.0, 0.0, 0.0, *turn]])
+    positions, turns = body_poses(world, pose, np.array([[joint.start for joint in world.joints]]))
+    touching = [place for place, body in enumerate(world.bodies) if body.touches] or range(len(world.bodies))
+    return min(float(clearances_m(world.bodies[place], positions[:, place], turns[:, place])[0]) for place in touching)
+
+
+def tilted_pose(world: World, tilt_rad: tuple[float, float]) -> FloatArray:
+    """Return `(7,)`: pose of the base at time 0, tilted about x and y of the world; its lowest point is as high."""
+    angle = float(np.hypot(*tilt_rad))
+    axis = np.array([*tilt_rad, 0.0]) / angle
+    level = np.array(world.start_turn)
+    turn = product(about(axis, np.array([angle]))[0], level)
+    return np.array([0.0, 0.0, world.start_height_m + lowest_m(world, level) - lowest_m(world, turn), *turn])
+
+
 def clearances_m(body: Body, positions: FloatArray, orientations: FloatArray) -> FloatArray:
     """Return `(k,)`: the height of the lowest point of a body above the ground, negative inside it.
 

@@ -15,6 +15,10 @@ Each row of the results depends on the same row of the arguments alone, to the l
 """
 
 
+Tilt: TypeAlias = tuple[float, float]
+LEVEL: Tilt = (0.0, 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Actuator targets over time, constant between changes.
@@ -23,15 +27,17 @@ class Motion:
         times_s: `(k,)`, ascending from 0: times at which targets change.
         targets: `(k, a)`, rad for a hinge: targets from each time on.
         observe_s: `(t,)`, ascending: times of observation; the last one ends the rollout.
+        start_tilt_rad: rotation of the base at time 0, about x and y of the world.
     """
 
     times_s: FloatArray
     targets: FloatArray
     observe_s: FloatArray
+    start_tilt_rad: Tilt = LEVEL
 
     def observed_at(self, times_s: FloatArray) -> "Motion":
         """Return the same motion, observed at other times."""
-        return Motion(self.times_s, self.targets, times_s)
+        return replace(self, observe_s=times_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +54,7 @@ class Loop:
         observation_noise: `(ticks, s)`: what is added to its observations, by call of `act`; empty: nothing.
         target_noise: `(ticks, a)`: what is added to its targets, likewise.
         latency_s: age of its observations.
+        start_tilt_rad: rotation of the base at time 0, about x and y of the world.
     """
 
     act: Act
@@ -59,6 +66,7 @@ class Loop:
     observation_noise: FloatArray = field(default_factory=no_readings)
     target_noise: FloatArray = field(default_factory=no_readings)
     latency_s: float = 0.0
+    start_tilt_rad: Tilt = LEVEL
 
     def observed_at(self, times_s: FloatArray) -> "Loop":
         """Return the same loop, whose trajectory is observed at other times."""

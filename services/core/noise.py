@@ -11,7 +11,7 @@ import numpy as np
 from numpy.random import Generator
 
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
-from gaplab.services.core.motions import Loop, Motion
+from gaplab.services.core.motions import LEVEL, Loop, Motion, Tilt
 from gaplab.services.core.observations import noises
 from gaplab.services.core.streams import stream
 from gaplab.services.core.world import Noise, World
@@ -50,8 +50,10 @@ def disturbed(world: World, motion: Motion | Loop, genome: Genome, trial: int = 
     if world.noise == QUIET:
         return motion
     commands = stream_of(genome, "noise of targets", trial)
+    tilt = _tilt(world, genome, trial)
     if isinstance(motion, Motion):
-        return Motion(motion.times_s, _disturbed(motion.targets, world.noise.target, commands), motion.observe_s)
+        targets = _disturbed(motion.targets, world.noise.target, commands)
+        return replace(motion, targets=targets, start_tilt_rad=tilt)
     scales = noises(world, motion.senses, world.noise)
     seen = stream_of(genome, "noise of observations", trial).standard_normal((motion.ticks, len(scales)))
     sent = commands.standard_normal((motion.ticks, len(world.actuators)))
@@ -60,7 +62,15 @@ def disturbed(world: World, motion: Motion | Loop, genome: Genome, trial: int = 
         observation_noise=frozen(scales * seen),
         target_noise=frozen(world.noise.target * sent),
         latency_s=world.noise.latency_s,
+        start_tilt_rad=tilt,
     )
+
+
+def _tilt(world: World, genome: Genome, trial: int) -> Tilt:
+    if not world.noise.start_tilt_rad:
+        return LEVEL
+    x, y = (world.noise.start_tilt_rad * stream_of(genome, "noise of the start", trial).standard_normal(2)).tolist()
+    return x, y
 
 
 def _disturbed(targets: FloatArray, deviation: float, rng: Generator) -> FloatArray:

@@ -157,6 +157,7 @@ class Noise:
         speed_rad_s: of a joint's speed.
         tilt: of each component of the direction of gravity, of length 1.
         turning_rad_s: of each component of the base's angular velocity.
+        start_tilt_rad: of the tilt of the base at time 0, about x and about y.
         latency_s: age of what a controller observes, rounded to whole time steps.
     """
 
@@ -165,6 +166,7 @@ class Noise:
     speed_rad_s: float = 0.0
     tilt: float = 0.0
     turning_rad_s: float = 0.0
+    start_tilt_rad: float = 0.0
     latency_s: float = 0.0
 
 

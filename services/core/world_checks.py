@@ -116,7 +116,7 @@ def _shape_checks(shape: Shape, place: str) -> Iterator[_Check]:
 
 def _length_check(place: str, length: float | tuple[float, ...]) -> _Check:
     lengths = length if isinstance(length, tuple) else (length,)
-    good = SHORTEST_M <= min(lengths) and max(lengths) <= LONGEST_M
+    good = min(lengths) >= SHORTEST_M and max(lengths) <= LONGEST_M
     return place, length, good, f"{SHORTEST_M:g} to {LONGEST_M:g}" + (", each" if len(lengths) > 1 else "")
 
 
@@ -162,6 +162,8 @@ def _world_checks(world: World) -> Iterator[_Check]:
     yield from _material_checks(world.material, "/material")
     for name, value in vars(world.noise).items():
         yield f"/noise/{name}", value, 0 <= value <= LATEST_S, f"0 to {LATEST_S:g}"
+    tilted = world.noise.start_tilt_rad
+    yield "/noise/start_tilt_rad", tilted, not (world.fixed and tilted), "0 where the base never moves"
     names = ["", *(body.name for body in world.bodies)]
     yield "/observed", world.observed, world.observed in names, "empty, or the name of a body"
     yield "/joints", "no motor", bool(world.actuators), "joints of which at least one has a motor"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import observed_poses, observes_base
-from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
+from gaplab.services.core.motions import Loop, Motion, Recording, Tilt, Trajectory
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
 from gaplab.services.engines.stepping import SteppedScene, WarmScenes, plausible, recording, watch
@@ -42,12 +42,13 @@ class SteppedEngine(Engine, Generic[S]):
         """Build the scene of a world."""
 
     @abstractmethod
-    def _start(self, scene: S, world: World) -> Callable[[int], None]:
+    def _start(self, scene: S, world: World, tilt_rad: Tilt) -> Callable[[int], None]:
         """Set a scene to time 0 of a world; return the function that advances it by a number of time steps.
 
         Args:
             scene: scene that was built from `world.built(in_place)`.
             world: the world, which `scene.world` is from now on.
+            tilt_rad: rotation of the base, about x and y of the world.
         """
 
     @classmethod
@@ -84,7 +85,7 @@ class SteppedEngine(Engine, Generic[S]):
         scene = self._scenes[built]
         look = (lambda: _joints_too(scene)) if with_joints else scene.pose
         try:
-            seen = watch(scene, self._start(scene, world), motion, look)
+            seen = watch(scene, self._start(scene, world, motion.start_tilt_rad), motion, look)
         except self.failures:
             seen = np.full((len(motion.observe_s), 7 + with_joints * 2 * len(world.joints)), np.nan)
         if not (plausible(seen[checked, :7]) and plausible(_observed(world, seen[checked]))):

@@ -44,6 +44,7 @@ USES: Mapping[str, Uses] = MappingProxyType(
         "motor.follows": _motors(lambda motor: motor.follows != "position"),
         "motor.kd": _motors(lambda motor: motor.kd),
         "motor.kp": _motors(lambda motor: motor.kp),
+        "noise.start_tilt_rad": lambda world: bool(world.noise.start_tilt_rad),
         "observed": lambda world: bool(world.bodies) and not observes_base(world),
         "shape.capsule": _shapes(Capsule),
         "shape.cylinder": _shapes(Cylinder),

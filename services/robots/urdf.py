@@ -161,4 +161,4 @@ def _mass_kg(link: Element) -> float | None:
 
 
 def _name(element: Element) -> str:
-    return element.get("name", "")
+    return str(element.get("name", ""))

@@ -59,9 +59,8 @@ def _check_limits(joint: Element, limit: Element, notes: Notes) -> None:
         return
     lower, upper = (next(_parsed(limit.get(name, "0")), math.nan) for name in ("lower", "upper"))
     if lower > upper:
-        notes.refuse(
-            f"line {limit.sourceline}: joint {joint.get('name', '')} has limits {lower:g} to {upper:g}; the smaller is first"
-        )
+        given = f"joint {joint.get('name', '')} has limits {lower:g} to {upper:g}"
+        notes.refuse(f"line {limit.sourceline}: {given}; the smaller is first")
     elif lower == upper:
         notes.lose("joints whose limits are equal have none: {}", joint.get("name", ""))
 

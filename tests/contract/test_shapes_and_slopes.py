@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import about, clearances_m
+from gaplab.services.core.kinematics import about, clearances_m, inverse, product
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.shapes import UNTURNED, Box, Capsule, Cylinder, Hull, Part, Shape, Sphere
-from gaplab.services.core.world import Body, Inertia, Material, World
+from gaplab.services.core.world import Body, Inertia, Material, Noise, World
 from gaplab.services.engines.base import Engine
 from tests.contract.textbook import STEP_S, G, X, Y, block, engine, held, honoured, positions, times
 
@@ -176,3 +177,28 @@ def test_a_base_begins_turned(engine: Engine) -> None:
     assert seen.positions_m[0] == pytest.approx([0, 0, 3.0], abs=1e-6)
     assert seen.orientations == pytest.approx(np.array([turn, turn]), abs=1e-4)
     assert seen.positions_m[1, :2] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_tilted_start_is_on_the_ground_and_is_forgotten_afterwards(engine: Engine) -> None:
+    body = Body("body", 1.0, Box((0.4, 0.2, 0.1)), (0.03, 0.0, 0.02), inertia=Inertia((0.02, 0.03, 0.04), QUARTER))
+    world = block(body, start_height_m=0.03, start_turn=QUARTER)
+    tilted = replace(world, noise=Noise(start_tilt_rad=0.1))
+    honoured(engine, tilted)
+    level = held(np.array([0.0, 0.5]))
+    tilts = (0.1, 0.0), (0.0, -0.3), (0.2, 0.1)
+    motions = [level, *(replace(level, start_tilt_rad=tilt) for tilt in tilts), level]
+
+    seen = engine.rollouts([world, tilted], motions)
+
+    for row, motion in enumerate(motions):
+        alone = engine.rollout(world, motion)
+        assert np.array_equal(seen.positions_m[row], [alone.positions_m] * 2)
+        turn = product(alone.orientations[0], inverse(np.array(QUARTER)))
+        x, y = motion.start_tilt_rad
+        assert Rotation.from_quat(turn).as_rotvec() == pytest.approx([x, y, 0.0], abs=1e-6)
+        height = clearances_m(world.bodies[0], alone.positions_m[:1], alone.orientations[:1])
+        assert height == pytest.approx(
+            clearances_m(world.bodies[0], np.array([[0, 0, 0.03]]), np.array([QUARTER])), abs=1e-6
+        )
+    assert np.array_equal(seen.positions_m[0], seen.positions_m[-1])
+    assert np.abs(seen.positions_m[1:-1, :, 1] - seen.positions_m[1:-1, :, 0]).max() > 0.005

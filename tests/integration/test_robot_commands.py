@@ -197,6 +197,16 @@ def test_tuned_values_of_an_imported_robot_are_in_its_urdf(gaplab: Gaplab, tuned
     assert "mass(trunk) = 0.9, 95 % interval 0.8 to 1; before 1" in output.read_text()
 
 
+def test_a_tuned_robot_can_be_added_beside_the_one_that_it_was(gaplab: Gaplab, tuned_a1: str, tmp_path: Path) -> None:
+    said = gaplab("simulator", tuned_a1, "-o", str(tmp_path / "tuned.json"))
+    added = gaplab("robot", "add", str(tmp_path / "tuned.json"), "--json")
+
+    assert said.code == 0, said.err
+    assert "Inertia" not in said.out
+    assert json.loads(added.out)["name"] == "a1_tuned"
+    assert [each["name"] for each in json.loads(gaplab("robot", "list", "--json").out)] == ["a1", "a1_tuned"]
+
+
 def test_another_urdf_than_that_of_the_robot_is_refused(gaplab: Gaplab, tuned_a1: str, tmp_path: Path) -> None:
     said = gaplab("simulator", tuned_a1, "-o", str(tmp_path / "t.urdf"), "--from", str(path_of("aliengo/aliengo.urdf")))
 

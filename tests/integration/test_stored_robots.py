@@ -138,7 +138,9 @@ def test_an_unknown_robot_is_told_with_the_names_of_the_stored_ones(store: Store
     stored_robots.add_robot(store, file_of().text)
     specs = {"/experiments": {"strategy": "random", "robot": "wolker"}, "/studies": {"robot": "wolker"}}
     answers = [http.post(path, json=spec) for path, spec in specs.items()]
-    answers.append(http.post("/samples/check?robot=wolker", content="gene_0,value_1\n", headers={"Content-Type": "text/csv"}))
+    answers.append(
+        http.post("/samples/check?robot=wolker", content="gene_0,value_1\n", headers={"Content-Type": "text/csv"})
+    )
 
     for answer in answers:
         (found,) = answer.json()["errors"]
@@ -161,7 +163,7 @@ def test_a_robot_that_the_process_knows_but_that_is_not_stored_is_refused(store:
     robot_library.learn([file_of().text])
     unstored = {"name": "robot_file", "options": {"sha256": file_of().sha256}}
 
-    with pytest.raises(InvalidSpec, match="no robot with the hash .* is stored here"):
+    with pytest.raises(InvalidSpec, match=r"no robot with the hash .* is stored here"):
         submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC | {"robot": unstored}))
 
 

@@ -80,7 +80,11 @@ def reframed(world: Any, turn: Any) -> Any:
     """The same robot, the frame of whose base is turned by `turn` at the start."""
     back = inverse(np.array(turn))
     joints = tuple(
-        replace(joint, origin_m=tuple(rotated(back, np.array(joint.origin_m))), turn=tuple(product(back, np.array(joint.turn))))
+        replace(
+            joint,
+            origin_m=tuple(rotated(back, np.array(joint.origin_m))),
+            turn=tuple(product(back, np.array(joint.turn))),
+        )
         if joint.parent == world.bodies[0].name
         else joint
         for joint in world.joints

@@ -137,3 +137,19 @@ def test_a_recording_has_the_noise_of_its_rollout() -> None:
     fitness = float(ToyFunction().fitness(recording.trajectory))
     assert fitness == simulation(genome[None], noise[None])[0, 0]
     assert fitness != simulation(genome[None], np.zeros((1, 1)))[0, 0]
+
+
+def test_the_start_is_tilted_by_the_genome_and_scaled_by_each_worlds_noise() -> None:
+    little, much = (replace(ROBOT.world, noise=Noise(start_tilt_rad=deviation)) for deviation in (0.05, 0.1))
+    genomes = ROBOT.space.draw(200, np.random.default_rng(1))
+
+    tilts = np.array([disturbed(little, MOTION, genome).start_tilt_rad for genome in genomes])
+    again = np.array([disturbed(much, MOTION, genome).start_tilt_rad for genome in genomes])
+
+    assert tilts.std(axis=0) == pytest.approx(0.05, rel=0.2)
+    np.testing.assert_allclose(again, 2 * tilts, rtol=1e-12)
+    assert disturbed(little, MOTION, genomes[0], 1).start_tilt_rad != tuple(tilts[0])
+    np.testing.assert_array_equal(open_loop(disturbed(little, MOTION, genomes[0])).targets, MOTION.targets)
+    loop = looping()
+    assert disturbed(little, loop.motion(loop.known), genomes[0]).start_tilt_rad == tuple(tilts[0])
+    assert disturbed(little, MOTION, genomes[0]).observed_at(MOTION.observe_s).start_tilt_rad == tuple(tilts[0])

@@ -446,7 +446,7 @@ def test_a_lock_that_fits_no_joint_is_refused(tmp_path: Path, suffix: str) -> No
 
 def test_a_file_that_is_neither_is_refused(tmp_path: Path) -> None:
     (tmp_path / "x.urdf").write_text("hello")
-    with pytest.raises(InvalidRobot, match="Start tag expected.*line 1, column 1$"):
+    with pytest.raises(InvalidRobot, match=r"Start tag expected.*line 1, column 1$"):
         import_robot(tmp_path / "x.urdf", ImportOptions())
 
 
@@ -455,7 +455,11 @@ def test_a_file_that_is_neither_is_refused(tmp_path: Path) -> None:
     [
         ('effort="7"', 'effort="-7"', "line 5: joint hinge: limit effort '-7' is below 0"),
         ('velocity="3"', 'velocity="fast"', "line 5: joint hinge: limit velocity 'fast' is no finite number"),
-        ('lower="-1" upper="2"', 'lower="2" upper="-1"', "line 5: joint hinge has limits 2 to -1; the smaller is first"),
+        (
+            'lower="-1" upper="2"',
+            'lower="2" upper="-1"',
+            "line 5: joint hinge has limits 2 to -1; the smaller is first",
+        ),
         ('xyz="0 1 0"/>', 'xyz="0 1"/>', "line 4: joint hinge: axis xyz '0 1' is not 3 finite numbers"),
         ("</robot>", "<a>" * 300 + "</a>" * 300 + "</robot>", "Excessive depth"),
         ("</robot>", "<b></robot>", "mismatch: b line 5"),

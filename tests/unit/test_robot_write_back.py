@@ -104,7 +104,7 @@ def test_a_urdf_keeps_everything_else_of_its_text(tmp_path: Path) -> None:
 
 def test_a_urdf_keeps_its_namespaces_its_ends_of_lines_and_what_is_after_its_root(tmp_path: Path) -> None:
     text = path_of("a1/a1.urdf").read_text().replace("<robot ", '<robot xmlns:other="http://other.example" ', 1)
-    text = f"<!-- first -->\n<!DOCTYPE robot>\n{text[text.index('<robot '):].rstrip()}\n<!-- last -->\n"
+    text = f"<!-- first -->\n<!DOCTYPE robot>\n{text[text.index('<robot ') :].rstrip()}\n<!-- last -->\n"
     original = tmp_path / "crlf.urdf"
     original.write_bytes(text.replace("\n", "\r\n").encode())
     robot = import_robot(original, ImportOptions()).robot

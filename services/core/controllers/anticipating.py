@@ -42,9 +42,9 @@ class Anticipating(Controller):
     """Pulses as in `square_pulses`, plus a share of the error between the expected and the observed motion.
 
     The expected angle e of a joint follows the pulses' target u, de/dt = (u - e) / `lag_s`, from the joint's start; the
-    expected heading is the first one. With the observed angle q, and the turn ψ about the axis of the base that was
-    upright at the start, summed up from its angular velocity, the target is u + gain (e - q) - heading_gain · ψ · z, where z is 1 for an axis
-    that points upwards, -1 downwards, and 0 for one that is not upright.
+    expected heading is the first one. With the observed angle q, and the turn ψ, summed up from the angular velocity
+    about the axis of the base that is upright at the start, the target is u + gain (e - q) - heading_gain · ψ · z.
+    There z is 1 for an axis that points upwards, -1 downwards, and 0 for one that is not upright.
 
     Joints whose motors follow speeds or torques are not corrected. Genes are those of the pulses.
     """

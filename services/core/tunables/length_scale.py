@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.kinematics import body_poses, clearances_m
+from gaplab.services.core.kinematics import lowest_m
 from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Shape, Sphere, Vector
 from gaplab.services.core.tunables.base import Tunable, lacking, matching
 from gaplab.services.core.tunables.groups import ALL, Pattern
@@ -57,7 +57,8 @@ class LengthScale(Tunable):
         edited = replace(world, bodies=bodies, joints=joints, origin=None, edits=frozenset())
         if world.fixed:
             return edited
-        return replace(edited, start_height_m=world.start_height_m + _lowest_m(world) - _lowest_m(edited))
+        turn = np.array(world.start_turn)
+        return replace(edited, start_height_m=world.start_height_m + lowest_m(world, turn) - lowest_m(edited, turn))
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
         """Return that the robot has no such body."""
@@ -100,11 +101,3 @@ def _sized(shape: Shape, factor: float) -> Shape:
             return Cylinder(radius * factor, length * factor)
         case Hull(points_m=points):
             return Hull(tuple(_times(point, factor) for point in points))
-
-
-def _lowest_m(world: World) -> float:
-    """Return the height of the lowest point that touches the ground, at the start, above the frame of the base."""
-    pose = np.array([[0.0, 0.0, 0.0, *world.start_turn]])
-    positions, turns = body_poses(world, pose, np.array([[joint.start for joint in world.joints]]))
-    touching = [place for place, body in enumerate(world.bodies) if body.touches] or range(len(world.bodies))
-    return min(float(clearances_m(world.bodies[place], positions[:, place], turns[:, place])[0]) for place in touching)

@@ -9,20 +9,28 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.tunables.base import IN_PLACE, Tunable
 from gaplab.services.core.world import World
 
-UNITS = {"target": "", "angle_rad": "rad", "speed_rad_s": "rad/s", "tilt": "1", "turning_rad_s": "rad/s"}
+UNITS = {
+    "target": "",
+    "angle_rad": "rad",
+    "speed_rad_s": "rad/s",
+    "tilt": "1",
+    "turning_rad_s": "rad/s",
+    "start_tilt_rad": "rad",
+}
 """What is noisy, with its unit; that of targets is the motor's."""
 
 
 class NoiseOptions(Frozen):
     """Options of `noise`."""
 
-    of: Literal["target", "angle_rad", "speed_rad_s", "tilt", "turning_rad_s"] = Field(
-        default="target", description="the noisy quantity: targets, or what a controller in a loop observes"
+    of: Literal["target", "angle_rad", "speed_rad_s", "tilt", "turning_rad_s", "start_tilt_rad"] = Field(
+        default="target",
+        description="the noisy quantity: targets, what a controller in a loop observes, or the tilt at the start",
     )
 
 
 class NoiseDeviation(Tunable):
-    """Standard deviation of the noise of targets, or of what a controller in a loop observes."""
+    """Standard deviation of the noise of targets, of what a controller in a loop observes, or of the start."""
 
     name = "noise"
     source = "Jakobi, Husbands and Harvey 1995; the bounds are gaplab's"
@@ -36,6 +44,8 @@ class NoiseDeviation(Tunable):
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
         self.unit = UNITS[self.options.of]
+        if self.options.of == "start_tilt_rad":
+            self.field = "noise.start_tilt_rad"
 
     def read(self, world: World) -> float:
         """Return the standard deviation."""
@@ -45,3 +55,9 @@ class NoiseDeviation(Tunable):
         """Return the world with another standard deviation."""
         changes: dict[str, float] = {self.options.of: float(value)}
         return world.edited(self.field, noise=replace(world.noise, **changes))
+
+    def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
+        """Return that a base that never moves cannot be tilted."""
+        if world.fixed and self.options.of == "start_tilt_rad":
+            return "the base of the robot never moves, so its start has no tilt", tuple(UNITS)[:-1]
+        return None

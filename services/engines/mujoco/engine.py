@@ -36,6 +36,7 @@ IN_PLACE = frozenset(
         "gravity_m_s2",
         "slope_rad",
         "noise",
+        "noise.start_tilt_rad",
     }
 )
 """Fields that are numbers of a compiled model."""

@@ -50,7 +50,7 @@ class Looping:
         commands = _Commands(np.empty((len(run.models), len(at), len(prepared[0].world.actuators))), at)
         delays = grouped([each.delays for each in prepared] * len(loops))
         found = np.empty((len(run.models), len(kept), len(self._states.start)))
-        found[:, kept == 0] = self._states.start
+        found[:, kept == 0] = run.recent[:, -1:]
         now = Continued(run.recent[:, -1], np.zeros((len(run.models), self._controls.width)))
         with self._pool.sensing(run.models[: len(prepared)]):
             for tick, (begin, then) in enumerate(zip(at, [*np.minimum(at[1:], end), end], strict=True)):
@@ -100,7 +100,7 @@ class _Run:
         lags = np.repeat([round(loop.latency_s / step_s) for loop in loops], len(prepared))
         self._length = int(lags.max()) + 1
         self._seen_at = np.arange(len(lags)), self._length - 1 - lags
-        self.recent = np.tile(states.start, (len(lags), self._length, 1))
+        self.recent = np.repeat(states.starts(loops, len(prepared))[:, None], self._length, axis=1)
         self._worlds: dict[Hashable, tuple[World, list[int]]] = {}
         for row, each in enumerate([*prepared] * len(loops)):
             self._worlds.setdefault(_looks(each.world), (each.world, []))[1].append(row)
@@ -123,6 +123,6 @@ class _Run:
 
 
 def _looks(world: World) -> Hashable:
-    """Return what decides the observations of a world, among those of one structure: its slope, and where shapes are."""
+    """Return what observations depend on, of worlds of one structure: the slope, and where shapes are."""
     solids = [body.center_m for body in world.bodies if not isinstance(body.shape, tuple)]
     return world.slope_rad, *solids

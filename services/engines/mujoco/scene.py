@@ -41,7 +41,6 @@ class MuJoCoScene:
         self.controls = Controls(world, self.models.structure)
         self.pool = Pool(mujoco, self.models.structure.model, threads)
         self._rows = ROWS * threads
-        self._starts = np.tile(self.states.start, (self._rows, 1))
         self._looping = Looping(self.pool, self.states, self.controls)
 
     def poses(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> FloatArray:
@@ -63,17 +62,17 @@ class MuJoCoScene:
 
         The torques `(k, joints)`, N·m, are the motors' in the step before; zeros at time 0.
         """
-        observed, chosen = self.steps(motion.observe_s), self.steps(times_s)
+        start, observed, chosen = self.states.starts([motion], 1), self.steps(motion.observe_s), self.steps(times_s)
         steps = max(1, int(observed[-1]))
         (prepared,) = self.models[[world]]
         with self.pool.in_force():
             if isinstance(motion, Motion):
                 controls = self.controls.of([motion], steps, [prepared.delays])
-                after = self.pool.rolled([prepared.model], self._starts[:1], controls)
+                after = self.pool.rolled([prepared.model], start, controls)
             else:
                 controls = np.zeros((1, steps, self.controls.width))
                 after = self._looping.run([prepared], [motion], np.arange(1, steps + 1), controls)
-        states = np.vstack([self.states.start, after[0]])
+        states = np.vstack([start, after[0]])
         looked = states[chosen]
         seen = np.hstack([self.states.base(looked), self.states.angles(looked)])
         torques = self._torques(prepared, controls[0], states)[chosen]
@@ -100,9 +99,10 @@ class MuJoCoScene:
             [motion for motion in motions if isinstance(motion, Motion)], last, [each.delays for each in prepared]
         )
         models = [each.model for each in prepared] * len(motions)
-        states = self.pool.rolled(models, self._starts[: len(models)], controls)
+        starts = self.states.starts(motions, len(prepared))
+        states = self.pool.rolled(models, starts, controls)
         seen = states[:, steps - 1]
-        seen[:, steps == 0] = self.states.start
+        seen[:, steps == 0] = starts[:, None]
         return self._checked(seen, states[:, -1], last)
 
     def _checked(self, seen: FloatArray, last: FloatArray, steps: int) -> FloatArray:

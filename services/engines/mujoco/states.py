@@ -1,10 +1,13 @@
 """MuJoCo's states of a world: time, positions, and speeds."""
 
+from collections.abc import Sequence
 from types import ModuleType
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.kinematics import tilted_pose
+from gaplab.services.core.motions import LEVEL, Loop, Motion
 from gaplab.services.core.observations import Bearing
 from gaplab.services.core.world import World
 from gaplab.services.engines.mujoco.models import Models
@@ -31,11 +34,20 @@ class States:
 
     def __init__(self, mujoco: ModuleType, world: World, models: Models) -> None:
         structure, model = models.structure, models.structure.model
+        self._world = world
         self.start = self._start(mujoco, models)
         self._fixed = np.array((0.0, 0.0, world.start_height_m, *world.start_turn)) if world.fixed else None
         self._speeds_at = POSITIONS + int(model.nq)
         self._angles = consecutive((structure.dofs + structure.ahead + POSITIONS).tolist())
         self._dofs = consecutive((structure.dofs + self._speeds_at).tolist())
+
+    def starts(self, motions: Sequence[Motion | Loop], worlds: int) -> FloatArray:
+        """Return `(n · worlds, state)`: the states at time 0 of n motions, each in as many worlds."""
+        found = np.tile(self.start, (len(motions), 1))
+        for row, motion in zip(found, motions, strict=True):
+            if motion.start_tilt_rad != LEVEL:
+                row[TURNED_POSE] = tilted_pose(self._world, motion.start_tilt_rad)
+        return np.repeat(found, worlds, axis=0)
 
     def base(self, states: FloatArray) -> FloatArray:
         """Return `(..., 7)`: poses of the base in states `(..., state)`."""

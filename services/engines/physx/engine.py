@@ -6,6 +6,7 @@ from types import ModuleType
 from warnings import catch_warnings, simplefilter
 
 from gaplab.schemas.base import Frozen
+from gaplab.services.core.motions import Tilt
 from gaplab.services.core.world import World
 from gaplab.services.engines.physx.scene import PhysXScene, surface_names
 from gaplab.services.engines.physx.shapes import MOST_SURFACES
@@ -26,6 +27,7 @@ IN_PLACE = frozenset(
         "motor.max_torque_nm",
         "motor.position_gain",
         "noise",
+        "noise.start_tilt_rad",
         "surfaces",
     }
 )
@@ -58,8 +60,8 @@ class PhysX(SteppedEngine[PhysXScene]):
     def _build(self, world: World) -> PhysXScene:
         return PhysXScene(self._library, world)
 
-    def _start(self, scene: PhysXScene, world: World) -> Callable[[int], None]:
-        scene.start(world)
+    def _start(self, scene: PhysXScene, world: World, tilt_rad: Tilt) -> Callable[[int], None]:
+        scene.start(world, tilt_rad)
         return scene.step
 
 

@@ -7,14 +7,15 @@ from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.inertias import inertia_of, inverse_inertias
-from gaplab.services.core.kinematics import inverse, rotated
+from gaplab.services.core.kinematics import inverse, rotated, tilted_pose
+from gaplab.services.core.motions import LEVEL, Tilt
 from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.shapes import Quaternion, Vector
 from gaplab.services.core.world import Material, Motor, World
 from gaplab.services.engines.physx.drives import JointDrive, resists
 from gaplab.services.engines.physx.handles import Handle
 from gaplab.services.engines.physx.robot import build_robot, set_masses
-from gaplab.services.engines.physx.shapes import ground_groups, set_offsets
+from gaplab.services.engines.physx.shapes import ground_groups, pose_of, set_offsets
 
 BOUNCE_THRESHOLD_M_S = 0.2
 """Impacts slower than this do not bounce, as in Bullet. PhysX's default, 2 m/s, is faster than walking feet."""
@@ -74,8 +75,8 @@ class PhysXScene:
         for entity in self.robot.entities:
             self._scene.add_entity(entity)
 
-    def start(self, world: World) -> None:
-        """Reset to time 0 of a world.
+    def start(self, world: World, tilt_rad: Tilt = LEVEL) -> None:
+        """Reset to time 0 of a world, with the base tilted about x and y.
 
         PhysX itself drops contacts when bodies are moved. But it solves those of several shapes of a body in an order
         that depends on all earlier contacts in the scene: such a robot moves to a new scene.
@@ -98,6 +99,9 @@ class PhysXScene:
                 set_masses(self.robot.links[body.name], body)
         self._set_joints()
         self._system.unpack(self._initial)
+        if tilt_rad != LEVEL:
+            pose = tilted_pose(world, tilt_rad)
+            self.articulation.root_pose = pose_of(self._sapien, pose[:3].tolist(), pose[3:])
 
     def _set_joints(self) -> None:
         """Set motors, damping, dry friction and armature, and forget those of the last rollout."""

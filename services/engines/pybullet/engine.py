@@ -4,6 +4,7 @@ from collections.abc import Callable
 from importlib import import_module
 
 from gaplab.schemas.base import Frozen
+from gaplab.services.core.motions import Tilt
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS
 from gaplab.services.engines.pybullet.scene import PyBulletScene
@@ -36,6 +37,7 @@ class PyBullet(SteppedEngine[PyBulletScene]):
             "motor.max_torque_nm",
             "motor.position_gain",
             "noise",
+            "noise.start_tilt_rad",
             "slope_rad",
             "surfaces",
         }
@@ -50,7 +52,7 @@ class PyBullet(SteppedEngine[PyBulletScene]):
     def _build(self, world: World) -> PyBulletScene:
         return PyBulletScene(self._bullet, world)
 
-    def _start(self, scene: PyBulletScene, world: World) -> Callable[[int], None]:
-        scene.start(world)
+    def _start(self, scene: PyBulletScene, world: World, tilt_rad: Tilt) -> Callable[[int], None]:
+        scene.start(world, tilt_rad)
         switches = any(each.dynamic_friction < each.static_friction for each in scene.materials.values())
         return StickSlip(scene).step if switches else scene.step

@@ -7,7 +7,8 @@ from weakref import finalize
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import inverse, rotated
+from gaplab.services.core.kinematics import inverse, rotated, tilted_pose
+from gaplab.services.core.motions import LEVEL, Tilt
 from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.shapes import UNTURNED, Quaternion, Vector
 from gaplab.services.core.world import Material, Motor, World
@@ -52,8 +53,8 @@ class PyBulletScene:
         self._set_joints()
         self._initial: int = bullet.saveState(physicsClientId=self.client)
 
-    def start(self, world: World) -> None:
-        """Reset to time 0 of a world, with the static friction of all contacts.
+    def start(self, world: World, tilt_rad: Tilt = LEVEL) -> None:
+        """Reset to time 0 of a world, with the static friction of all contacts, and the base tilted about x and y.
 
         `restoreState` keeps contact points of the last rollout, with their impulses, where a foot ended near its start.
         Far from the ground they are dropped.
@@ -63,6 +64,8 @@ class PyBulletScene:
         bullet.performCollisionDetection(physicsClientId=client)
         bullet.restoreState(self._initial, physicsClientId=client)
         self._become(world)
+        if tilt_rad != LEVEL:
+            self._place(tilted_pose(world, tilt_rad))
         self._torques.reset()
         named = dict(world.surfaces)
         for link, body in self._robot.colliding.items():
@@ -124,6 +127,12 @@ class PyBulletScene:
             if not isinstance(joint.motor, Motor):  # Bullet's motor is the dry friction there
                 torques[number] = self._torques.motor_nm(number)
         return torques
+
+    def _place(self, pose: FloatArray) -> None:
+        """Move the base's frame to a pose `(7,)`; joints keep their angles."""
+        frame = inertial_frame(self.world.bodies[0])
+        position, turn = self.bullet.multiplyTransforms(pose[:3].tolist(), pose[3:].tolist(), *frame)
+        self.bullet.resetBasePositionAndOrientation(self.robot, position, turn, physicsClientId=self.client)
 
     def _states(self, place: int) -> FloatArray:
         """Return one of Bullet's numbers about each joint, `(joints,)`."""
