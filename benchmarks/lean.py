@@ -9,22 +9,20 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 from scipy.stats import kendalltau
 
+from benchmarks.differences import SIGNIFICANT, Difference
 from benchmarks.findings import opened, table_of
+from benchmarks.lean_count import count_table
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.core.strategies import strategies
 from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.results.curves import curves
-from gaplab.services.specs.presets import LEAN_OPTIMIZER, PRESETS
-from gaplab.services.specs.resolution import resolve_study, takes_samples
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.store.queries import experiments
 from gaplab.services.store.session import Store
 
@@ -32,44 +30,8 @@ SHARE = 0.03
 """Margin of equivalence, as a share of the mean fitness of the paper's `direct`."""
 
 COUNTS = (1, 3, 5)
-SIGNIFICANT = 0.05
-LEAN = PRESETS["lean"]
-WEIGHTIEST = [
-    {"name": ref.name, "options": dict(strategies[ref.name].lean)} for ref in StudySpec().strategies
-]  # fmt: skip
-
-PARTS: Mapping[str, Mapping[str, Any]] = {
-    "paper": {},
-    "controllers alone": {
-        "budget": {
-            "controller_evaluations": LEAN.controller_evaluations,
-            "selection_evaluations": LEAN.selection_evaluations,
-        },
-        "controller_optimizer": LEAN_OPTIMIZER,
-    },
-    "tunings alone": {
-        "budget": {"simulator_evaluations": LEAN.simulator_evaluations},
-        "tuner": {"name": "search", "options": {"warm_start": True}},
-    },
-    "simulators of most weight alone": {"strategies": WEIGHTIEST},
-    "lean": {"budget": "lean"},
-}
-"""Each part of `lean` alone, between the whole budgets."""
-
-
-def rollouts(part: Mapping[str, Any]) -> int:
-    """Return the rollouts of Fig. 4: six strategies with 40 repetitions of 10 iterations, and 100 of `direct`."""
-    resolved = resolve_study(StudySpec.model_validate({"direct_repetitions": 100, **part}))
-    return sum(expected_rollouts(each) * each.repetitions for each in resolved)
-
-
-def count_table() -> Table:
-    """Return the rollouts of Fig. 4 with each part."""
-    table = table_of("Rollouts of the whole of Fig. 4", ("budget", "rollouts", "of paper"))
-    whole = rollouts(PARTS["paper"])
-    for name, part in PARTS.items():
-        table.add_row(name, f"{rollouts(part):,}", f"{rollouts(part) / whole:.4f}")
-    return table
+COLUMNS = "strategy", "after", "n", "difference", "test", "p", "shown if 0", "verdict"
+"""Of the table of differences; *shown if 0* is the probability that a true difference of 0 is shown to be within."""
 
 
 class World(NamedTuple):
@@ -141,7 +103,11 @@ def margin_of(store: Store, side: Sides, direct: float | None) -> float:
 
 
 def equivalence_rows(store: Store, side: Sides, margin: float) -> Iterator[tuple[str, ...]]:
-    """Yield the difference of `lean` from `paper` for each strategy and count, and two one-sided tests of it."""
+    """Yield the difference of `lean` from `paper` for each strategy and count, and two one-sided tests of it.
+
+    The last rows are of the mean of the differences of all strategies, which has a smaller error than each.
+    """
+    differences: dict[int, list[Difference]] = defaultdict(list)
     for name in side.both:
         pair = [side.lean[name], side.paper[name]]
         known = means(store, pair)
@@ -152,7 +118,27 @@ def equivalence_rows(store: Store, side: Sides, margin: float) -> Iterator[tuple
             interval = f"{_number(one.difference)} ({_number(one.lower)} to {_number(one.upper)})"
             sizes = f"{one.n_first}, {one.n_second}"
             p = "-" if one.equivalence.p is None else f"{one.equivalence.p:.2g}"
-            yield name, str(count), sizes, interval, one.equivalence.test, p, one.equivalence.verdict.value
+            found = Difference.of(one.difference, one.lower, one.upper)
+            if count and found is not None:
+                differences[count].append(found)
+            chance = "-" if found is None else f"{found.chance(margin):.2f}"
+            yield name, str(count), sizes, interval, one.equivalence.test, p, chance, one.equivalence.verdict.value
+    for count, each in sorted(differences.items()):
+        if len(each) > 1:
+            mean = Difference.mean(each)
+            p_mean = mean.p(margin)
+            verdict = "equivalent" if p_mean < SIGNIFICANT else "undecided"
+            interval = f"{mean.value:.3f} ({mean.value - mean.half:.3f} to {mean.value + mean.half:.3f})"
+            yield (
+                f"mean of {len(each)}",
+                str(count),
+                "",
+                interval,
+                "z",
+                f"{p_mean:.2g}",
+                f"{mean.chance(margin):.2f}",
+                verdict,
+            )
 
 
 def ranking_rows(store: Store, side: Sides) -> Iterator[tuple[str, ...]]:
@@ -201,7 +187,7 @@ def judge(store: Store, ids: Iterable[str], direct: float | None) -> Iterator[Ta
     for world, side in worlds.items():
         margin = margin_of(store, side, direct)
         title = f"lean − paper, 90 % intervals; two one-sided tests of ±{margin:.3g}\n{world.robot} in {world.engine}"
-        table = table_of(title, ("strategy", "after", "n", "difference", "test", "p", "verdict"))
+        table = table_of(title, COLUMNS)
         for row in equivalence_rows(store, side, margin):
             table.add_row(*row)
         yield table

@@ -29,7 +29,8 @@ SPEC = ExperimentSpec.model_validate(
     }
 )
 CORES = 2
-LOOK_S = 0.05
+LOOK_S = 0.5
+"""Interval between looks at the progress: each takes 10 ms of the cores that the experiment needs."""
 
 
 @contextmanager

@@ -35,7 +35,7 @@ def study_row(study: Study, label: str, link: str) -> tuple[str, ...]:
     spec = study.arms[0].spec
     budget, reality = spec.budget, study.arms[0].read.spec["reality"]
     sizes = budget.controller_evaluations, budget.selection_evaluations, budget.simulator_evaluations
-    shares = [f"{100 * size / full:.2g} %" for size, full in zip(sizes, paper.EVALUATIONS, strict=True)]
+    shares = [f"{100 * size / full:.3g} %" for size, full in zip(sizes, paper.EVALUATIONS, strict=True)]
     reused = "; transfers reused" if budget.reuse_transfer else ""
     truth = ", ".join(
         f"{spoken(name).lower()} {'hidden' if value is None else value}"

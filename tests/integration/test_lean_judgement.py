@@ -76,6 +76,11 @@ def test_curves_that_are_the_same_are_equivalent_and_ranked_alike(judged: Judged
     assert "1, 1; 1 in both, 0 opposite" in text
 
 
+def test_the_mean_of_all_strategies_is_judged_too(judged: Judged) -> None:
+    assert verdicts(judged(LEAN), "mean of 2") == ["equivalent"] * 3
+    assert verdicts(judged(moved("random", -0.2)), "mean of 2") == ["undecided"] * 3
+
+
 def test_a_curve_beyond_the_margin_is_different_and_the_others_stay_equivalent(judged: Judged) -> None:
     text = judged(moved("simulated_fit", -0.06))
 
