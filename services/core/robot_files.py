@@ -98,10 +98,24 @@ class RobotFile(Frozen):
 
 
 def read_robot_file(text: str | bytes) -> RobotFile:
-    """Return the robot of a file's text.
+    """Return the robot of a file's text, checked.
 
     Raises:
         InvalidSpec: with every violation; pointers are places in the file.
+    """
+    robot = stored_robot_file(text)
+    if violations := tuple(world_violations(robot.world, "/world")):
+        raise InvalidSpec(violations)
+    return robot
+
+
+def stored_robot_file(text: str | bytes) -> RobotFile:
+    """Return the robot of a text that was checked when it was stored.
+
+    Its world is not checked again: a robot whose experiments are stored stays readable if later checks are stricter.
+
+    Raises:
+        InvalidSpec: it is no robot file.
     """
     if len(text) > MOST_BYTES:
         message = f"the robot file has {len(text):,} bytes, but at most {MOST_BYTES:,} are permitted"
@@ -112,12 +126,9 @@ def read_robot_file(text: str | bytes) -> RobotFile:
         raise InvalidSpec([Violation("", None, f"the robot file is no JSON: {error}", "JSON in UTF-8")]) from error
     _refuse_edits(content)
     try:
-        robot = RobotFile.model_validate_json(text)
+        return RobotFile.model_validate_json(text)
     except ValidationError as error:
         raise InvalidSpec(_violations(error, content)) from error
-    if violations := tuple(world_violations(robot.world, "/world")):
-        raise InvalidSpec(violations)
-    return robot
 
 
 def _refuse_edits(content: Any) -> None:  # noqa: ANN401 - any JSON

@@ -10,7 +10,7 @@ from typing import Protocol
 from weakref import WeakSet
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.robot_files import RobotFile, read_robot_file
+from gaplab.services.core.robot_files import RobotFile, stored_robot_file
 
 IMPORTED = "robot_file"
 """Name of the plug-in of all robots from files."""
@@ -37,13 +37,13 @@ def add_source(source: Source) -> None:
 
 
 def learn(texts: Iterable[str]) -> None:
-    """Remember robot files, which another process sent.
+    """Remember robot files that a store or another process of gaplab had, and so checked.
 
     Raises:
         InvalidSpec: one is no robot file.
     """
     for text in texts:
-        _remember(read_robot_file(text))
+        _remember(stored_robot_file(text))
 
 
 def robot_file(sha256: str) -> RobotFile | None:

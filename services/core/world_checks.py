@@ -105,7 +105,7 @@ def _shape_checks(shape: Shape, place: str) -> Iterator[_Check]:
     elif isinstance(shape, Hull):
         count = len(shape.points_m)
         ends = np.ptp(np.array(shape.points_m), axis=0) if count else np.zeros(1)
-        permitted = f"points at most {SMALLEST_HULL_M:g} to {LONGEST_M:g} m apart along an axis"
+        permitted = f"{SMALLEST_HULL_M:g} to {LONGEST_M:g} m long along the longest axis"
         yield f"{place}/points_m", float(ends.max()), SMALLEST_HULL_M <= ends.max() <= LONGEST_M, permitted
         yield f"{place}/points_m", count, 4 <= count <= MOST_VERTICES, f"4 to {MOST_VERTICES} points"
         yield f"{place}/points_m", count, count < 4 or _has_volume(shape), "points that enclose a volume"

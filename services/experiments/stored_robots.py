@@ -12,7 +12,7 @@ from gaplab.schemas.spec import SharedSettings
 from gaplab.services.core import robot_library
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, gather, unknown_name
-from gaplab.services.core.robot_files import RobotFile, read_robot_file
+from gaplab.services.core.robot_files import RobotFile, read_robot_file, stored_robot_file
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.core.sample_tables import read_samples
@@ -56,7 +56,7 @@ def _insert(session: Session, file: RobotFile) -> RobotRead:
 @snapshot
 def list_robots(session: Session) -> tuple[RobotRead, ...]:
     """Return all stored robots, by name, the newest of a name first."""
-    return tuple(_view(row, read_robot_file(row.text)) for row in rows.all_(session))
+    return tuple(_view(row, stored_robot_file(row.text)) for row in rows.all_(session))
 
 
 @snapshot
@@ -137,8 +137,13 @@ def _with_stored_names(store: Store, violation: Violation) -> Violation:
     plugins = violation.permitted
     if violation.pointer != "/robot" or isinstance(plugins, str) or IMPORTED not in (plugins or ()):
         return violation
-    names = {*robots, *(each.name for each in list_robots(store))} - {IMPORTED}
+    names = {*robots, *_stored_names(store)} - {IMPORTED}
     return unknown_name("/robot", "robot", str(violation.value), sorted(names))
+
+
+@snapshot
+def _stored_names(session: Session) -> tuple[str, ...]:
+    return rows.names(session)
 
 
 @snapshot

@@ -8,7 +8,7 @@ import numpy as np
 from gaplab.schemas.replays import Framing
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
-from gaplab.services.core.robot_files import read_robot_file
+from gaplab.services.core.robot_files import stored_robot_file
 from gaplab.services.core.robots import robots
 from gaplab.services.core.world import World
 from gaplab.services.experiments import stored_robots
@@ -35,7 +35,7 @@ def robot_picture(drawing: RolloutProcess, store: Store, name: str, *, dark: boo
         LimitReached: too many callers wait.
     """
     own = robots[name].example().world if name in robots else None
-    world = own if own is not None else read_robot_file(stored_robots.robot_text(store, name)).world
+    world = own if own is not None else stored_robot_file(stored_robots.robot_text(store, name)).world
     if not world.bodies:
         raise NotFound(f"the robot {name!r} has no body, so there is no picture of it")
     return world_picture(drawing, world, dark=dark, width_px=width_px)

@@ -12,7 +12,7 @@ from gaplab import migrations
 from gaplab.api.app import create_app
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import export_experiment, import_archive
-from gaplab.services.core import robot_library
+from gaplab.services.core import robot_library, world_checks
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.robot_files import RobotFile, read_robot_file
@@ -196,6 +196,23 @@ def test_a_spec_whose_robot_is_gone_says_so(store: Store) -> None:
 
     with pytest.raises(InvalidSpec, match="the robot 'lost' with the hash"):
         setting(spec, 0)
+
+
+def test_a_stored_robot_stays_usable_where_later_checks_would_refuse_it(
+    store: Store, http: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    robot_library._known.clear()
+    monkeypatch.setattr(world_checks, "MOST_BODIES", 3)
+
+    assert [each["name"] for each in http.get("/robots").json()] == ["walker"]
+    assert {each["name"]: each["available"] for each in http.get("/catalogue").json()["robots"]}["walker"]
+    assert http.get("/catalogue/robots/walker/picture").headers["content-type"] == "image/png"
+    with store.reading() as session:
+        assert next(repetition(setting(spec_to_run(session.get_one(ExperimentRow, made.id).spec), 0)))
+    with pytest.raises(InvalidSpec, match="1 to 3 bodies"):
+        stored_robots.add_robot(store, file_of("another").text)
 
 
 def test_a_robot_whose_usual_task_is_gone_is_unavailable_in_the_catalogue(store: Store, http: TestClient) -> None:

@@ -28,6 +28,11 @@ def all_(session: Session) -> list[RobotRow]:
     return list(session.scalars(select(RobotRow).order_by(RobotRow.name, RobotRow.created_at.desc(), RobotRow.sha256)))
 
 
+def names(session: Session) -> tuple[str, ...]:
+    """Return the names of all robots, sorted."""
+    return tuple(session.scalars(select(RobotRow.name).distinct().order_by(RobotRow.name)))
+
+
 def put(session: Session, sha256: str, name: str, text: str) -> RobotRow:
     """Insert a robot file unless it is there, and return its row; it is the newest of its name now."""
     values = {"sha256": sha256, "name": name, "text": text}
