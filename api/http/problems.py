@@ -24,6 +24,7 @@ from gaplab.services.core.errors import (
     Forbidden,
     GaplabError,
     InvalidArchive,
+    InvalidRobotFile,
     InvalidSpec,
     KeyReused,
     LimitReached,
@@ -42,6 +43,7 @@ MEDIA_TYPE = "application/problem+json"
 
 KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     InvalidSpec: (422, "invalid-spec", "The spec is invalid"),
+    InvalidRobotFile: (422, "invalid-robot-file", "The robot file is invalid"),
     NotFound: (404, "not-found", "Not found"),
     Conflict: (409, "conflict", "The present state forbids this"),
     Changed: (412, "changed", "It was changed in the meantime"),

@@ -76,6 +76,10 @@ class InvalidSpec(GaplabError):
         super().__init__("; ".join(f"{each.pointer or '/'}: {each.message}" for each in self.violations))
 
 
+class InvalidRobotFile(InvalidSpec):
+    """A robot file that cannot be stored, with all its violations."""
+
+
 class NotFound(GaplabError):
     """No object has this name or id."""
 

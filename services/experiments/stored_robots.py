@@ -11,7 +11,7 @@ from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.spec import SharedSettings
 from gaplab.services.core import robot_library
 from gaplab.services.core.controllers import controllers
-from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, gather, unknown_name
+from gaplab.services.core.errors import InvalidRobotFile, InvalidSpec, NotFound, Violation, gather, unknown_name
 from gaplab.services.core.robot_files import RobotFile, read_robot_file, stored_robot_file
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
@@ -32,9 +32,18 @@ def add_robot(store: Store, text: str | bytes) -> RobotRead:
     """Store a robot file, unless it is stored already, and return what it is; its name now means this robot.
 
     Raises:
-        InvalidSpec: it is no robot file, a plug-in has its name, or its usual controller or task cannot drive and rate
-            it; with every violation.
+        InvalidRobotFile: it is no robot file, a plug-in has its name, or its usual controller or task cannot drive and
+            rate it; with every violation.
     """
+    try:
+        file = _checked(text)
+    except InvalidSpec as error:
+        raise InvalidRobotFile(error.violations) from error
+    return _insert(store, file)
+
+
+def _checked(text: str | bytes) -> RobotFile:
+    """Return the robot of a file that can be stored."""
     file = read_robot_file(text)
     if file.name in robots:
         message = f"gaplab has a robot {file.name!r} already; choose another name"
@@ -45,7 +54,7 @@ def add_robot(store: Store, text: str | bytes) -> RobotRead:
     )
     robot_library.learn([file.text])
     robots.create(_ref(file.sha256, file.name))
-    return _insert(store, file)
+    return file
 
 
 @transaction

@@ -110,6 +110,7 @@ def test_a_robot_cannot_have_the_name_of_a_plug_in_or_a_controller_that_is_not_t
     unknown = {"usual_controller": {"name": "wings", "options": {}}, "usual_task": {"name": "fly", "options": {}}}
     winged = http.post("/robots", json=file_of().content | unknown).json()
 
+    assert taken["title"] == winged["title"] == "The robot file is invalid"
     assert "gaplab has a robot 'quadruped' already" in taken["errors"][0]["message"]
     assert [each["pointer"] for each in winged["errors"]] == ["/usual_controller", "/usual_task"]
     assert "wings" in winged["errors"][0]["message"]
