@@ -8,6 +8,7 @@ from rich.table import Table
 from benchmarks.findings import table_of
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tuners import tuners
 from gaplab.services.specs.presets import LEAN_OPTIMIZER, PRESETS
 from gaplab.services.specs.resolution import resolve_study
 from gaplab.services.specs.rollouts import expected_rollouts
@@ -26,10 +27,7 @@ PARTS: Mapping[str, Mapping[str, Any]] = {
         },
         "controller_optimizer": LEAN_OPTIMIZER,
     },
-    "tunings alone": {
-        "budget": {"simulator_evaluations": LEAN.simulator_evaluations},
-        "tuner": {"name": "search", "options": {"warm_start": True}},
-    },
+    "tunings alone": {"tuner": {"name": "search", "options": dict(tuners["search"].lean)}},
     "simulators of most weight alone": {"strategies": WEIGHTIEST},
     "lean": {"budget": "lean"},
 }

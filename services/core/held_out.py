@@ -22,6 +22,11 @@ def is_held_out(number: int, share: float) -> bool:
     return int(number * share + ROUNDING) > int((number - 1) * share + ROUNDING)
 
 
+def seen_of(samples: int, share: float) -> int:
+    """Return how many of the first samples tuning sees."""
+    return sum(not is_held_out(number, share) for number in range(1, samples + 1))
+
+
 def split(samples: Sequence[Sample], share: float) -> tuple[tuple[Sample, ...], tuple[Sample, ...]]:
     """Return the samples that tuning sees, and those that it does not see.
 

@@ -202,12 +202,12 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     Samples that are held out are not tuned on: the best simulator is tested on them. The budget includes samples that
     are no lessons or whose measurement failed; their rollouts count as saved.
     """
-    strategy, evaluations = setting.strategy, setting.budget.simulator_evaluations
+    strategy = setting.strategy
     if not strategy.tunes:
         return Tuned(iteration, history.simulators)
-    known = setting.known_samples
-    seen, unseen = split(history.samples[len(known) :], setting.held_out)
-    seen = known + seen
+    seen, unseen = split(history.samples[len(setting.known_samples) :], setting.held_out)
+    seen = setting.known_samples + seen
+    evaluations = setting.budget.simulator_evaluations // setting.tuner.divisor(len(seen))
     ensemble, budget = strategy.ensemble, evaluations * len(seen) + len(unseen)
     if _keeps(setting, history):
         return Tuned(iteration, history.simulators, Cost(saved=budget))

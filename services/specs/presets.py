@@ -42,7 +42,7 @@ PRESETS: dict[BudgetName, Preset] = {
     "desk": Preset(5, 8, 500, 150, 200),
     "paper": PAPER,
     # the whole Fig. 4 at a tenth of the rollouts: docs/lean.md
-    "lean": Preset(10, 40, 1_350, 1_350, 300, lean=True),
+    "lean": Preset(10, 40, 1_350, 1_350, 2_000, lean=True),
     "as_published": replace(PAPER, as_published=True),
 }
 

@@ -12,6 +12,7 @@ from gaplab.services.core.controllers import controllers
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
+from gaplab.services.core.held_out import seen_of
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Registry
@@ -31,6 +32,7 @@ from gaplab.services.specs.realities import completed, physical_reality, simulat
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.tunables import shared_fields, with_bounds, with_usual_tunables
 from gaplab.services.specs.violations import (
+    Searches,
     budget_violations,
     engine_violations,
     reality_violations,
@@ -65,7 +67,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     real = simulated if physical else spec.reality.engine or simulated
     place = "/reality/engine" if spec.reality.engine and not physical else "/engine"
     engine, reality_engine = gather(lambda: _engine(simulated, robot, "/engine"), lambda: _engine(real, robot, place))
-    budget = _budget(spec, preset)
+    budget, iterations = _budget(spec, preset), spec.iterations or preset.iterations
+    divisor = tuner.divisor(seen_of(iterations, spec.held_out) + len(spec.reality.samples))
     if violations := [
         *engine_violations(robot, {reality_engine: "/reality/engine", engine: "/engine"}),
         *tunable_violations(spec, robot, engine),
@@ -73,14 +76,14 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, robot, simulated=engine, engine=reality_engine),
         *bench_violations(spec, robot),
-        *budget_violations(budget, strategy, len(spec.tunables), controllers=controllers, simulators=simulators),
+        *budget_violations(budget, strategy, len(spec.tunables), Searches(controllers, simulators, divisor)),
     ]:
         raise InvalidSpec(violations)
     return ResolvedSpec(
         priority=spec.priority,
         max_parallel=spec.max_parallel,
         name=spec.name or _label(strategy),
-        iterations=spec.iterations or preset.iterations,
+        iterations=iterations,
         repetitions=spec.repetitions or preset.repetitions,
         **{each.kind: (ref := getattr(spec, each.kind)) and completed(each, ref) for each in NEED_NO_OTHERS},
         controller_optimizer=completed(optimizers, spec.controller_optimizer or spec.optimizer),

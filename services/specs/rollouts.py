@@ -2,8 +2,9 @@
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.controller_search import Allowance
-from gaplab.services.core.held_out import is_held_out
+from gaplab.services.core.held_out import seen_of
 from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tuners import tuners
 
 
 def expected_rollouts(spec: ResolvedSpec) -> int:
@@ -14,16 +15,18 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
     """
     strategy, tunables = strategies.create(spec.strategy), len(spec.tunables)
     budget, iterations = spec.budget, spec.iterations if strategy.takes_samples else 0
-    knows = bool(spec.reality.samples)
+    known = bool(spec.reality.samples)
     selections = sum(
-        Allowance.of_selection(strategy, budget.selection_evaluations, tunables, learned=number > 1 or knows).rollouts
+        Allowance.of_selection(strategy, budget.selection_evaluations, tunables, learned=number > 1 or known).rollouts
         for number in range(1, iterations + 1)
     )
     transfer = Allowance.of_transfer(strategy, budget.controller_evaluations, tunables)
-    tuning = sum(
-        (iterations + 1 - number) * (1 if is_held_out(number, spec.held_out) else budget.simulator_evaluations)
-        for number in range(1, iterations + 1)
-    )
-    tuning += len(spec.reality.samples) * (iterations + 1) * budget.simulator_evaluations
-    tuned = tuning if strategy.tunes else 0
+    tuned = sum(_of_tuning(spec, number) for number in range(iterations + 1)) if strategy.tunes else 0
     return transfer.rollouts * (iterations + 1) + selections + tuned
+
+
+def _of_tuning(spec: ResolvedSpec, iteration: int) -> int:
+    """Return the rollouts of the tuning of an iteration, with the tests on samples that are held out."""
+    seen = seen_of(iteration, spec.held_out)
+    samples, tests = seen + len(spec.reality.samples), iteration - seen
+    return spec.budget.simulator_evaluations // tuners.create(spec.tuner).divisor(samples) * samples + tests

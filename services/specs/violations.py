@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from gaplab.schemas.plugin import TunableRef
 from gaplab.schemas.resolved import ResolvedBudget
@@ -175,8 +176,22 @@ def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[V
         yield Violation("/reality/probes", reality.probes, message, ["each", "last"])
 
 
+class Searches(NamedTuple):
+    """What the searches of a spec are made with.
+
+    Attributes:
+        controllers: optimizer of controllers.
+        simulators: optimizer of simulators.
+        divisor: number that divides the evaluations of the last tuning.
+    """
+
+    controllers: Optimizer
+    simulators: Optimizer
+    divisor: int
+
+
 def budget_violations(
-    budget: ResolvedBudget, strategy: Strategy, tunables: int, *, controllers: Optimizer, simulators: Optimizer
+    budget: ResolvedBudget, strategy: Strategy, tunables: int, searches: Searches
 ) -> Iterator[Violation]:
     """Yield searches whose budget is smaller than the population that they start with.
 
@@ -184,21 +199,25 @@ def budget_violations(
         budget: with every number.
         strategy: selects and transfers.
         tunables: number of tunables.
-        controllers: optimizer of controllers.
-        simulators: optimizer of simulators.
+        searches: optimizers, and what divides their evaluations.
     """
-    least = controllers.least_evaluations
-    tuner = simulators.diverse(strategy.ensemble) if strategy.ensemble > 1 else simulators
-    needed = {"controller_evaluations": (budget.controller_evaluations, least, strategy.transfer_simulators(tunables))}
+    least, shared = searches.controllers.least_evaluations, strategy.equal_rollouts
+    tuner = searches.simulators.diverse(strategy.ensemble) if strategy.ensemble > 1 else searches.simulators
+    transfer = strategy.transfer_simulators(tunables) if shared else 1
+    needed = {"controller_evaluations": (budget.controller_evaluations, least, transfer, "simulators")}
     if strategy.searches and strategy.takes_samples:
-        selection = strategy.selection_simulators(tunables)
-        needed["selection_evaluations"] = (budget.selection_evaluations, least, selection)
+        selection = strategy.selection_simulators(tunables) if shared else 1
+        needed["selection_evaluations"] = (budget.selection_evaluations, least, selection, "simulators")
     if strategy.tunes and strategy.takes_samples:
-        needed["simulator_evaluations"] = (budget.simulator_evaluations, tuner.least_evaluations, 1)
-    for name, (given, population, count) in needed.items():
-        shared = strategy.equal_rollouts and count > 1
-        minimum = population * count if shared else population
+        needed["simulator_evaluations"] = (
+            budget.simulator_evaluations,
+            tuner.least_evaluations,
+            searches.divisor,
+            "samples",
+        )
+    for name, (given, population, count, what) in needed.items():
+        minimum = population * count
         if given < minimum:
             message = f"{given} evaluations do not fill the population of {population} that the search starts with"
-            message += f"; equal_rollouts divides them by {count} simulators" if shared else ""
+            message += f"; equal_rollouts divides them by {count} {what}" if count > 1 else ""
             yield Violation(f"/budget/{name}", given, message, f"at least {minimum}")

@@ -22,7 +22,8 @@ from gaplab.services.store.stored_specs import complete
 from tests.fakes import flat, small_setting
 
 DIVERSE = sorted(name for name, each in strategies.items() if issubclass(each, Diverse))
-WARM = SearchTuner(SearchOptions(warm_start=True))
+TUNER = SearchTuner(SearchOptions(equal_rollouts=True))
+OFF = {"warm_start": False, "equal_rollouts": False}
 
 
 def resolved(**spec: Any) -> ResolvedSpec:
@@ -35,7 +36,7 @@ def lean_setting(strategy: Any, **changes: Any) -> Any:
     """A small repetition with every part of `lean`."""
     options = {"simulators": 6, "weightiest": 3} if strategy in DIVERSE else {}
     controllers = CmaEs(CmaEsOptions(members=5))
-    return small_setting(strategy, options, controller_optimizer=controllers, tuner=WARM, **changes)
+    return small_setting(strategy, options, controller_optimizer=controllers, tuner=TUNER, **changes)
 
 
 class TestPreset:
@@ -45,7 +46,7 @@ class TestPreset:
             spec = resolved(strategy=name, budget=preset)
 
             assert spec.strategy.options["weightiest"] is None
-            assert spec.tuner == PluginRef(name="search", options={"warm_start": False})
+            assert spec.tuner == PluginRef(name="search", options=OFF)
             assert spec.controller_optimizer == spec.optimizer == resolved().optimizer
 
     def test_lean_sets_every_part(self) -> None:
@@ -54,7 +55,7 @@ class TestPreset:
         assert (spec.iterations, spec.repetitions) == (10, 40)
         assert spec.controller_optimizer.name == "cma_es"
         assert spec.optimizer == resolved().optimizer
-        assert spec.tuner.options == {"warm_start": True}
+        assert spec.tuner.options == {"warm_start": False, "equal_rollouts": True}
         assert spec.strategy.options["weightiest"] == 10
         assert resolved(budget="lean", strategy="simulated_fit").strategy.options == {}
 
@@ -62,12 +63,12 @@ class TestPreset:
         spec = resolved(
             budget="lean",
             controller_optimizer="steady_state",
-            tuner={"name": "search", "options": {"warm_start": False}},
+            tuner={"name": "search", "options": OFF},
             strategy={"name": "informative", "options": {"weightiest": None, "simulators": 5}},
         )
 
         assert spec.controller_optimizer == resolved().optimizer
-        assert spec.tuner.options == {"warm_start": False}
+        assert spec.tuner.options == OFF
         assert (spec.strategy.options["weightiest"], spec.strategy.options["simulators"]) == (None, 5)
 
     def test_another_tuner_stays_as_it_is(self) -> None:
@@ -106,9 +107,9 @@ class TestPreset:
             for budget in ("lean", "paper")
         )
 
-        fit = (10 + 11) * 1_350 + 300 * 55
+        fit = (10 + 11) * 1_350 + sum(2_000 // samples * samples for samples in range(1, 11))
         weighed = fit + (19 + 9 * 9) * 1_350  # the first selection is in 20 simulators, nine are in 10
-        assert lean == 40 * (2 * fit + 2 * weighed + 2 * (fit - 10 * 1_350)) + 100 * 1_350 == 20_619_000
+        assert lean == 40 * (2 * fit + 2 * weighed + 2 * (fit - 10 * 1_350)) + 100 * 1_350 == 21_456_360
         assert lean / paper < 0.1
 
 

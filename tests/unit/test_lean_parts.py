@@ -26,7 +26,7 @@ from gaplab.services.specs.rollouts import expected_rollouts
 from tests.fakes import Recorder, flat, paraboloid, small_setting
 
 DIVERSE = sorted(name for name, each in strategies.items() if issubclass(each, Diverse))
-TINY = {"preset": "lean", "controller_evaluations": 30, "selection_evaluations": 20, "simulator_evaluations": 25}
+TINY = {"preset": "lean", "controller_evaluations": 30, "selection_evaluations": 20, "simulator_evaluations": 75}
 WARM = SearchTuner(SearchOptions(warm_start=True))
 
 
@@ -161,6 +161,47 @@ class TestWarmStart:
         )
 
         assert flat(next(repetition(warm))) == flat(next(repetition(scratch)))
+
+
+class TestEqualRollouts:
+    TUNER = SearchTuner(SearchOptions(equal_rollouts=True))
+
+    def test_each_tuning_takes_as_many_rollouts_as_that_on_one_sample(self) -> None:
+        steps = repetition(small_setting("simulated_fit", tuner=self.TUNER, iterations=4))
+
+        spent = [step.cost.rollouts + step.cost.saved for step in steps if isinstance(step, Tuned)]
+
+        assert spent == [0, 50, 50, 48, 48]
+
+    def test_the_estimate_is_what_is_spent(self) -> None:
+        spec = {
+            "strategy": "random",
+            "robot": "toy_function",
+            "iterations": 5,
+            "repetitions": 1,
+            "held_out": 0.4,
+            "budget": {"preset": "smoke", "simulator_evaluations": 100},
+            "tuner": {"name": "search", "options": {"equal_rollouts": True}},
+        }
+        resolved = resolve_experiment(ExperimentSpec.model_validate(spec))
+
+        costs = [step.cost for step in repetition(setting(resolved, 0)) if hasattr(step, "cost")]
+
+        assert sum(each.rollouts + each.saved for each in costs) == expected_rollouts(resolved)
+
+    def test_too_few_evaluations_for_the_last_tuning_are_refused(self) -> None:
+        spec = {
+            "strategy": "random",
+            "robot": "toy_function",
+            "budget": {"preset": "paper", "simulator_evaluations": 150},
+            "tuner": {"name": "search", "options": {"equal_rollouts": True}},
+        }
+        with pytest.raises(InvalidSpec, match="equal_rollouts divides them by 10 samples") as refused:
+            resolve_experiment(ExperimentSpec.model_validate(spec))
+
+        (violation,) = refused.value.violations
+        assert violation.pointer == "/budget/simulator_evaluations"
+        assert violation.permitted == "at least 200"
 
 
 class TestWeightiest:

@@ -49,6 +49,10 @@ class Tuner(Plugin):
     def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
         """Return `task.ensemble` simulators, the best estimate first."""
 
+    def divisor(self, samples: int) -> int:  # noqa: ARG002 - for those that need it
+        """Return the number that divides the evaluations of a tuning on some samples, by default 1."""
+        return 1
+
     @classmethod
     def details(cls) -> dict[str, Any]:
         """Return whether it needs a sum of squares, and whether it gives intervals, for the catalogue."""
