@@ -4,12 +4,13 @@ With each of them, all strategies select their samples from searches of equal si
 changes that: docs/decisions/a-fair-comparison.md.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import BudgetName, ExperimentSpec
-from gaplab.services.core.registry import Registry
+from gaplab.services.core.registry import Plugin, Registry
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners import tuners
 
@@ -53,19 +54,25 @@ LEAN_OPTIMIZER = PluginRef(name="cma_es")
 def with_preset(spec: ExperimentSpec) -> ExperimentSpec:
     """Return the spec with the plug-ins and options that its preset sets, where the spec does not give them."""
     preset = PRESETS[spec.budget.preset]
-    if preset.as_published:
-        return spec.model_copy(update={"strategy": _with(spec.strategy, strategies, "published")})
-    if not preset.lean:
+    if not (preset.as_published or preset.lean):
         return spec
-    changes = {
-        "strategy": _with(spec.strategy, strategies, "lean"),
-        "tuner": _with(spec.tuner, tuners, "lean"),
-        "controller_optimizer": spec.controller_optimizer or LEAN_OPTIMIZER,
+    changes: dict[str, Any] = {
+        "strategy": _with(preset, spec.strategy, strategies),
+        "tuner": _with(preset, spec.tuner, tuners),
     }
+    if preset.lean:
+        changes["controller_optimizer"] = spec.controller_optimizer or LEAN_OPTIMIZER
     return spec.model_copy(update=changes)
 
 
-def _with(ref: PluginRef, registry: Registry[Any], attribute: str) -> PluginRef:
-    """Return a plug-in with the options in an attribute of its class, under those that are given."""
-    options = getattr(registry[ref.name], attribute) if ref.name in registry else {}
+def preset_options(preset: Preset, kind: type[Plugin]) -> Mapping[str, Any]:
+    """Return the options of a plug-in that a preset sets."""
+    if preset.as_published:
+        return kind.published
+    return kind.lean if preset.lean else {}
+
+
+def _with(preset: Preset, ref: PluginRef, registry: Registry[Any]) -> PluginRef:
+    """Return a plug-in with the options that a preset sets, under those that are given."""
+    options = preset_options(preset, registry[ref.name]) if ref.name in registry else {}
     return PluginRef(name=ref.name, options={**options, **ref.options})

@@ -27,7 +27,7 @@ from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.bench_violations import bench_violations
 from gaplab.services.specs.default_engines import default_engine, runs
-from gaplab.services.specs.presets import PRESETS, Preset, with_preset
+from gaplab.services.specs.presets import PRESETS, Preset, preset_options, with_preset
 from gaplab.services.specs.realities import completed, physical_reality, simulated_reality
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.tunables import shared_fields, with_bounds, with_usual_tunables
@@ -82,7 +82,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     return ResolvedSpec(
         priority=spec.priority,
         max_parallel=spec.max_parallel,
-        name=spec.name or _label(strategy),
+        name=spec.name or _label(strategy, preset),
         iterations=iterations,
         repetitions=spec.repetitions or preset.repetitions,
         **{each.kind: (ref := getattr(spec, each.kind)) and completed(each, ref) for each in NEED_NO_OTHERS},
@@ -186,9 +186,10 @@ def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
     return engine
 
 
-def _label(strategy: Strategy) -> str:
-    """Return the name of the strategy with all options that differ from their defaults."""
-    defaults = type(strategy).Options().model_dump(mode="json")
+def _label(strategy: Strategy, preset: Preset) -> str:
+    """Return the name of the strategy with all options that differ from those of the preset."""
+    kind = type(strategy)
+    defaults = kind.Options(**preset_options(preset, kind)).model_dump(mode="json")
     chosen = strategy.options.model_dump(mode="json")
     changed = [f"{name} {value}" for name, value in chosen.items() if value != defaults[name]]
     return f"{strategy.name} ({', '.join(changed)})"[:200] if changed else strategy.name

@@ -59,6 +59,13 @@ class TestPreset:
         assert spec.strategy.options["weightiest"] == 10
         assert resolved(budget="lean", strategy="simulated_fit").strategy.options == {}
 
+    def test_a_name_tells_options_that_the_preset_does_not_set(self) -> None:
+        whole = {"name": "informative", "options": {"weightiest": None}}
+
+        assert resolved(budget="lean", strategy="informative").name == "informative"
+        assert resolved(budget="lean", strategy=whole).name == "informative (weightiest None)"
+        assert resolved(strategy=whole).name == "informative"
+
     def test_what_a_spec_gives_beats_the_preset(self) -> None:
         spec = resolved(
             budget="lean",

@@ -70,7 +70,7 @@ def test_as_published_has_the_papers_numbers_and_its_plain_formulas() -> None:
     assert published["informative"].strategy.options["least_error"] == 0.0
     assert published["simulated_fit_and_informative"].strategy.options["least_error"] == 0.0
     assert published["simulated_fit_and_unique"].strategy.options == {"distances": "plain"}
-    assert published["informative"].name == "informative (least_error 0.0)"
+    assert published["informative"].name == "informative"
 
 
 def test_an_option_given_beats_the_published_one() -> None:
