@@ -44,15 +44,17 @@ def pictures(store: Store, studies: dict[str, Study], folder: Path) -> dict[tupl
     return addresses
 
 
-def write(archives: Sequence[Path], output: Path | None) -> None:
+def write(archives: Sequence[Path], control_archives: Sequence[Path], output: Path | None) -> None:
     """Write the document and its pictures, or print it."""
     with private_store() as store:
-        studies = {archive.stem: read_study(store, archive.resolve()) for archive in archives}
+        studies, controls = (
+            {each.stem: read_study(store, each.resolve()) for each in files} for files in (archives, control_archives)
+        )
         if output is None:
-            print(Document(store, studies, ROOT / "docs", {}).text(), end="")
+            print(Document(store, studies, ROOT / "docs", {}, controls).text(), end="")
             return
         folder = output.resolve().parent
-        text = Document(store, studies, folder, pictures(store, studies, folder)).text()
+        text = Document(store, studies, folder, pictures(store, studies, folder), controls).text()
         output.write_text(text, encoding="utf-8")
 
 
@@ -61,10 +63,12 @@ def main() -> None:
     parser = ArgumentParser(prog="python -m benchmarks.reproduction", description=__doc__)
     parser.add_argument("archives", nargs="+", type=Path, help="archives of studies, in the order of the document")
     parser.add_argument("-o", "--output", type=Path, help="file of the document; its pictures go to figures/ beside it")
+    parser.add_argument("--control", action="append", type=Path, default=[], help="archive of a control, repeatable")
     arguments = parser.parse_args()
-    if len({archive.stem for archive in arguments.archives}) < len(arguments.archives):
+    archives = [*arguments.archives, *arguments.control]
+    if len({archive.stem for archive in archives}) < len(archives):
         parser.error("two archives have one name; a name is the label of a study, so rename one")
-    write(arguments.archives, arguments.output)
+    write(arguments.archives, arguments.control, arguments.output)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 """The document, as Markdown, from studies."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.reproduction import tables
+from benchmarks.reproduction import controls, tables
 from benchmarks.reproduction.claims import CLAIMS, Claim
 from benchmarks.reproduction.evidence import RULES, Examined, Judged, Verdict, judge
 from benchmarks.reproduction.limits import limits
@@ -31,12 +31,14 @@ class Document:
         studies: the studies, by their labels.
         folder: folder of the document, from which its links begin.
         pictures: address of each picture, by the label of its study and the number of its figure.
+        controls: studies with one changed setting, by their labels; no claim is judged by them.
     """
 
     store: Store
     studies: dict[str, Study]
     folder: Path
     pictures: dict[tuple[str, int], str]
+    controls: dict[str, Study]
 
     def text(self) -> str:
         """Return the document."""
@@ -47,6 +49,7 @@ class Document:
             *self._figure_4(),
             *self._figure_3(),
             *self._claims(),
+            *self._controls(),
             "\n".join(["## How a verdict is reached", "", *(f"- {rule}" for rule in RULES)]),
             "\n".join(["## What the reconstruction cannot know", "", *(f"- {one}" for one in limits(self._link))]),
             self._costs(),
@@ -65,12 +68,18 @@ class Document:
             "Tørresen, SIMPAR 2012), beside stored studies of gaplab. Fitness is a ratio to *direct*: the mean fitness "
             "of controllers that evolve in reality itself, with as many evaluations.\n\n"
             "This command wrote the page from the archives below; run it again instead of editing the page:\n\n"
-            f"```sh\npython -m benchmarks.reproduction {archives} -o docs/reproduction.md\n```"
+            f"```sh\npython -m benchmarks.reproduction {archives}{self._control_options()} -o docs/reproduction.md\n```"
         )
 
+    def _control_options(self) -> str:
+        return "".join(f" --control {os.path.relpath(each.archive, ROOT)}" for each in self.controls.values())
+
     def _studies(self) -> str:
-        rows = [tables.study_row(study, label, self._link(study.archive)) for label, study in self.studies.items()]
-        return f"## The studies\n\n{tables.table(tables.STUDY_HEAD, rows)}"
+        return f"## The studies\n\n{self._study_table(self.studies)}"
+
+    def _study_table(self, studies: Mapping[str, Study]) -> str:
+        rows = [tables.study_row(study, label, self._link(study.archive)) for label, study in studies.items()]
+        return tables.table(tables.STUDY_HEAD, rows)
 
     def _verdicts(self) -> str:
         rows = [
@@ -119,9 +128,24 @@ class Document:
             head = "study", "verdict", "here", "the paper's test", "the careful test", "why"
             yield f"### {claim.key}\n\n{claim.says}\n\nThe rule: {claim.rule}\n\n{tables.table(head, rows)}"
 
+    def _controls(self) -> Iterator[str]:
+        if not self.controls:
+            return
+        yield (
+            "## Controls\n\nEach control repeats strategies of a study with one change. Fitness is over the direct "
+            "baseline of its own study, and over the other's if the control has none. *Direct* itself is in the unit "
+            "of fitness. Brackets have the number of repetitions after a mean, and the 90 % interval after a "
+            "difference. Each p is uncorrected. Repetitions of one number share their random numbers, so tests are "
+            "paired."
+        )
+        yield f"### The controls\n\n{self._study_table(self.controls)}"
+        rows = [row for label, each in self.controls.items() for row in controls.rows(label, each, self.studies)]
+        yield f"### What each change does\n\n{tables.table(controls.HEAD, rows)}"
+
     def _costs(self) -> str:
-        rows = [row for label, study in self.studies.items() for row in tables.cost_rows(label, study)]
-        arms = [arm for study in self.studies.values() for arm in study.arms]
+        everything = self.studies | self.controls
+        rows = [row for label, study in everything.items() for row in tables.cost_rows(label, study)]
+        arms = [arm for study in everything.values() for arm in study.arms]
         total = (
             "all",
             "",

@@ -37,6 +37,8 @@ def study_row(study: Study, label: str, link: str) -> tuple[str, ...]:
     sizes = budget.controller_evaluations, budget.selection_evaluations, budget.simulator_evaluations
     shares = [f"{100 * size / full:.3g} %" for size, full in zip(sizes, paper.EVALUATIONS, strict=True)]
     reused = "; transfers reused" if budget.reuse_transfer else ""
+    divided = "; a tuning's divided by its samples" if spec.tuner.options.get("equal_rollouts") else ""
+    preset = f"{budget.preset}, {spec.controller_optimizer.name}"
     truth = ", ".join(
         f"{spoken(name).lower()} {'hidden' if value is None else value}"
         for name, value in reality["parameters"].items()
@@ -48,7 +50,7 @@ def study_row(study: Study, label: str, link: str) -> tuple[str, ...]:
         spec.engine.name,
         f"{simulated} ({truth})" if truth else simulated,
         "/".join(sorted({str(arm.spec.seed) for arm in study.arms})),
-        f"{budget.preset}: {' / '.join(f'{size:,}' for size in sizes)} ({', '.join(shares)} of the paper's){reused}",
+        f"{preset}: {' / '.join(f'{size:,}' for size in sizes)} ({', '.join(shares)} of the paper's){reused}{divided}",
         str(study.last if study.present else 0),
         _repetitions(study),
         f"{sum(arm.read.progress.rollouts_done for arm in study.arms):,}",

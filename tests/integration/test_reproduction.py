@@ -76,6 +76,22 @@ STUDIES = {
     ),
 }
 
+CONTROLS = {
+    "bouncing": Study(
+        {
+            "direct": Made([2.0], 0.02),
+            "simulated_fit": Made([2 * (mean - 0.1) for mean in AGREES["simulated_fit"].means], wiggle=0.02),
+        },
+        changes={"reality": {"parameters": {"restitution": 0.1}}},
+    ),
+    "divided": Study(
+        {"simulated_fit": AGREES["simulated_fit"]._replace(wiggle=0.02)},
+        samples=3,
+        changes={"tuner": {"name": "search", "options": {"equal_rollouts": True}}},
+    ),
+}
+"""Strategies of "agrees" with one change: one is a tenth of direct below it, the other is as fit."""
+
 
 def reproduce(*arguments: object) -> str:
     """Run the command, and return what it prints."""
@@ -113,9 +129,10 @@ def document(tmp_path_factory: pytest.TempPathFactory) -> Document:
     migrations.upgrade(url)
     store = Store(url)
     archives = [archive(store, label, study, folder) for label, study in STUDIES.items()]
+    controls = [f"--control={archive(store, label, study, folder)}" for label, study in CONTROLS.items()]
     store.dispose()
 
-    assert reproduce(*archives, "-o", folder / "reproduction.md") == ""
+    assert reproduce(*archives, *controls, "-o", folder / "reproduction.md") == ""
 
     return Document(folder / "reproduction.md")
 
@@ -290,8 +307,51 @@ def test_the_list_of_studies_says_what_each_is(document: Document) -> None:
 
     assert (row["robot"], row["simulators"], row["seed"], row["iterations"]) == ("toy_function", "analytic", "7", "10")
     assert row["reality"] == "analytic (static friction 1.0, dynamic friction 0.8, restitution 0.0)"
-    assert row["evaluations: controller / selection / tuning"].startswith("smoke: 60 / 30 / 60")
+    assert row["evaluations: controller / selection / tuning"].startswith("smoke, steady_state: 60 / 30 / 60")
     assert row["repetitions"] == "12"
+
+
+def test_a_control_tells_what_its_change_does_to_fitness_over_its_own_direct(document: Document) -> None:
+    rows = [row for row in document.rows("What each change does") if row["control"] == "bouncing, beside agrees"]
+
+    assert {row["what differs"] for row in rows} == {"restitution of reality: 0.1, not 0.0"}
+    assert [(row["strategy"], row["samples"]) for row in rows] == [
+        ("Direct", "0"),
+        *[("Simulated fit", str(count)) for count in (1, 2, 3, 5, 10)],
+    ]
+    direct, first, *_ = rows
+    assert (first["study"], first["control's"], first["test"], first["p"]) == (
+        "0.85 (12)",
+        "0.75 (12)",
+        "paired t",
+        "< 0.001",
+    )
+    assert first["difference"].startswith("\N{MINUS SIGN}0.100 (\N{MINUS SIGN}0.1")
+    assert (direct["study"], direct["control's"]) == ("1.00 (12)", "2.00 (12)")
+
+
+def test_a_control_without_direct_is_judged_by_that_of_its_study_as_far_as_it_goes(document: Document) -> None:
+    rows = [row for row in document.rows("What each change does") if row["control"] == "divided, beside agrees"]
+
+    assert [row["samples"] for row in rows] == ["1", "2", "3"]
+    assert all(row["study"] == row["control's"] for row in rows)
+    assert all(float(row["p"]) > 0.99 for row in rows)
+    assert (
+        "a tuning's divided by its samples"
+        in document.row("The controls", "[divided]")["evaluations: controller / selection / tuning"]
+    )
+
+
+def test_a_control_of_no_study_is_refused(document: Document) -> None:
+    folder = document.file.parent
+    command = [sys.executable, "-m", "benchmarks.reproduction", folder / "agrees.zip"]
+
+    ended = subprocess.run(
+        [*command, "--control", ROOT / "docs" / "studies" / "toy-lean.zip"], cwd=ROOT, capture_output=True, text=True
+    )
+
+    assert ended.returncode == 1
+    assert "no study has its robot, engines, preset and seed" in ended.stderr
 
 
 def test_every_link_and_picture_leads_somewhere(document: Document) -> None:
