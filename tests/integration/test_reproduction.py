@@ -343,12 +343,10 @@ def test_a_control_without_direct_is_judged_by_that_of_its_study_as_far_as_it_go
 
 
 def test_a_control_of_no_study_is_refused(document: Document) -> None:
-    folder = document.file.parent
-    command = [sys.executable, "-m", "benchmarks.reproduction", folder / "agrees.zip"]
+    archives = [str(document.file.with_name("agrees.zip")), f"--control={ROOT / 'docs' / 'studies' / 'toy-lean.zip'}"]
 
-    ended = subprocess.run(
-        [*command, "--control", ROOT / "docs" / "studies" / "toy-lean.zip"], cwd=ROOT, capture_output=True, text=True
-    )
+    command = [sys.executable, "-m", "benchmarks.reproduction", *archives]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
 
     assert ended.returncode == 1
     assert "no study has its robot, engines, preset and seed" in ended.stderr
