@@ -8,6 +8,7 @@ from scipy.stats import norm
 
 SIGNIFICANT = 0.05
 Z = float(norm.isf(SIGNIFICANT))
+TWO_SIDED = float(norm.isf(SIGNIFICANT / 2))
 
 
 class Difference(NamedTuple):
@@ -38,6 +39,17 @@ class Difference(NamedTuple):
         return (
             float(norm.sf((margin - abs(self.value)) / self.error)) if self.error else float(abs(self.value) >= margin)
         )
+
+    def verdict(self, margin: float) -> str:
+        """Return whether the difference is shown to be within the margin, or shown to be one and not within."""
+        if self.p(margin) < SIGNIFICANT:
+            return "equivalent"
+        return "different" if abs(self.value) > self.error * TWO_SIDED else "undecided"
+
+    def cells(self, margin: float) -> tuple[str, str, str, str]:
+        """Return the difference with its interval, p, the chance of equivalence, and the verdict."""
+        interval = f"{self.value:.3f} ({self.value - self.half:.3f} to {self.value + self.half:.3f})"
+        return interval, f"{self.p(margin):.2g}", f"{self.chance(margin):.2f}", self.verdict(margin)
 
     def chance(self, margin: float) -> float:
         """Return the probability that a true difference of 0 is shown to be within the margin."""

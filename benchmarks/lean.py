@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import kendalltau
 
+from benchmarks import lean_ratios
 from benchmarks.differences import SIGNIFICANT, Difference
 from benchmarks.findings import opened, table_of
 from benchmarks.lean_count import count_table
@@ -125,20 +126,8 @@ def equivalence_rows(store: Store, side: Sides, margin: float) -> Iterator[tuple
             yield name, str(count), sizes, interval, one.equivalence.test, p, chance, one.equivalence.verdict.value
     for count, each in sorted(differences.items()):
         if len(each) > 1:
-            mean = Difference.mean(each)
-            p_mean = mean.p(margin)
-            verdict = "equivalent" if p_mean < SIGNIFICANT else "undecided"
-            interval = f"{mean.value:.3f} ({mean.value - mean.half:.3f} to {mean.value + mean.half:.3f})"
-            yield (
-                f"mean of {len(each)}",
-                str(count),
-                "",
-                interval,
-                "z",
-                f"{p_mean:.2g}",
-                f"{mean.chance(margin):.2f}",
-                verdict,
-            )
+            interval, *rest = Difference.mean(each).cells(margin)
+            yield f"mean of {len(each)}", str(count), "", interval, "z", *rest
 
 
 def ranking_rows(store: Store, side: Sides) -> Iterator[tuple[str, ...]]:
@@ -191,6 +180,12 @@ def judge(store: Store, ids: Iterable[str], direct: float | None) -> Iterator[Ta
         for row in equivalence_rows(store, side, margin):
             table.add_row(*row)
         yield table
+        if "direct" in side.both:
+            title = f"The same over the direct baseline of each; two one-sided tests of ±{SHARE}"
+            table = table_of(title, lean_ratios.COLUMNS)
+            for row in lean_ratios.ratio_rows(store, side.lean, side.paper, COUNTS, SHARE):
+                table.add_row(*row)
+            yield table
         columns = "after", "order under lean", "order under paper", "same", "Kendall's τ", "pairs told apart"
         table = table_of("Ranking of the strategies that take samples", columns)
         for row in ranking_rows(store, side):

@@ -70,15 +70,30 @@ def verdicts(text: str, strategy: str) -> list[str]:
 def test_curves_that_are_the_same_are_equivalent_and_ranked_alike(judged: Judged) -> None:
     text = judged(LEAN)
 
-    assert verdicts(text, "simulated_fit") == ["equivalent"] * 3
-    assert verdicts(text, "random") == ["equivalent"] * 3
+    assert verdicts(text, "simulated_fit") == ["equivalent"] * 6
+    assert verdicts(text, "random") == ["equivalent"] * 6
     assert "simulated_fit > random" in text
     assert "1, 1; 1 in both, 0 opposite" in text
 
 
 def test_the_mean_of_all_strategies_is_judged_too(judged: Judged) -> None:
     assert verdicts(judged(LEAN), "mean of 2") == ["equivalent"] * 3
-    assert verdicts(judged(moved("random", -0.2)), "mean of 2") == ["undecided"] * 3
+    assert verdicts(judged(moved("random", -0.2)), "mean of 2") == ["different"] * 3
+
+
+def test_all_curves_above_the_papers_are_equivalent_over_their_own_direct(judged: Judged) -> None:
+    higher = {name: made._replace(means=[1.2 * mean for mean in made.means]) for name, made in LEAN.items()}
+
+    text = judged(higher)
+
+    assert verdicts(text, "simulated_fit") == ["different"] * 3 + ["equivalent"] * 3
+    assert "0.800 │ 0.800" in text
+
+
+def test_a_direct_that_is_not_well_known_leaves_ratios_undecided(judged: Judged) -> None:
+    text = judged(LEAN | {"direct": Made([1.0], 0.3)})
+
+    assert verdicts(text, "random")[3:] == ["undecided"] * 3
 
 
 def test_a_curve_beyond_the_margin_is_different_and_the_others_stay_equivalent(judged: Judged) -> None:
