@@ -101,6 +101,13 @@ def keeps_to_its_budget(plugin: Plugin) -> None:
     assert np.all((SPACE.lower <= asked) & (asked <= SPACE.upper)), "it asks for simulators outside the bounds"
 
 
+def divides_its_evaluations(plugin: Plugin) -> None:
+    """Divides its evaluations by a whole number of 1 or more, for any number of samples."""
+    for count in range(11):
+        found = plugin().divisor(count)
+        assert isinstance(found, int) and found >= 1, f"for {count} samples its divisor is {found!r}"
+
+
 def repeats_itself(plugin: Plugin) -> None:
     """Finds the same with the same random stream."""
     first, second = (tuned(plugin, Physics(), 7) for _ in range(2))
@@ -138,6 +145,7 @@ CHECKS = (
     returns_as_many_as_wanted,
     states_the_discrepancy_of_each,
     keeps_to_its_budget,
+    divides_its_evaluations,
     repeats_itself,
     copes_with_failed_physics,
     states_intervals_around_its_best,

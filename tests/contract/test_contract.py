@@ -12,6 +12,7 @@ from gaplab.services.contract.checks import CHECKS, Check, results
 from gaplab.services.contract.files import check_file, write_skeleton
 from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError
+from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.engines import engines
 from gaplab.services.plugins.external import REGISTRIES
 
@@ -122,6 +123,16 @@ def test_a_file_that_cannot_be_used_says_why(tmp_path: Path) -> None:
         list(check_file(tmp_path / "none.py"))
     with pytest.raises(FileNotFoundError):
         list(check_file(tmp_path / "absent.py"))
+
+
+def test_a_tuner_that_divides_its_evaluations_by_nothing_is_told() -> None:
+    class Careless(SearchTuner):
+        """A tuner."""
+
+        def divisor(self, samples: int) -> int:
+            return samples
+
+    assert "for 0 samples its divisor is 0" in {result.reason for result in results("tuner", Careless)}
 
 
 def test_results_go_on_after_a_check_that_fails() -> None:
