@@ -105,7 +105,8 @@ def divides_its_evaluations(plugin: Plugin) -> None:
     """Divides its evaluations by a whole number of 1 or more, for any number of samples."""
     for count in range(11):
         found = plugin().divisor(count)
-        assert isinstance(found, int) and found >= 1, f"for {count} samples its divisor is {found!r}"
+        assert isinstance(found, int), f"for {count} samples its divisor is {found!r}"
+        assert found >= 1, f"for {count} samples its divisor is {found!r}"
 
 
 def repeats_itself(plugin: Plugin) -> None:
