@@ -44,11 +44,20 @@ def pictures(store: Store, studies: dict[str, Study], folder: Path) -> dict[tupl
     return addresses
 
 
-def write(archives: Sequence[Path], control_archives: Sequence[Path], output: Path | None) -> None:
+Archives = tuple[Path, ...]
+"""The archives of a study; the first one's name is its label."""
+
+
+def archives_of(argument: str) -> Archives:
+    """Return the archives of a study, which commas part."""
+    return tuple(Path(each).resolve() for each in argument.split(","))
+
+
+def write(archives: Sequence[Archives], control_archives: Sequence[Archives], output: Path | None) -> None:
     """Write the document and its pictures, or print it."""
     with private_store() as store:
         studies, controls = (
-            {each.stem: read_study(store, each.resolve()) for each in files} for files in (archives, control_archives)
+            {each[0].stem: read_study(store, each) for each in files} for files in (archives, control_archives)
         )
         if output is None:
             print(Document(store, studies, ROOT / "docs", {}, controls).text(), end="")
@@ -61,12 +70,19 @@ def write(archives: Sequence[Path], control_archives: Sequence[Path], output: Pa
 def main() -> None:
     """Read the command, and write the document."""
     parser = ArgumentParser(prog="python -m benchmarks.reproduction", description=__doc__)
-    parser.add_argument("archives", nargs="+", type=Path, help="archives of studies, in the order of the document")
+    parser.add_argument(
+        "archives",
+        nargs="+",
+        type=archives_of,
+        help="archives of studies, in the order of the document; commas part those of one study",
+    )
     parser.add_argument("-o", "--output", type=Path, help="file of the document; its pictures go to figures/ beside it")
-    parser.add_argument("--control", action="append", type=Path, default=[], help="archive of a control, repeatable")
+    parser.add_argument(
+        "--control", action="append", type=archives_of, default=[], help="archive of a control, repeatable"
+    )
     arguments = parser.parse_args()
     archives = [*arguments.archives, *arguments.control]
-    if len({archive.stem for archive in archives}) < len(archives):
+    if len({each[0].stem for each in archives}) < len(archives):
         parser.error("two archives have one name; a name is the label of a study, so rename one")
     write(arguments.archives, arguments.control, arguments.output)
 

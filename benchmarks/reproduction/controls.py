@@ -27,7 +27,7 @@ def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
     for label, study in studies.items():
         if _world(study.arms[0]) == _world(control.arms[0]):
             return label
-    raise SystemExit(f"{control.archive}: no study has its robot, engines, preset and seed")
+    raise SystemExit(f"{control.archives[0]}: no study has its robot, engines, preset and seed")
 
 
 def rows(label: str, control: Study, studies: Mapping[str, Study]) -> Iterator[tuple[str, ...]]:

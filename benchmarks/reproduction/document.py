@@ -61,7 +61,7 @@ class Document:
         return Path(os.path.relpath(ROOT / path, self.folder)).as_posix()
 
     def _opening(self) -> str:
-        archives = " ".join(os.path.relpath(study.archive, ROOT) for study in self.studies.values())
+        archives = " ".join(_files(study) for study in self.studies.values())
         return (
             "# The paper's figures and claims\n\n"
             "*A Comparison of Sampling Strategies for Parameter Estimation of a Robot Simulator* (Klaus, Glette and "
@@ -72,13 +72,16 @@ class Document:
         )
 
     def _control_options(self) -> str:
-        return "".join(f" --control {os.path.relpath(each.archive, ROOT)}" for each in self.controls.values())
+        return "".join(f" --control {_files(each)}" for each in self.controls.values())
 
     def _studies(self) -> str:
         return f"## The studies\n\n{self._study_table(self.studies)}"
 
     def _study_table(self, studies: Mapping[str, Study]) -> str:
-        rows = [tables.study_row(study, label, self._link(study.archive)) for label, study in studies.items()]
+        rows = [
+            tables.study_row(study, [f"[{each.stem}]({self._link(each)})" for each in study.archives])
+            for study in studies.values()
+        ]
         return tables.table(tables.STUDY_HEAD, rows)
 
     def _verdicts(self) -> str:
@@ -171,3 +174,8 @@ def judged(claim: Claim, study: Study) -> tuple[Examined, Judged]:
 
 def _claim_row(label: str, examined: Examined, verdict: Judged) -> Sequence[str]:
     return label, WORDS[verdict.verdict], examined.here, examined.paper_test, verdict.careful, verdict.why
+
+
+def _files(study: Study) -> str:
+    """Return the archives of a study as the command takes them."""
+    return ",".join(os.path.relpath(each, ROOT) for each in study.archives)

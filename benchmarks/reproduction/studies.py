@@ -98,13 +98,13 @@ class Study:
     """A stored study.
 
     Attributes:
-        archive: its file.
+        archives: its files; several if its experiments were computed apart.
         name: its name.
         arms: its experiments, in their order.
         curves: their curves.
     """
 
-    archive: Path
+    archives: tuple[Path, ...]
     name: str
     arms: tuple[Arm, ...]
     curves: tuple[Curve, ...]
@@ -154,22 +154,36 @@ class Study:
         return f"samples are selected from searches of unequal size ({told} evaluations)"
 
 
-def read_study(store: Store, archive: Path) -> Study:
-    """Import the archive of a study or of a single experiment, and return it.
+def read_study(store: Store, archives: Sequence[Path]) -> Study:
+    """Import archives of studies or of single experiments, and return them as one study, named by the first.
 
     Raises:
-        InvalidArchive: the file is no archive.
+        InvalidArchive: a file is no archive.
+        SystemExit: the archives differ in robot, engines, reality, budget or seed.
     """
+    parts = [_part(store, archive) for archive in archives]
+    reads = tuple(read for _, experiments_of in parts for read in experiments_of)
+    with store.reading() as session:
+        arms = _arms(session, reads)
+    if len(parts) > 1 and len({_settings(arm.spec) for arm in arms}) > 1:
+        raise SystemExit(f"{', '.join(map(str, archives))}: robot, engines, reality, budget or seed differ")
+    return Study(tuple(archives), parts[0][0], arms, curves(store, [read.id for read in reads]))
+
+
+def _part(store: Store, archive: Path) -> tuple[str, tuple[ExperimentRead, ...]]:
+    """Import an archive, and return its name and its experiments."""
     made = import_file(store, archive)
     if made.study is not None:
         study = reading.read_study(store, made.study)
-        name, reads = study.name, study.experiments
-    else:
-        reads = tuple(reading.read_experiment(store, id_) for id_ in made.experiments)
-        name = reads[0].name
-    with store.reading() as session:
-        arms = _arms(session, reads)
-    return Study(archive, name, arms, curves(store, [read.id for read in reads]))
+        return study.name, study.experiments
+    reads = tuple(reading.read_experiment(store, id_) for id_ in made.experiments)
+    return reads[0].name, reads
+
+
+def _settings(spec: ResolvedSpec) -> str:
+    """Return the settings that experiments of one study share."""
+    shared = {"robot", "controller", "task", "engine", "tunables", "reality", "budget", "controller_optimizer", "seed"}
+    return spec.model_dump_json(include=shared)
 
 
 def _arms(session: Session, reads: Sequence[ExperimentRead]) -> tuple[Arm, ...]:

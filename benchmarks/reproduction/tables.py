@@ -24,14 +24,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
 
 
-def study_row(study: Study, label: str, link: str) -> tuple[str, ...]:
-    """Return what a study is.
-
-    Args:
-        study: the study.
-        label: its label in this document.
-        link: address of its archive.
-    """
+def study_row(study: Study, links: Sequence[str]) -> tuple[str, ...]:
+    """Return what a study is, after links to its archives; the first has its label in this document."""
     spec = study.arms[0].spec
     budget, reality = spec.budget, study.arms[0].read.spec["reality"]
     sizes = budget.controller_evaluations, budget.selection_evaluations, budget.simulator_evaluations
@@ -45,7 +39,7 @@ def study_row(study: Study, label: str, link: str) -> tuple[str, ...]:
     )
     simulated = "a robot on a bench" if reality["engine"] is None else reality["engine"]["name"]
     return (
-        f"[{label}]({link}): {study.name}",
+        f"{', '.join(links)}: {study.name}",
         spec.robot.name,
         spec.engine.name,
         f"{simulated} ({truth})" if truth else simulated,

@@ -129,6 +129,8 @@ def document(tmp_path_factory: pytest.TempPathFactory) -> Document:
     migrations.upgrade(url)
     store = Store(url)
     archives = [archive(store, label, study, folder) for label, study in STUDIES.items()]
+    apart = {"parted": {name: AGREES[name] for name in AGREES if name != "direct"}, "parted-direct": DIRECT}
+    archives.append(",".join(str(archive(store, label, Study(curves), folder)) for label, curves in apart.items()))
     controls = [f"--control={archive(store, label, study, folder)}" for label, study in CONTROLS.items()]
     store.dispose()
 
@@ -340,6 +342,22 @@ def test_a_control_without_direct_is_judged_by_that_of_its_study_as_far_as_it_go
         "a tuning's divided by its samples"
         in document.row("The controls", "[divided]")["evaluations: controller / selection / tuning"]
     )
+
+
+def test_archives_that_were_computed_apart_are_one_study(document: Document) -> None:
+    assert [document.verdict(claim, "parted") for claim in CLAIMS] == ["reproduced"] * len(CLAIMS)
+    assert document.row("The studies", "[parted](parted.zip), [parted-direct](parted-direct.zip): made: parted")
+    assert re.search(r"/parted\.zip,\S+/parted-direct\.zip ", document.text)
+
+
+def test_archives_with_other_settings_are_no_study(document: Document) -> None:
+    archives = f"{document.file.with_name('agrees.zip')},{ROOT / 'docs' / 'studies' / 'toy-lean.zip'}"
+
+    command = [sys.executable, "-m", "benchmarks.reproduction", archives]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+
+    assert ended.returncode == 1
+    assert "robot, engines, reality, budget or seed differ" in ended.stderr
 
 
 def test_a_control_of_no_study_is_refused(document: Document) -> None:
