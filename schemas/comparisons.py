@@ -110,6 +110,9 @@ class Comparison(Groups, Pair):
     the range; a repetition that lacks a number of the range is left out. Differences are `first` minus `second`.
     """
 
+    difference: Statistic = Field(
+        description="difference of the means; where streams are shared, over the repetitions that both have"
+    )
     caution: str | None = Field(
         default=None,
         description="why not to trust the unpaired tests; null if they can be trusted",

@@ -1,5 +1,6 @@
 """Errors as RFC 9457 problem details. The HTTP status of each error is defined here and nowhere else."""
 
+import json
 import logging
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
@@ -8,7 +9,7 @@ from uuid import uuid4
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse, Response
+from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
@@ -87,11 +88,10 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Exception, _of_bug)
 
 
-def response(problem: Problem, headers: dict[str, str] | None = None) -> JSONResponse:
-    """Return the response for a problem."""
-    return JSONResponse(
-        problem.model_dump(mode="json"), status_code=problem.status, headers=headers, media_type=MEDIA_TYPE
-    )
+def response(problem: Problem, headers: dict[str, str] | None = None) -> Response:
+    """Return the response for a problem; `?` stands for what is no character: a message may repeat half a surrogate."""
+    text = json.dumps(problem.model_dump(mode="json"), ensure_ascii=False, allow_nan=False)
+    return Response(text.encode(errors="replace"), problem.status, headers, MEDIA_TYPE)
 
 
 def problem(status: int, kind: str, title: str, detail: str, errors: Sequence[SpecError] = ()) -> Problem:
@@ -154,7 +154,7 @@ def _spec_error(violation: Violation) -> SpecError:
     )
 
 
-def _of_validation(request: Request, error: Exception) -> JSONResponse:
+def _of_validation(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     found = without_consequences(error.errors())
     if found[0]["type"] == "json_invalid":
@@ -187,12 +187,12 @@ def _of_framework(request: Request, error: Exception) -> Response:
     return _shown(request, problem(*kind, detail), dict(error.headers or {}))
 
 
-def _of_absent_client(request: Request, error: Exception) -> JSONResponse:  # noqa: ARG001 - a handler's signature
+def _of_absent_client(request: Request, error: Exception) -> Response:  # noqa: ARG001 - a handler's signature
     """Return what the client no longer receives; that it left in the middle of its request is no incident."""
     return response(problem(*FRAMEWORK[400], "The request ended before its body did."))
 
 
-def _of_bug(request: Request, error: Exception) -> JSONResponse:
+def _of_bug(request: Request, error: Exception) -> Response:
     """Answer an unexpected error without its details, which go to the log under the same number."""
     incident = uuid4().hex[:8]
     logger.error("incident %s at %s", incident, request.url.path, exc_info=error)

@@ -25,7 +25,7 @@ FOLDER = "figures"
 
 def figures(store: Store, label: str, study: Study) -> Iterator[tuple[int, FigureDefinition]]:
     """Yield the paper's figures as the study has them, each with its number."""
-    yield 4, curves_figure(study.curves, title=label)
+    yield 4, curves_figure(study.curves, title=study.name or label)
     shown = [count for count in FIGURE_3[1:] if count <= study.last]
     first = next((arm for name in study.present if (arm := study.arm(name))), None)
     if study.arms[0].spec.robot.name == TOY and first and shown:

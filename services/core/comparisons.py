@@ -136,6 +136,9 @@ def _compared(
     first, second = over.values(one), over.values(other)
     shared = shares_streams(one, other)
     paired_t, wilcoxon = compare_paired(first, second) if shared else (UNDEFINED, UNDEFINED)
+    groups = _groups(finite(first), finite(second))
+    if shared:
+        groups["difference"] = _difference(*both(first, second))
     lower, upper = difference_interval(first, second, paired=shared)
     several = over.first < over.last
     pooled = Pooled(caution=POOLED, **_groups(over.pooled(one), over.pooled(other))) if several else None
@@ -146,7 +149,7 @@ def _compared(
         second_name=other.name,
         from_evaluations=over.first,
         to_evaluations=over.last,
-        **_groups(finite(first), finite(second)),
+        **groups,
         caution=f"{_streams(one, other)}; trust the paired tests" if shared else None,
         lower=lower,
         upper=upper,

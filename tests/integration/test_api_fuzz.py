@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from gaplab.api.app import create_app
@@ -79,6 +79,7 @@ def test_no_json_at_all_makes_the_service_fail(api: TestClient, spec: object) ->
 
 
 @FUZZ
+@example(spec={"optimizer": {"name": "steady_state", "options": {"population": ["\ud800"]}}})
 @given(spec=mutated_specs())
 def test_no_mutation_of_what_is_checked_makes_the_service_fail(api: TestClient, spec: dict[str, Any]) -> None:
     spec.pop("strategy", None)

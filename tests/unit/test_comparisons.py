@@ -114,6 +114,18 @@ def test_a_pair_that_shares_streams_is_judged_by_the_paired_test() -> None:
     assert (independent.paired_t.p, independent.n_paired, independent.caution) == (None, 0, None)
 
 
+def test_a_difference_of_pairs_is_in_the_middle_of_its_interval_whatever_else_was_computed() -> None:
+    noise, change = drawn(1.0, sd=0.3), drawn(0.05, seed=2, sd=0.02)
+    one, other = compared("fit", noise), compared("fit, more", (noise + change)[:10], strategy="fit")
+
+    (pair,) = compare_all([one, other], 0, 0)
+
+    assert pair.lower is not None
+    assert pair.upper is not None
+    assert pair.difference == pytest.approx((pair.lower + pair.upper) / 2)
+    assert pair.difference == pytest.approx(-change[:10].mean())
+
+
 def test_the_trusted_tests_of_all_pairs_are_one_family() -> None:
     experiments = [
         compared("a", drawn(1.0)),
