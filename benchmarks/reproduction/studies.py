@@ -1,7 +1,8 @@
 """The values of a stored study, by strategy."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -167,7 +168,20 @@ def read_study(store: Store, archives: Sequence[Path]) -> Study:
         arms = _arms(session, reads)
     if len(parts) > 1 and len({_settings(arm.spec) for arm in arms}) > 1:
         raise SystemExit(f"{', '.join(map(str, archives))}: robot, engines, reality, budget or seed differ")
-    return Study(tuple(archives), parts[0][0], arms, curves(store, [read.id for read in reads]))
+    drawn = curves(store, [read.id for read in reads])
+    names = _names(arms)
+    return Study(
+        tuple(archives),
+        parts[0][0],
+        tuple(replace(arm, read=arm.read.model_copy(update={"name": names[arm.read.id]})) for arm in arms),
+        tuple(curve.model_copy(update={"name": names[curve.experiment]}) for curve in drawn),
+    )
+
+
+def _names(arms: Sequence[Arm]) -> dict[str, str]:
+    """Return the name of each experiment by id: its strategy's, as in the paper, unless several share it."""
+    times = Counter(arm.strategy for arm in arms)
+    return {arm.read.id: arm.strategy if times[arm.strategy] == 1 else arm.read.name for arm in arms}
 
 
 def _part(store: Store, archive: Path) -> tuple[str, tuple[ExperimentRead, ...]]:

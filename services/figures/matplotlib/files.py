@@ -26,7 +26,10 @@ COLUMN_IN = 3.5
 DPI = 300
 SIZE_PT = 8
 PANEL_IN, LOW_IN = 2.1, 1.1
-"""Height of the only row of panels, and of one of several rows."""
+"""Least height of the only row of panels, and the height of one of several rows."""
+
+SLOPE = 0.45
+"""Height of the only row of panels, as a share of the width of a file: a wide curve would look flat."""
 
 FREE = 0.85
 """Share of the width of a file that its panels have."""
@@ -85,7 +88,8 @@ def _canvas(figure: FigureDefinition, width_in: float, *, caption: bool) -> "Can
     from matplotlib.figure import Figure as Canvas
 
     rows = figure.row_heights
-    canvas = Canvas(figsize=(width_in, sum(rows) * LOW_IN + 0.3 if len(rows) > 1 else PANEL_IN), layout="constrained")
+    height_in = sum(rows) * LOW_IN + 0.3 if len(rows) > 1 else max(PANEL_IN, SLOPE * width_in)
+    canvas = Canvas(figsize=(width_in, height_in), layout="constrained")
     share: Any = "col" if figure.share_x else False
     grid = canvas.subplots(len(rows), figure.columns, squeeze=False, sharex=share, gridspec_kw={"height_ratios": rows})
     for index, axes in enumerate(grid.flat):
