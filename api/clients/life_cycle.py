@@ -33,11 +33,12 @@ class LifeCycle:
         """Queue the FAILED repetitions of a study or an experiment once more, from their stored steps."""
         return self._apply(id, Verb.RETRY)
 
-    def extend(self, id: str, *, iterations: int | None = None, repetitions: int | None = None) -> ExperimentRead:
-        """Extend a completed experiment to these totals."""
+    def extend(
+        self, id: str, *, iterations: int | None = None, repetitions: int | None = None
+    ) -> ExperimentRead | StudyRead:
+        """Extend a completed experiment, or those of a study that are smaller, to these totals."""
         totals = {"iterations": iterations, "repetitions": repetitions}
-        body = {name: total for name, total in totals.items() if total is not None}
-        return self._connection.change(ExperimentRead, "POST", f"/experiments/{segment(id)}/extend", json=body)
+        return self._apply(id, Verb.EXTEND, {name: total for name, total in totals.items() if total is not None})
 
     def schedule(self, id: str, **changes: int | None) -> ExperimentRead:
         """Change the `priority` or `max_parallel` of an experiment."""
@@ -47,6 +48,6 @@ class LifeCycle:
         """Let an experiment continue under other versions of engines or plug-ins than it started with."""
         return self._connection.change(ExperimentRead, "POST", f"/experiments/{segment(id)}/accept-versions")
 
-    def _apply(self, id: str, verb: Verb) -> Record:
+    def _apply(self, id: str, verb: Verb, body: dict[str, int] | None = None) -> Record:
         record = self._records.find(id)
-        return self._connection.change(type(record), "POST", f"{path_of(record)}/{verb}")
+        return self._connection.change(type(record), "POST", f"{path_of(record)}/{verb}", json=body)

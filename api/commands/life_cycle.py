@@ -49,13 +49,13 @@ def retry(id: Id, as_json: AsJson = False, url: Url = None) -> None:
 
 @app.command(rich_help_panel=LIFE)
 def extend(
-    id: ExperimentId,
+    id: Id,
     iterations: Annotated[int | None, Total] = None,
     repetitions: Annotated[int | None, Total] = None,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Add iterations or repetitions to a completed experiment; its results are kept."""
+    """Add iterations or repetitions to a completed experiment, or to those of a study; results are kept."""
     with connect(url) as client:
         _print_state(client.extend(id, iterations=iterations, repetitions=repetitions), as_json=as_json)
 

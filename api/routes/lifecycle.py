@@ -9,8 +9,7 @@ from gaplab.api.http.problems import documented
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.schedule import ExtensionSpec, ScheduleChange
-from gaplab.services.experiments import lifecycle
-from gaplab.services.experiments.extension import extend_experiment as extend_to
+from gaplab.services.experiments import extension, lifecycle
 
 _experiment = APIRouter(prefix="/experiments/{id}", tags=["experiments"])
 _study = APIRouter(prefix="/studies/{id}", tags=["studies"])
@@ -71,7 +70,7 @@ def retry_experiment(id: Id, store: StoreDep) -> ExperimentRead:
 )
 def extend_experiment(
     id: Id,
-    extension: Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)],
+    totals: Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)],
     store: StoreDep,
     admitted: LimitedDep,
 ) -> ExperimentRead:
@@ -80,7 +79,7 @@ def extend_experiment(
     Existing results stay, and the whole equals an experiment that was submitted with these totals. A stopped experiment
     that is given its own totals is completed.
     """
-    return extend_to(store, id, extension, admitted)
+    return extension.extend_experiment(store, id, totals, admitted)
 
 
 @_experiment.patch(
@@ -124,6 +123,27 @@ def cancel_study(id: Id, store: StoreDep) -> StudyRead:
 def retry_study(id: Id, store: StoreDep) -> StudyRead:
     """Queue the FAILED repetitions of every experiment of the study once more."""
     return lifecycle.ask_study(store, id, Verb.RETRY)
+
+
+@_study.post(
+    "/extend",
+    status_code=202,
+    summary="Extend a study",
+    response_description="QUEUED again",
+    responses=documented(404, 409, 413, 415, 422, 429),
+)
+def extend_study(
+    id: Id,
+    totals: Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)],
+    store: StoreDep,
+    admitted: LimitedDep,
+) -> StudyRead:
+    """Set new totals of iterations or repetitions for the completed experiments of a study that are smaller.
+
+    Existing results stay. An experiment that is larger keeps its size, and one that takes no samples has no iterations
+    to add. A stopped experiment is completed.
+    """
+    return extension.extend_study(store, id, totals, admitted)
 
 
 router = APIRouter()

@@ -1,22 +1,25 @@
-"""Extension: a COMPLETED experiment becomes as large as one that was submitted with larger totals."""
+"""Extension: COMPLETED experiments become as large as if they had been submitted with larger totals.
 
-from collections.abc import Iterator
+Each function is one transaction, and raises StoreUnavailable while the database cannot be used.
+"""
+
+from collections.abc import Iterator, Sequence
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import State, Verb
-from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments.archiving import show_again
-from gaplab.services.experiments.lifecycle import get_permitting
+from gaplab.services.experiments.lifecycle import get_permitting, get_study_permitting
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.experiments.submission import extent_of
-from gaplab.services.experiments.views import view_experiments
+from gaplab.services.experiments.views import view_experiments, view_studies
 from gaplab.services.specs.resolution import is_direct, takes_samples
-from gaplab.services.store.models import RepetitionRow
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import insert_repetitions, repetitions_of
 from gaplab.services.store.queries.progress import tallies
@@ -29,8 +32,7 @@ def extend_experiment(
 ) -> ExperimentRead:
     """Queue a COMPLETED experiment again with larger totals; its results so far stay.
 
-    Given its present totals, a stopped experiment is completed. Raises StoreUnavailable while the
-    database cannot be used.
+    Given its present totals, a stopped experiment is completed.
 
     Raises:
         NotFound: no such experiment.
@@ -39,48 +41,102 @@ def extend_experiment(
             iterations.
         LimitReached: too much work is in progress.
     """
-    experiment, row = get_permitting(session, experiment_id, Verb.EXTEND), RepetitionRow
-    if None in experiment.spec["reality"]["parameters"].values():
-        msg = f"experiment {experiment_id!r} was imported while its reality was hidden, so it cannot be extended"
-        raise Conflict(msg)
-    spec = _extended(spec_to_run(experiment.spec), extension)
-    check_extent([spec], admitted.limits)
-    tally = tallies(session, [experiment_id])[experiment_id]
-    check_load(session, [spec], admitted, done=tally.rollouts_done + tally.rollouts_saved)
-    extent, total = extent_of(spec), spec.repetitions
-    present = len(repetitions_of(session, experiment_id))
-    extendable = (row.experiment_id == experiment_id) & (row.state != State.FAILED)
-    unfinished = extendable & (row.iterations_done < extent.iterations)
-    if not move(session, row, unfinished, State.QUEUED, losses=0) and total == present:
-        msg = f"experiment {experiment_id!r} has {spec.iterations} iterations and {total} repetitions already"
-        raise Conflict(f"{msg}, and none of these is left to run: ask for larger totals")
-    insert_repetitions(session, experiment_id, range(present, total))
-    experiment.spec = experiment.spec | {"iterations": spec.iterations, "repetitions": total}
-    experiment.iterations, experiment.rollouts = extent.iterations, extent.rollouts
-    session.flush()
-    show_again(session, experiment)
-    note(session, EventKind.EXTENDED, experiment_id, iterations=spec.iterations, repetitions=total)
-    settle(session, [experiment_id], State.QUEUED)
-    session.refresh(experiment)
+    experiment = get_permitting(session, experiment_id, Verb.EXTEND)
+    spec = _spec(experiment)
+    if violations := list(_violations(spec, extension)):
+        raise InvalidSpec(violations)
+    larger = spec.model_copy(update=extension.model_dump(exclude_none=True))
+    if not _extend(session, [(experiment, larger)], admitted):
+        msg = f"experiment {experiment_id!r} has {larger.iterations} iterations and {larger.repetitions} repetitions "
+        raise Conflict(f"{msg}already, and none of these is left to run: ask for larger totals")
     return view_experiments(session, [experiment])[0]
 
 
-def _extended(spec: ResolvedSpec, extension: ExtensionSpec) -> ResolvedSpec:
-    if violations := list(_violations(spec, extension)):
+@transaction
+def extend_study(session: Session, study_id: str, extension: ExtensionSpec, admitted: Admission = FREELY) -> StudyRead:
+    """Queue the COMPLETED experiments of a study again that are smaller than the totals; their results so far stay.
+
+    An experiment that is larger keeps its size, and one that takes no samples has no iterations to add. A stopped
+    experiment is completed.
+
+    Raises:
+        NotFound: no such study.
+        Conflict: none of its experiments is COMPLETED, the totals add nothing to these, or their reality is unknown
+            here.
+        InvalidSpec: no total is given, or one is above a limit.
+        LimitReached: too much work is in progress.
+    """
+    study, experiments = get_study_permitting(session, study_id, Verb.EXTEND)
+    if violations := list(_missing(extension)):
         raise InvalidSpec(violations)
-    return spec.model_copy(update=extension.model_dump(exclude_none=True))
+    if not _extend(session, [(each, _enlarged(_spec(each), extension)) for each in experiments], admitted):
+        msg = f"no experiment of study {study_id!r} has anything left to run with these totals: ask for larger totals"
+        raise Conflict(msg)
+    return view_studies(session, [study])[0]
+
+
+def _spec(experiment: ExperimentRow) -> ResolvedSpec:
+    if None in experiment.spec["reality"]["parameters"].values():
+        msg = f"experiment {experiment.id!r} was imported while its reality was hidden, so it cannot be extended"
+        raise Conflict(msg)
+    return spec_to_run(experiment.spec)
+
+
+def _enlarged(spec: ResolvedSpec, extension: ExtensionSpec) -> ResolvedSpec:
+    """Return a spec with totals of at least those of the extension."""
+    totals = extension.model_dump(exclude_none=True, exclude=None if takes_samples(spec) else {"iterations"})
+    return spec.model_copy(update={name: max(total, getattr(spec, name)) for name, total in totals.items()})
+
+
+def _extend(session: Session, larger: Sequence[tuple[ExperimentRow, ResolvedSpec]], admitted: Admission) -> bool:
+    """Give experiments the sizes of their larger specs; return whether any of them has something left to run."""
+    growing = [(experiment, spec) for experiment, spec in larger if _has_work(session, experiment, spec)]
+    if not growing:
+        return False
+    specs = [spec for _, spec in growing]
+    check_extent(specs, admitted.limits)
+    computed = tallies(session, [experiment.id for experiment, _ in growing]).values()
+    done = sum(tally.rollouts_done + tally.rollouts_saved for tally in computed)
+    check_load(session, specs, admitted, done=done)
+    for experiment, spec in growing:
+        _grow(session, experiment, spec)
+    return True
+
+
+def _has_work(session: Session, experiment: ExperimentRow, spec: ResolvedSpec) -> bool:
+    repetitions, iterations = repetitions_of(session, experiment.id), extent_of(spec).iterations
+    unfinished = (row.state != State.FAILED and row.iterations_done < iterations for row in repetitions)
+    return spec.repetitions > len(repetitions) or any(unfinished)
+
+
+def _grow(session: Session, experiment: ExperimentRow, spec: ResolvedSpec) -> None:
+    extent, present, row = extent_of(spec), len(repetitions_of(session, experiment.id)), RepetitionRow
+    waits_for_retry = row.state == State.FAILED
+    unfinished = (row.experiment_id == experiment.id) & ~waits_for_retry & (row.iterations_done < extent.iterations)
+    move(session, row, unfinished, State.QUEUED, losses=0)
+    insert_repetitions(session, experiment.id, range(present, spec.repetitions))
+    experiment.spec = experiment.spec | {"iterations": spec.iterations, "repetitions": spec.repetitions}
+    experiment.iterations, experiment.rollouts = extent.iterations, extent.rollouts
+    session.flush()
+    show_again(session, experiment)
+    note(session, EventKind.EXTENDED, experiment.id, iterations=spec.iterations, repetitions=spec.repetitions)
+    settle(session, [experiment.id], State.QUEUED)
+    session.refresh(experiment)
 
 
 def _violations(spec: ResolvedSpec, extension: ExtensionSpec) -> Iterator[Violation]:
-    totals = extension.model_dump(exclude_none=True)
-    if not totals:
-        yield Violation("", {}, "give a total of iterations, of repetitions, or both", ["iterations", "repetitions"])
+    yield from _missing(extension)
     if extension.iterations is not None and not takes_samples(spec):
         subject = "the direct baseline" if is_direct(spec) else spec.strategy.name
         message = f"{subject} has no iterations: it takes no samples; extend its repetitions"
         yield Violation("/iterations", extension.iterations, message)
-    for name, total in totals.items():
+    for name, total in extension.model_dump(exclude_none=True).items():
         present = getattr(spec, name)
         if total < present:
             message = f"{total} is less than the {present} {name} that the experiment has; give a total"
             yield Violation(f"/{name}", total, message, f"at least {present}")
+
+
+def _missing(extension: ExtensionSpec) -> Iterator[Violation]:
+    if not extension.model_dump(exclude_none=True):
+        yield Violation("", {}, "give a total of iterations, of repetitions, or both", ["iterations", "repetitions"])

@@ -17,7 +17,7 @@ from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.checks import cancel_unneeded
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.experiments.views import view_experiments, view_studies
-from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries import attempts, checkpoints, requests
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, lock, with_failures
@@ -64,21 +64,12 @@ def ask_study(session: Session, study_id: str, verb: Verb) -> StudyRead:
         NotFound: no such study.
         Conflict: none of its experiments permits it.
     """
-    study, experiments = get_study(session, study_id), experiments_of(session, [study_id])
-    lock(session, [experiment.id for experiment in experiments])
-    for experiment in experiments:
-        session.refresh(experiment)
-    permitting = [experiment for experiment in experiments if experiment.state in PERMITTED[verb]]
+    study, permitting = get_study_permitting(session, study_id, verb)
     if verb is Verb.RETRY:
         failed = with_failures(session, [experiment.id for experiment in permitting])
         permitting = [experiment for experiment in permitting if experiment.id in failed]
         if not permitting:
             raise Conflict(f"no repetition of study {study_id!r} has FAILED, so none can be retried")
-    if not permitting:
-        states = ", ".join(sorted({experiment.state for experiment in experiments}))
-        permitted = ", ".join(PERMITTED[verb])
-        msg = f"no experiment of study {study_id!r} can be {_PARTICIPLES[verb]}: "
-        raise Conflict(msg + f"they are {states}; permitted: {permitted}")
     for experiment in permitting:
         _obey(session, experiment, verb)
     return view_studies(session, [study])[0]
@@ -126,6 +117,26 @@ def get_permitting(session: Session, experiment_id: str, verb: Verb) -> Experime
         )
         raise Conflict(msg)
     return experiment
+
+
+def get_study_permitting(session: Session, study_id: str, verb: Verb) -> tuple[StudyRow, list[ExperimentRow]]:
+    """Return the study, and those of its experiments whose state permits the verb; all of its experiments are locked.
+
+    Raises:
+        NotFound: no such study.
+        Conflict: none of its experiments permits it.
+    """
+    study, experiments = get_study(session, study_id), experiments_of(session, [study_id])
+    lock(session, [experiment.id for experiment in experiments])
+    for experiment in experiments:
+        session.refresh(experiment)
+    permitting = [experiment for experiment in experiments if experiment.state in PERMITTED[verb]]
+    if not permitting:
+        states = ", ".join(sorted({experiment.state for experiment in experiments}))
+        permitted = ", ".join(PERMITTED[verb])
+        msg = f"no experiment of study {study_id!r} can be {_PARTICIPLES[verb]}: "
+        raise Conflict(msg + f"they are {states}; permitted: {permitted}")
+    return study, permitting
 
 
 def _obey(session: Session, experiment: ExperimentRow, verb: Verb) -> None:

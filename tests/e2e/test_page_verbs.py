@@ -8,12 +8,13 @@ import pytest
 from playwright.sync_api import expect
 
 from gaplab.schemas.access import Role
+from gaplab.schemas.spec import StudySpec
 from gaplab.services.access import create_token
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
-from tests.experiments import run, toy
+from tests.experiments import run, some_log, toy
 
 SLOW_MS = 120_000
 expect.set_options(timeout=SLOW_MS)
@@ -77,6 +78,31 @@ def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api: Any, 
     page.get_by_role("button", name="Stop").click()
     page.get_by_role("button", name="Stop it").click()
     expect(page.locator(".state-now")).to_contain_text("completed")
+
+
+def test_the_direct_baseline_is_extended_by_repetitions_alone(api: Any, written: Store, visit: Any) -> None:
+    submitted = submission.submit_experiment(written, toy(strategy="direct", repetitions=1))
+    (claim,) = execution.claim(written, "tests", 1)
+    run(written, claim, some_log(0))
+    page = visit(address(api, submitted.id))
+    page.get_by_role("button", name="Extend").click()
+    expect(page.get_by_label("Iterations in all")).to_have_count(0)
+    page.get_by_label("Repetitions in all").fill("2")
+    page.get_by_role("button", name="Extend it").click()
+    expect(page.locator(".facts")).to_contain_text("1 of 2")
+
+
+def test_a_study_is_extended(api: Any, written: Store, visit: Any) -> None:
+    spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "direct"]}
+    study = submission.submit_study(written, StudySpec.model_validate(spec | {"iterations": 2, "repetitions": 1}))
+    for claim in execution.claim(written, "tests", 2):
+        run(written, claim, some_log(2 if claim.spec.strategy.name == "random" else 0))
+    page = visit(f"{api.url}/#/studies/{study.id}")
+    page.get_by_role("button", name="Extend").click()
+    page.get_by_label("Repetitions in all").fill("3")
+    page.get_by_role("button", name="Extend it").click()
+    expect(page.locator(".state-now").first).to_contain_text("queued")
+    assert [each["spec"]["repetitions"] for each in api.get(f"/studies/{study.id}")["experiments"]] == [3, 3]
 
 
 def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api: Any, written: Store, visit: Any) -> None:

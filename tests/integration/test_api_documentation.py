@@ -15,7 +15,7 @@ from referencing.jsonschema import DRAFT202012
 from gaplab.api.app import create_app
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
 from gaplab.schemas.plugin import PluginRef
-from gaplab.schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec
+from gaplab.schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec, StudySpec
 from gaplab.services.bench import answering, taking
 from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.experiments import submission
@@ -85,6 +85,7 @@ ENDPOINTS = {
     "POST /studies/{id}/stop",
     "POST /studies/{id}/cancel",
     "POST /studies/{id}/retry",
+    "POST /studies/{id}/extend",
     "GET /experiments/{id}/curve",
     "GET /curves",
     "GET /comparisons",
@@ -196,6 +197,7 @@ OPERATIONS = {
     "export_experiment",
     "export_study",
     "extend_experiment",
+    "extend_study",
     "import_archive",
     "list_attempts",
     "list_events",
@@ -340,7 +342,7 @@ def _subject(store: Store, path: str) -> str:
         if not each.state.ended:
             cancel(store, each.id)
     if not path.startswith(("/requests", "/measurements")):
-        return _completed(store)
+        return _completed(store, study=path.startswith("/studies"))
     request = _waiting(store)
     if path == "/requests/{id}/take":
         return request
@@ -371,10 +373,18 @@ def _waiting(store: Store) -> str:
     return request.id
 
 
-def _completed(store: Store) -> str:
-    experiment = submission.submit_experiment(store, toy(repetitions=1)).id
+def _completed(store: Store, *, study: bool) -> str:
+    """The id of an experiment, or of the study that has it alone."""
+    spec = toy(repetitions=1)
+    made = submission.submit_study(store, study_of(spec)) if study else submission.submit_experiment(store, spec)
     run(store, *execution.claim(store, "me", 1))  # type: ignore[arg-type]
-    return experiment
+    return made.id
+
+
+def study_of(spec: ExperimentSpec) -> StudySpec:
+    return StudySpec.model_validate(
+        {"strategies": [spec.strategy], **spec.model_dump(exclude={"strategy"}, exclude_unset=True)}
+    )
 
 
 def test_every_error_is_documented_as_a_problem(document: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import insert
 
-from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.lifecycle import Ending, State, Verb
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_experiment, export_study, import_archive, opening, unpacking
@@ -27,11 +27,13 @@ from gaplab.services.archives.columns import EXPORTED, ONLY_IF_USED
 from gaplab.services.archives.logs import check_logs
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
+from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.experiments import extension, listing, reading, submission
+from gaplab.services.experiments import extension, lifecycle, listing, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries import archives as repository
 from gaplab.services.store.queries.attempts import attempts_of
@@ -347,6 +349,34 @@ def test_what_came_without_its_reality_cannot_be_extended(store: Store, other: A
     assert reading.read_experiment(other, direct).state is State.COMPLETED
     with pytest.raises(Conflict, match="while its reality was hidden"):
         extension.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
+
+
+def test_a_stopped_study_goes_on_from_its_archive_as_if_it_had_never_stopped(store: Store, other: Any) -> None:
+    spec = StudySpec.model_validate(TOY_STUDY | {"strategies": ["simulated_fit", "random"]})
+    whole = submission.submit_study(other, spec)
+    compute(other)
+    expected = [curves.curve(other, each.id).points for each in whole.experiments]
+    study = submission.submit_study(store, spec)
+    for claim in execution.claim(store, "me", 2):
+        for step, _ in zip(repetition(setting(claim.spec, claim.number)), range(7), strict=False):
+            assert execution.record(store, claim, step)
+        execution.release(store, claim, "its worker was lost")
+    lifecycle.ask_study(store, study.id, Verb.STOP)
+
+    import_archive(other, BytesIO(exported(export_study(store, study.id))))
+    stopped = reading.read_study(other, study.id)
+    extension.extend_study(other, study.id, ExtensionSpec(repetitions=2))
+    compute(other)
+
+    assert (stopped.state, stopped.experiments[0].progress.iterations_done) == (State.COMPLETED, 1)
+    assert [curves.curve(other, each.id).points for each in study.experiments] == expected
+
+
+def compute(store: Store) -> None:
+    """Compute all that is queued, from its stored steps on."""
+    while claims := execution.claim(store, "me", 9):
+        for claim in claims:
+            run(store, claim, repetition(setting(claim.spec, claim.number), claim.log))
 
 
 def test_times_keep_their_microseconds(store: Store, other: Any) -> None:

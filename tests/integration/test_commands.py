@@ -164,6 +164,8 @@ def live_and_die(ask: Callable[..., Any], finish: Callable[[], None]) -> None:
     assert ask("watch", id)["state"] == "COMPLETED"
     assert ask("extend", experiment, "--iterations", "3")["state"] == "QUEUED"
     assert ask("stop", experiment)["state"] == "COMPLETED"
+    assert [each["state"] for each in ask("extend", id, "--repetitions", "4")["experiments"]] == ["QUEUED"] * 2
+    assert ask("stop", id)["state"] == "COMPLETED"
     other = ask("submit", "-", stdin=json.dumps(STUDY | {"strategies": ["random"]}))["id"]
     assert ask("cancel", other)["state"] == "CANCELLED"
     assert [each["id"] for each in ask("list")] == [other, id]

@@ -308,6 +308,44 @@ def test_an_extended_experiment_equals_one_that_was_submitted_with_the_larger_to
     assert curves.curve(store, small).points == curves.curve(store, large).points
 
 
+def test_an_extended_study_equals_one_that_was_submitted_with_the_larger_totals(store: Store) -> None:
+    small = compared(store, iterations=1, repetitions=1)
+    large = compared(store, iterations=2, repetitions=2)
+
+    extended = extension.extend_study(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
+    for experiment in (*small.experiments[:2], *large.experiments):
+        compute(store, experiment.id)
+
+    assert [each.state for each in extended.experiments] == [State.QUEUED, State.QUEUED, State.COMPLETED]
+    found, expected = (reading.read_study(store, each.id) for each in (small, large))
+    assert [each.spec for each in found.experiments[:2]] == [each.spec for each in expected.experiments[:2]]
+    assert found.state is State.COMPLETED
+    for one, other in zip(found.experiments, expected.experiments, strict=True):
+        assert curves.curve(store, one.id).points == curves.curve(store, other.id).points
+    with pytest.raises(Conflict, match="has anything left to run with these totals: ask for larger totals"):
+        extension.extend_study(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
+    with pytest.raises(InvalidSpec, match="give a total of iterations"):
+        extension.extend_study(store, small.id, ExtensionSpec())
+
+
+def test_a_study_of_which_nothing_has_completed_is_not_extended(store: Store) -> None:
+    study = compared(store, compute_it=False, iterations=1, repetitions=1)
+
+    with pytest.raises(Conflict, match="can be extended: they are QUEUED; permitted: COMPLETED"):
+        extension.extend_study(store, study.id, ExtensionSpec(repetitions=9))
+    with pytest.raises(NotFound):
+        extension.extend_study(store, "nope", ExtensionSpec(repetitions=9))
+
+
+def compared(store: Store, *, compute_it: bool = True, **changes: Any) -> Any:
+    """A study of two strategies and of the direct baseline, which has three repetitions."""
+    spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "simulated_fit", "direct"], **changes}
+    study = submission.submit_study(store, StudySpec.model_validate(spec | {"direct_repetitions": 3}))
+    for experiment in study.experiments if compute_it else ():
+        compute(store, experiment.id)
+    return study
+
+
 def test_extending_a_stopped_experiment_to_what_it_had_brings_it_to_its_end(store: Store) -> None:
     whole = submitted(store, repetitions=3)
     expected = compute(store, whole)

@@ -31,11 +31,11 @@ def test_a_study_is_told_apart_from_an_unknown_experiment(gaplab: Gaplab, sqlite
     study = submission.submit_study(sqlite_store, StudySpec.model_validate(SMALL))
     first = study.experiments[0].id
 
-    extended = gaplab("extend", study.id, "--repetitions", "9")
+    accepted = gaplab("accept-versions", study.id)
     drawn = gaplab("figure", "simulators", study.id, "--out", str(tmp_path / "a.svg"))
 
-    assert extended.code == Exit.NOT_FOUND
-    assert f"'{study.id}' is a study, and this needs an experiment: {first} (random), " in extended.err
+    assert accepted.code == Exit.NOT_FOUND
+    assert f"'{study.id}' is a study, and this needs an experiment: {first} (random), " in accepted.err
     assert f"a figure of simulators has one experiment, not a study; choose one of {first} (random), " in drawn.err
 
 

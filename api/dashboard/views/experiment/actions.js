@@ -65,18 +65,19 @@ function cancel(page) {
 
 /** @param {Page.ExperimentPage} page */
 function extend(page) {
-  const { iterations, repetitions } = page.experiment.spec;
-  const whole = { type: "number", required: true, step: 1 };
+  const { level, spec } = page.experiment;
+  const total = { type: "number", required: true, step: 1 };
+  const iterations = { name: "iterations", label: "Iterations in all", value: spec.iterations, min: spec.iterations, max: 1000, ...total };
   openDialog({
     title: "Extend this experiment",
     text: "Enter totals, not what to add. Results so far stay, and the experiment is then as if it had been submitted with these totals. " +
       "To finish an experiment that was stopped, keep the totals as they are.",
     fields: [
-      { name: "iterations", label: "Iterations in all", value: iterations, min: iterations, max: 1000, ...whole },
-      { name: "repetitions", label: "Repetitions in all", value: repetitions, min: repetitions, max: 10000, ...whole },
+      ...(level ? [] : [iterations]),
+      { name: "repetitions", label: "Repetitions in all", value: spec.repetitions, min: spec.repetitions, max: 10000, ...total },
     ],
     action: "Extend it",
-    act: (values) => send(page, "extend", { iterations: Number(values.iterations), repetitions: Number(values.repetitions) }),
+    act: (values) => send(page, "extend", Object.fromEntries(Object.entries(values).map(([name, value]) => [name, Number(value)]))),
   }, page.signal);
 }
 

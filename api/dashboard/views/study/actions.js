@@ -8,8 +8,6 @@ import { actionButtons, isPermitted, PARTICIPLES, permittedStates } from "../../
 
 /** @typedef {import("../../lib/life_cycle.js").Action} Action */
 
-const CONFLICT = 409;
-
 /**
  * Return the buttons, which are updated when `page.study` has changed.
  *
@@ -43,9 +41,10 @@ function refusal(study, action) {
 /**
  * @param {Page.StudyPage} page
  * @param {Action} action
+ * @param {object} [body]
  */
-async function send(page, action) {
-  await post(`/studies/${page.id}/${action}`);
+async function send(page, action, body) {
+  await post(`/studies/${page.id}/${action}`, body);
   await page.reload();
 }
 
@@ -94,30 +93,6 @@ function extend(page) {
       { name: "repetitions", label: "Repetitions in all", value: repetitions, min: 1, max: 10000, ...whole },
     ],
     action: "Extend it",
-    act: async (values) => {
-      await enlarge(experiments, Number(values.iterations), Number(values.repetitions));
-      await page.reload();
-    },
+    act: (values) => send(page, "extend", { iterations: Number(values.iterations), repetitions: Number(values.repetitions) }),
   }, page.signal);
-}
-
-/**
- * Extend experiments one by one; one that is large enough refuses, and is left alone. An experiment without samples has no iterations to add.
- *
- * @param {Api.ExperimentRead[]} experiments
- * @param {number} iterations
- * @param {number} repetitions
- */
-async function enlarge(experiments, iterations, repetitions) {
-  const refusals = [];
-  for (const { id, level, spec } of experiments) {
-    const totals = { repetitions: Math.max(spec.repetitions, repetitions), ...(level ? {} : { iterations: Math.max(spec.iterations, iterations) }) };
-    try {
-      await post(`/experiments/${id}/extend`, totals);
-    } catch (error) {
-      if (error.status !== CONFLICT) throw error;
-      refusals.push(error);
-    }
-  }
-  if (refusals.length === experiments.length) throw refusals[0];
 }
