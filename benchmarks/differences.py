@@ -40,6 +40,11 @@ class Difference(NamedTuple):
             float(norm.sf((margin - abs(self.value)) / self.error)) if self.error else float(abs(self.value) >= margin)
         )
 
+    @property
+    def p_of_none(self) -> float:
+        """Return the two-sided p of the hypothesis that there is no difference."""
+        return float(2 * norm.sf(abs(self.value) / self.error)) if self.error else float(self.value == 0.0)
+
     def verdict(self, margin: float) -> str:
         """Return whether the difference is shown to be within the margin, or shown to be one and not within."""
         if self.p(margin) < SIGNIFICANT:

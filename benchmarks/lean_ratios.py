@@ -38,13 +38,20 @@ def ratio_rows(
             values = [recorded[side[name]] for side in (lean, paper)]
             if all(count < each.shape[1] for each in values):
                 first, second = (each[:, count] / own.mean() for each, own in zip(values, baselines, strict=True))
-                found = _difference(first, second, baselines)
+                found = ratio_difference(first, second, baselines)
                 if found is not None:
                     means = (f"{np.nanmean(each):.3f}" for each in (first, second))
                     yield name, str(count), *means, *found.cells(margin)
 
 
-def _difference(first: FloatArray, second: FloatArray, baselines: Sequence[FloatArray]) -> Difference | None:
+def ratio_difference(first: FloatArray, second: FloatArray, baselines: Sequence[FloatArray]) -> Difference | None:
+    """Return the mean difference of paired ratios to direct, with the errors of both baselines; None if undefined.
+
+    Args:
+        first: ratios `(r,)` by repetition; nan is missing.
+        second: the same.
+        baselines: fitness of direct behind each, by repetition.
+    """
     lower, upper = difference_interval(first, second, paired=True)
     one, other = both(first, second)
     found = Difference.of(float((one - other).mean()) if len(one) else None, lower, upper)

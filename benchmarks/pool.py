@@ -1,6 +1,7 @@
 """Speed-up of one repetition of *informative* on two cores, beside that of two bare processes on this machine.
 
-`python -m benchmarks.pool --evaluations 1000` prints it, and that of each kind of step.
+`python -m benchmarks.pool --evaluations 1000` prints it, and that of each kind of step; `--preset lean` takes the
+optimizer and options of that budget.
 """
 
 import argparse
@@ -20,6 +21,7 @@ from gaplab.services.core.types import Selected, Step, Transferred, Tuned
 from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.presets import PRESETS
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
@@ -36,9 +38,10 @@ Spent: TypeAlias = list[tuple[str, int, float]]
 """Kind, rollouts and seconds of each step."""
 
 
-def spec_of(evaluations: int) -> ExperimentSpec:
+def spec_of(evaluations: int = EVALUATIONS, preset: str = "paper") -> ExperimentSpec:
     """Return a spec whose selection has nine tenths of the rollouts, 20 a newcomer, as at the paper's budgets."""
     budget = {
+        "preset": preset,
         "controller_evaluations": evaluations,
         "selection_evaluations": evaluations,
         "simulator_evaluations": evaluations // 4,
@@ -57,12 +60,12 @@ def _spent(steps: Iterable[tuple[Step, float]]) -> Spent:
 
 
 @ray.remote(num_cpus=1)
-def _alone(evaluations: int) -> Spent:
+def _alone(spec: ExperimentSpec) -> Spent:
     """Run the repetition on one core, even if others are idle."""
 
     def timed() -> Iterable[tuple[Step, float]]:
         begun = perf_counter()
-        for step in repetition(setting(resolve_experiment(spec_of(evaluations)), 0)):
+        for step in repetition(setting(resolve_experiment(spec), 0)):
             yield step, perf_counter() - begun
             begun = perf_counter()
 
@@ -78,15 +81,15 @@ def _rollouts(count: int) -> int:
     return count
 
 
-def alone(evaluations: int = EVALUATIONS) -> Spent:
+def alone(spec: ExperimentSpec) -> Spent:
     """Run the repetition in one process; return what its steps took."""
-    found: Spent = ray.get(_alone.remote(evaluations))
+    found: Spent = ray.get(_alone.remote(spec))
     return found
 
 
-def on_all_cores(evaluations: int = EVALUATIONS) -> Spent:
+def on_all_cores(spec: ExperimentSpec) -> Spent:
     """Run the repetition as the service does; return what its steps took."""
-    claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=resolve_experiment(spec_of(evaluations)))
+    claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=resolve_experiment(spec))
     stream: Any = task.run.remote(claim, {}, CHECKPOINT_S, None)
     delivered = (each for batch in stream for each in ray.get(batch))
     return _spent((each.step, each.seconds) for each in delivered if isinstance(each, TimedStep))
@@ -105,19 +108,21 @@ def settled(work: Callable[[], object]) -> float:
     return perf_counter() - begun
 
 
-def rows(rounds: int, evaluations: int = EVALUATIONS) -> list[Row]:
+def rows(rounds: int, spec: ExperimentSpec | None = None) -> list[Row]:
     """Measure the speed-up of a repetition, of each kind of its steps, and of bare processes in the same rounds."""
+    spec = spec or spec_of()
     spent: dict[str, list[Spent]] = {"one": [], "two": []}
     competitors: dict[str, Callable[[], object]] = {
-        "one": lambda: spent["one"].append(alone(evaluations)),
-        "two": lambda: spent["two"].append(on_all_cores(evaluations)),
+        "one": lambda: spent["one"].append(alone(spec)),
+        "two": lambda: spent["two"].append(on_all_cores(spec)),
         "bare one": bare(1),
         "bare two": bare(2),
     }
     taken: dict[str, list[float]] = {name: [] for name in competitors}
     with cluster(Settings(workers=2)):
         bare(2)()  # load the engines
-        if _rollouts_of(on_all_cores()) != _rollouts_of(alone()):
+        first = spec_of(preset=spec.budget.preset)
+        if _rollouts_of(on_all_cores(first)) != _rollouts_of(alone(first)):
             raise RuntimeError("the service's task computes other steps than the repetition")
         for _ in range(rounds):
             for name, work in competitors.items():
@@ -157,9 +162,10 @@ def main() -> None:
     """Print the rows."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--evaluations", type=int, default=EVALUATIONS, help="evaluations of a transfer")
+    parser.add_argument("--preset", default="paper", choices=list(PRESETS), help="what the numbers leave out")
     parser.add_argument("--rounds", type=int, default=3, help="rounds in which the parts of a ratio take turns")
     arguments = parser.parse_args()
-    for row in rows(arguments.rounds, arguments.evaluations):
+    for row in rows(arguments.rounds, spec_of(arguments.evaluations, arguments.preset)):
         print(f"{row.figure}: {row.value}", "" if row.ratio is None else f"{row.ratio:.2f}", sep="; ")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.archives import private_store
 from benchmarks.reproduction.document import ROOT, Document
 from benchmarks.reproduction.studies import Study, read_study
-from benchmarks.reproduction.tables import FIGURE_3, TOY
+from benchmarks.reproduction.tables import FIGURE_3, is_toy
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.figures.marks import FigureDefinition
@@ -28,7 +28,7 @@ def figures(store: Store, label: str, study: Study) -> Iterator[tuple[int, Figur
     yield 4, curves_figure(study.curves, title=study.name or label)
     shown = [count for count in FIGURE_3[1:] if count <= study.last]
     first = next((arm for name in study.present if (arm := study.arm(name))), None)
-    if study.arms[0].spec.robot.name == TOY and first and shown:
+    if is_toy(study) and first and shown:
         yield 3, toy_figure(toy_iterations(store, first.read.id, 0, shown))
 
 

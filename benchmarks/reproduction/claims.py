@@ -9,6 +9,8 @@ from benchmarks.reproduction import paper, statements
 from benchmarks.reproduction.evidence import Evidence, Examined
 from benchmarks.reproduction.pairs import (
     fit_strategies_differ,
+    fit_strategies_lead,
+    known_fit_leads_random,
     one_sample_wins,
     uniqueness_gains,
     weak_strategies_differ,
@@ -43,15 +45,21 @@ def starts_are_alike(study: Study) -> Examined:
         return Examined("", "", (), (NO_DIRECT,) if not len(study.direct) else lacking)
     together = np.concatenate(list(starts.values()))
     margin, level = NEAR * study.unit, paper.START * study.direct
+    others = {name: np.concatenate([starts[each] for each in starts if each != name]) for name in starts}
     evidence = [
         Evidence(
             f"{spoken(name)} near the others",
-            *statements.alike(own, np.concatenate([starts[each] for each in starts if each != name]), margin),
+            *statements.alike(own, others[name], margin),
+            statements.estimate(own, others[name], study.unit),
         )
         for name, own in starts.items()
         if len(starts) > 1
     ]
-    near = Evidence(f"all together near {paper.START:.2f}", *statements.alike(together, level, margin))
+    near = Evidence(
+        f"all together near {paper.START:.2f}",
+        *statements.alike(together, level, margin),
+        statements.estimate(together, study.direct, study.unit, base=1.0),
+    )
     ratios = [own.mean() / study.unit for own in starts.values()]
     here = f"{together.mean() / study.unit:.2f} of direct; strategies {min(ratios):.2f} to {max(ratios):.2f}"
     return Examined(here, NO_TEST, (*evidence, near), lacking)
@@ -76,8 +84,10 @@ def three_samples_reach_direct(study: Study) -> Examined:
 
 
 def _reaches(study: Study, name: str, count: int, share: float) -> Evidence:
-    p_values = statements.above(study.values(name, count, count), share * study.direct)
-    return Evidence(f"{spoken(name)} above {share:.2f} after {count}", *p_values)
+    values = study.values(name, count, count)
+    told = statements.estimate(values, study.direct, study.unit, base=1.0)
+    p_values = statements.above(values, share * study.direct)
+    return Evidence(f"{spoken(name)} above {share:.2f} after {count}", *p_values, told)
 
 
 def _ratio(study: Study, name: str, count: int) -> str:
@@ -95,7 +105,7 @@ def fit_strategies_vary_less(study: Study) -> Examined:
         return Examined("", "", (), (*lacking, *reason))
     narrow, wide = ([study.complete(name, 3, study.last) for name in names] for names in (fit, weak))
     ratio, p_values = statements.narrower(narrow, wide, NEARER_TO_A_THIRD)
-    evidence = Evidence(f"ratio of the deviations below {NEARER_TO_A_THIRD:.2f}", *p_values)
+    evidence = Evidence(f"ratio of the deviations below {NEARER_TO_A_THIRD:.2f}", *p_values, f"{ratio:.2f}")
     centred = [
         np.concatenate([each.mean(axis=1) - np.median(each.mean(axis=1)) for each in side]) for side in (narrow, wide)
     ]
@@ -117,9 +127,10 @@ def curves_rise_and_flatten(study: Study) -> Examined:
     for name in present:
         recorded = study.complete(name, 0, study.last)
         early, late = recorded[:, middle] - recorded[:, 0], recorded[:, -1] - recorded[:, middle]
-        evidence.append(Evidence(f"{spoken(name)} rises", *statements.rising(early + late, least)))
         slowing = early / middle - late / (study.last - middle)
-        evidence.append(Evidence(f"{spoken(name)} flattens", *statements.rising(slowing)))
+        for verb, gains, size in (("rises", early + late, least), ("flattens", slowing, 0.0)):
+            told_gain = statements.estimate(gains, np.zeros_like(gains), study.unit, paired=True)
+            evidence.append(Evidence(f"{spoken(name)} {verb}", *statements.rising(gains, size), told_gain))
         if len(recorded):
             told.append(f"{spoken(name)} {_gain(study, early)} and {_gain(study, late)}")
     unit = "" if np.isnan(study.unit) else " of direct"
@@ -176,32 +187,44 @@ CLAIMS = (
     Claim(
         "C4",
         "With one sample, simulated fit and informative is significantly better than every other (p < 0.01).",
-        "It is above each of the five others after one sample. Refuted if its lead over one is shown to be smaller "
-        f"than {paper.ONE_SAMPLE.least:.2f} standard deviations, the least that has the paper's p in its 40 "
-        "repetitions.",
+        "It is above each of the five others after one sample. Refuted if its lead is shown to be smaller than "
+        f"{paper.ONE_SAMPLE.least(*paper.SIMULATED_FIT[:2]):.2f} of direct over a strategy with simulated fit, or "
+        f"than {paper.ONE_SAMPLE.least(paper.SIMULATED_FIT[0], paper.WEAK[0]):.2f} over another.",
         one_sample_wins,
     ),
     Claim(
-        "C5",
-        "Beyond two samples, each strategy with simulated fit differs from each other one (p ≪ 0.001), and known fit "
-        "is better than random (p ≈ 0.017).",
-        "Over 3 to 10 samples, these three differ from each other, are above each of the other three, and known fit is "
-        f"above random. Refuted if a difference is shown to be smaller than {paper.BEYOND_TWO.least:.2f} standard "
-        f"deviations (known fit and random: {paper.KNOWN_FIT.least:.2f}), the least that has the paper's p.",
+        "C5a",
+        "Beyond two samples, each strategy with simulated fit is better than each without (p ≪ 0.001).",
+        "Over 3 to 10 samples, each of the three is above each of the other three. Refuted if a lead is shown to be "
+        f"smaller than {paper.BEYOND_TWO.least(paper.SIMULATED_FIT[0], paper.WEAK[0]):.2f} of direct.",
+        fit_strategies_lead,
+    ),
+    Claim(
+        "C5b",
+        "Beyond two samples, the strategies with simulated fit differ from each other (p ≪ 0.001).",
+        "Over 3 to 10 samples, each pair of the three differs. Refuted if a difference is shown to be smaller than "
+        f"{paper.BEYOND_TWO.least(*paper.SIMULATED_FIT[:2]):.2f} of direct.",
         fit_strategies_differ,
+    ),
+    Claim(
+        "C5c",
+        "Beyond two samples, known fit is better than random (p ≈ 0.017).",
+        "Over 3 to 10 samples, known fit is above random. Refuted if its lead is shown to be smaller than "
+        f"{paper.KNOWN_FIT.least(*paper.WEAK[:2]):.2f} of direct.",
+        known_fit_leads_random,
     ),
     Claim(
         "C6",
         "Beyond five samples, the three weak strategies differ from one another (p < 0.05).",
         "Over 6 to 10 samples, each pair of informative, random and known fit differs. Refuted if a difference is "
-        f"shown to be smaller than {paper.BEYOND_FIVE.least:.2f} standard deviations.",
+        f"shown to be smaller than {paper.BEYOND_FIVE.least(*paper.WEAK[:2]):.2f} of direct.",
         weak_strategies_differ,
     ),
     Claim(
         "C7",
         "Uniqueness gives a small gain over plain simulated fit.",
         "Over 3 to 10 samples, simulated fit and unique is above simulated fit. Refuted if its lead is shown to be "
-        f"smaller than {paper.BEYOND_TWO.least:.2f} standard deviations, as for C5.",
+        f"smaller than {paper.BEYOND_TWO.least(*paper.SIMULATED_FIT[:2]):.2f} of direct, as for C5b.",
         uniqueness_gains,
     ),
     Claim(

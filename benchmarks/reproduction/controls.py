@@ -1,11 +1,15 @@
 """Controls: what a single change of a study's spec does to the recorded fitness of its strategies."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import TypeAlias
 
+import numpy as np
+
+from benchmarks.lean_ratios import ratio_difference
 from benchmarks.reproduction.studies import Arm, Study
 from gaplab.schemas.differences import Values
-from gaplab.services.core.comparisons import Compared, compare_all
+from gaplab.services.core.comparisons import compare_all
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING, probability
 from gaplab.services.specs.differences import SpecColumn, differences
@@ -19,7 +23,7 @@ HEAD = ("control", "what differs", "strategy", "samples", "study", "control's", 
 
 
 def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
-    """Return the label of the first study of the same robot, engines, preset and seed.
+    """Return the label of the first study of the same robot, engines and seed.
 
     Raises:
         SystemExit: there is none.
@@ -27,14 +31,15 @@ def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
     for label, study in studies.items():
         if _world(study.arms[0]) == _world(control.arms[0]):
             return label
-    raise SystemExit(f"{control.archives[0]}: no study has its robot, engines, preset and seed")
+    raise SystemExit(f"{control.archives[0]}: no study has its robot, engines and seed")
 
 
 def rows(label: str, control: Study, studies: Mapping[str, Study]) -> Iterator[tuple[str, ...]]:
     """Yield the difference of a control from its study, for each strategy of both and each number of samples.
 
     Fitness is over the direct baseline of its own study; over that of the other one if the control has none. Its
-    repetitions share the random numbers of the study's, so the trusted test is paired.
+    repetitions share the random numbers of the study's, so they are paired. Where there are two baselines, the
+    difference has the errors of both.
 
     Args:
         label: label of the control in the document.
@@ -43,15 +48,15 @@ def rows(label: str, control: Study, studies: Mapping[str, Study]) -> Iterator[t
     """
     beside = compared_with(control, studies)
     study = studies[beside]
-    units = study.unit, control.unit if len(control.direct) else study.unit
     for arm in control.arms:
         own = study.arm(arm.strategy)
         if own is None:
             continue
         head = f"{label}, beside {beside}", what_differs(own, arm), spoken(arm.strategy)
         for count in [0] if arm.read.direct else COUNTS:
-            if row := _row((own, arm), (1.0, 1.0) if arm.read.direct else units, count):
-                yield *head, *row
+            row = _by_pairs if arm.read.direct or not len(control.direct) else _by_ratios
+            if told := row((study, own), (control, arm), count):
+                yield *head, str(count), *told
 
 
 def what_differs(own: Arm, other: Arm) -> str:
@@ -71,21 +76,41 @@ def _told(values: Values) -> str:
 
 def _world(arm: Arm) -> tuple[object, ...]:
     reality = arm.spec.reality.engine
-    return arm.spec.robot, arm.spec.engine.name, reality and reality.name, arm.spec.budget.preset, arm.spec.seed
+    return arm.spec.robot, arm.spec.engine.name, reality and reality.name, arm.spec.seed
 
 
-def _row(arms: Iterable[Arm], units: tuple[float, float], count: int) -> tuple[str, ...] | None:
-    """Return number of samples, both means, their difference and its test; None without values."""
-    own, other = (_scaled(arm, unit) for arm, unit in zip(arms, units, strict=True))
-    (pair,) = compare_all([other, own], count, count, intervals=False)
+Side: TypeAlias = tuple[Study, Arm]
+"""An experiment in its study."""
+
+
+def _by_pairs(side: Side, other: Side, count: int) -> tuple[str, ...] | None:
+    """Return both means, their difference and the trusted test; None without values.
+
+    Fitness is over the direct baseline of the first study; that of direct itself is as it is.
+    """
+    unit = 1.0 if side[1].read.direct else side[0].unit
+    compared = [replace(own := arm.compared(), recorded=own.recorded / unit) for _, arm in (other, side)]
+    (pair,) = compare_all(compared, count, count, intervals=False)
     if pair.difference is None:
         return None
     means = (f"{each.mean.value:.2f} ({each.n})" for each in (pair.summary_second, pair.summary_first))
-    span = "" if pair.lower is None or pair.upper is None else f" ({pair.lower:+.3f} to {pair.upper:+.3f})"
-    difference = f"{pair.difference:+.3f}{span}".replace("-", "\N{MINUS SIGN}")
-    return str(count), *means, difference, pair.trusted.test.replace("_", " "), probability(pair.trusted.p)
+    told = _interval(pair.difference, pair.lower, pair.upper)
+    return *means, told, pair.trusted.test.replace("_", " "), probability(pair.trusted.p)
 
 
-def _scaled(arm: Arm, unit: float) -> Compared:
-    compared = arm.compared()
-    return replace(compared, recorded=compared.recorded / unit)
+def _by_ratios(side: Side, other: Side, count: int) -> tuple[str, ...] | None:
+    """Return both means over their own baselines, their difference with the errors of both, and its test."""
+    if any(count >= arm.recorded.shape[1] for _, arm in (side, other)):
+        return None
+    first, second = (arm.recorded[:, count] / study.unit for study, arm in (other, side))
+    found = ratio_difference(first, second, [study.direct for study, _ in (other, side)])
+    if found is None:
+        return None
+    means = (f"{np.nanmean(each):.2f} ({np.isfinite(each).sum()})" for each in (second, first))
+    told = _interval(found.value, found.value - found.half, found.value + found.half)
+    return *means, told, "z", probability(found.p_of_none)
+
+
+def _interval(difference: float, lower: float | None, upper: float | None) -> str:
+    span = "" if lower is None or upper is None else f" ({lower:+.3f} to {upper:+.3f})"
+    return f"{difference:+.3f}{span}".replace("-", "\N{MINUS SIGN}")

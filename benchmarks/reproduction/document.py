@@ -5,21 +5,26 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.reproduction import controls, tables
+from benchmarks.reproduction import controls, origins, rankings, tables
 from benchmarks.reproduction.claims import CLAIMS, Claim
 from benchmarks.reproduction.evidence import RULES, Examined, Judged, Verdict, judge
 from benchmarks.reproduction.limits import limits
 from benchmarks.reproduction.studies import Study
+from gaplab.services.reports.numbers import probability
 from gaplab.services.store.session import Store
 
 ROOT = Path(__file__).parents[2]
 
 WORDS = {
     Verdict.REPRODUCED: "**reproduced**",
+    Verdict.SMALLER: "**reproduced**, smaller",
     Verdict.NOT: "**not**",
     Verdict.OPEN: "open",
-    Verdict.ABSENT: "absent from it",
+    Verdict.ABSENT: "not in this study",
 }
+
+
+STATEMENT_HEAD = "study", "statement", "here", "p that shows it", "p that refutes it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,14 +49,17 @@ class Document:
         """Return the document."""
         sections = [
             self._opening(),
-            self._studies(),
+            *self._rankings(),
             self._verdicts(),
             *self._figure_4(),
-            *self._figure_3(),
+            *self._origins(),
             *self._claims(),
             *self._controls(),
-            "\n".join(["## How a verdict is reached", "", *(f"- {rule}" for rule in RULES)]),
+            *self._figure_3(),
             "\n".join(["## What the reconstruction cannot know", "", *(f"- {one}" for one in limits(self._link))]),
+            "\n".join(["## How a verdict is reached", "", *(f"- {rule}" for rule in RULES)]),
+            *self._statements(),
+            self._studies(),
             self._costs(),
         ]
         return "\n\n".join(sections) + "\n"
@@ -61,21 +69,23 @@ class Document:
         return Path(os.path.relpath(ROOT / path, self.folder)).as_posix()
 
     def _opening(self) -> str:
-        archives = " ".join(_files(study) for study in self.studies.values())
         return (
             "# The paper's figures and claims\n\n"
             "*A Comparison of Sampling Strategies for Parameter Estimation of a Robot Simulator* (Klaus, Glette and "
-            "Tørresen, SIMPAR 2012), beside stored studies of gaplab. Fitness is a ratio to *direct*: the mean fitness "
-            "of controllers that evolve in reality itself, with as many evaluations.\n\n"
-            "This command wrote the page from the archives below; run it again instead of editing the page:\n\n"
-            f"```sh\npython -m benchmarks.reproduction {archives}{self._control_options()} -o docs/reproduction.md\n```"
+            "Tørresen, SIMPAR 2012), beside [stored studies](#the-studies) of gaplab. Fitness is a ratio to *direct*: "
+            "the mean fitness of controllers that evolve in reality itself, with as many evaluations."
         )
 
     def _control_options(self) -> str:
         return "".join(f" --control {_files(each)}" for each in self.controls.values())
 
     def _studies(self) -> str:
-        return f"## The studies\n\n{self._study_table(self.studies)}"
+        archives = " ".join(_files(study) for study in self.studies.values())
+        return (
+            f"## The studies\n\n{self._study_table(self.studies)}\n\n"
+            "This command wrote the page from these archives; run it again instead of editing the page:\n\n"
+            f"```sh\npython -m benchmarks.reproduction {archives}{self._control_options()} -o docs/reproduction.md\n```"
+        )
 
     def _study_table(self, studies: Mapping[str, Study]) -> str:
         rows = [
@@ -83,6 +93,22 @@ class Document:
             for study in studies.values()
         ]
         return tables.table(tables.STUDY_HEAD, rows)
+
+    def _rankings(self) -> Iterator[str]:
+        yield (
+            "## Which strategies differ\n\nMean recorded fitness over direct. Strategies with a letter in common are "
+            "not told apart by Welch's t after Holm's correction over the pairs of a column. Each repetition is one "
+            "value."
+        )
+        for label, study in self._of_robots():
+            if len(study.present) > 1 and len(study.direct):
+                told = tables.table(rankings.head(study), rankings.rows(study))
+                yield f"**{label}**, {tables.in_words(study)}\n\n{told}"
+
+    def _of_robots(self) -> Iterator[tuple[str, Study]]:
+        """Yield the studies, without those of the toy if there are others."""
+        toys = {label for label, each in self.studies.items() if tables.is_toy(each)}
+        yield from (each for each in self.studies.items() if each[0] not in toys or len(toys) == len(self.studies))
 
     def _verdicts(self) -> str:
         rows = [
@@ -92,7 +118,8 @@ class Document:
         return (
             f"## The verdicts\n\n{tables.table(('claim', *self.studies), rows)}\n\n"
             "Each verdict has its reason [below](#the-claims), and follows from [rules](#how-a-verdict-is-reached). "
-            "Those on a toy function say nothing of the paper's quadruped."
+            "Those on a toy function say nothing of the paper's quadruped: there, evolution in reality finds the "
+            "maximum, which no strategy can pass (C2)."
         )
 
     def _figure_4(self) -> Iterator[str]:
@@ -110,19 +137,35 @@ class Document:
 
     def _figure_3(self) -> Iterator[str]:
         yield (
-            "## Fig. 3\n\nOn the toy function: the median distance of the best simulators from the truth, as a share "
-            "of the bounds; then the fitness over direct. The paper shows one run without numbers, and says that with "
-            "more samples the simulations become more accurate, and the fitness of the transferred individual "
-            "increases until it is near the maximum."
+            "## Fig. 3\n\nThe paper shows one run on a toy function without numbers, and says that with more samples "
+            "the simulations become more accurate, and the fitness of the transferred individual increases until it is "
+            "near the maximum."
         )
-        toys = {label: each for label, each in self.studies.items() if each.arms[0].spec.robot.name == tables.TOY}
+        toys = {label: each for label, each in self.studies.items() if tables.is_toy(each)}
         if not toys:
             yield "None of the archives is a study of the toy function."
         for label, study in toys.items():
             yield f"### Fig. 3: {label}"
             if picture := self.pictures.get((label, 3)):
                 yield f"![Function, simulators, samples and transfer in one repetition of {label}]({picture})"
-            yield tables.figure_3(self.store, study)
+            distances, ratios = tables.figure_3(self.store, study)
+            yield f"Recorded fitness over direct:\n\n{ratios}"
+            yield (
+                f"#### Distance: {label}\n\nMedian distance of the best simulators from the truth, with the bounds of "
+                f"each tunable scaled to 1:\n\n{distances}"
+            )
+
+    def _origins(self) -> Iterator[str]:
+        yield (
+            "## Where the recorded fitness comes from\n\nThe recorded fitness is the larger of two: that of the "
+            "transferred controller, and that of the best sample so far. So a strategy may lead because its simulators "
+            "are better, or because its samples are fit. Means over repetitions, in reality and over direct; the share "
+            "of repetitions whose recorded fitness is a sample's; and the median distance of the best simulators from "
+            "the truth, with the bounds of each tunable scaled to 1."
+        )
+        for label, study in self._of_robots():
+            if len(study.direct) and study.present:
+                yield f"### Origins: {label}\n\n{tables.table(origins.HEAD, list(origins.rows(self.store, study)))}"
 
     def _claims(self) -> Iterator[str]:
         yield "## The claims"
@@ -130,6 +173,19 @@ class Document:
             rows = [_claim_row(label, *judged(claim, study)) for label, study in self.studies.items()]
             head = "study", "verdict", "here", "the paper's test", "the careful test", "why"
             yield f"### {claim.key}\n\n{claim.says}\n\nThe rule: {claim.rule}\n\n{tables.table(head, rows)}"
+
+    def _statements(self) -> Iterator[str]:
+        yield (
+            "## The statements\n\nDifferences, and gains, are of direct; ratios are to direct. Brackets have 90 % "
+            "intervals. Each p is as it is before any correction."
+        )
+        for claim in CLAIMS:
+            rows = [
+                (label, each.statement, each.estimate, probability(each.supports), probability(each.refutes))
+                for label, study in self.studies.items()
+                for each in claim.examine(study).evidence
+            ]
+            yield f"### {claim.key}, by statement\n\n{tables.table(STATEMENT_HEAD, rows)}"
 
     def _controls(self) -> Iterator[str]:
         if not self.controls:
@@ -139,7 +195,7 @@ class Document:
             "baseline of its own study, and over the other's if the control has none. *Direct* itself is in the unit "
             "of fitness. Brackets have the number of repetitions after a mean, and the 90 % interval after a "
             "difference. Each p is uncorrected. Repetitions of one number share their random numbers, so tests are "
-            "paired."
+            "paired; *z* has the errors of both baselines too."
         )
         yield f"### The controls\n\n{self._study_table(self.controls)}"
         rows = [row for label, each in self.controls.items() for row in controls.rows(label, each, self.studies)]

@@ -29,7 +29,10 @@ AFTER_TEN = 1.4 / DIRECT
 """The strategies with simulated fit after ten samples."""
 
 LEARNED_SD = (0.10 / DIRECT, 0.15 / DIRECT)
-"""Least and greatest standard deviation with simulated fit, "about three times smaller than in" the others."""
+"""Least and greatest standard deviation with simulated fit."""
+
+TIMES = 3.0
+"""How many times smaller these are than those of the others: "about three times"."""
 
 LEAST_RISE = (1.3 / DIRECT - START) / 2
 """Half of the rise of all curves, from about 0.9 "to more or less 1.3"."""
@@ -38,6 +41,19 @@ SIMULATED_FIT = ("simulated_fit", "simulated_fit_and_unique", "simulated_fit_and
 WEAK = ("informative", "random", "known_fit")
 STRATEGIES = (*SIMULATED_FIT[:2], WEAK[0], SIMULATED_FIT[2], *WEAK[1:])
 """The six strategies, in the paper's order."""
+
+
+POWER = 1 / 3
+"""Power with which the paper's design would have found the least effect that agrees with its result.
+
+Source: Simonsohn 2015, Small Telescopes: Detectability and the Evaluation of Replication Results.
+"""
+
+
+def deviation(strategy: str) -> float:
+    """Return the standard deviation of a strategy's values in the paper, as a share of direct."""
+    learned = sum(LEARNED_SD) / 2
+    return learned if strategy in SIMULATED_FIT else TIMES * learned
 
 
 @dataclass(frozen=True)
@@ -53,11 +69,15 @@ class Difference:
     values: int
 
     @property
-    def least(self) -> float:
-        """Return the least difference with this p, in standard deviations of the values."""
+    def effect(self) -> float:
+        """Return the effect, in standard deviations, that the paper's design finds with the power `POWER`."""
         freedom = 2 * self.values - 2
-        quantile: float = stats.t.ppf(1 - self.p / 2, freedom)
+        quantile: float = stats.t.ppf(1 - self.p / 2, freedom) + stats.norm.ppf(POWER)
         return quantile * sqrt(2 / self.values)
+
+    def least(self, first: str, second: str) -> float:
+        """Return that effect between two strategies as a share of direct, with the paper's standard deviations."""
+        return self.effect * sqrt((deviation(first) ** 2 + deviation(second) ** 2) / 2)
 
 
 ONE_SAMPLE = Difference(0.01, REPETITIONS)

@@ -12,7 +12,7 @@ from scipy import stats
 
 from gaplab.schemas.comparisons import Test
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.equivalence import equivalence_p
+from gaplab.services.core.equivalence import difference_interval, equivalence_p
 from gaplab.services.core.statistics import compare, compare_paired
 from gaplab.services.core.streams import stream
 from gaplab.services.core.trends import FEWEST_REPETITIONS
@@ -42,12 +42,12 @@ def above(first: FloatArray, second: FloatArray, least: float = 0.0) -> PValues:
     return _larger(_greater(student), _greater(welch)), _less(against)
 
 
-def apart(first: FloatArray, second: FloatArray, least: float) -> PValues:
-    """Test a difference of two means, either way; refuted if it is shown to be smaller than `least`."""
+def apart(first: FloatArray, second: FloatArray, least: float = 0.0) -> PValues:
+    """Test a difference of two means, either way; refuted if it is shown to be below `least`, unless that is 0."""
     if min(len(first), len(second)) < FEWEST_REPETITIONS:
         return UNKNOWN
     student, welch, _ = compare(first, second)
-    return _larger(student.p, welch.p), equivalence_p(first, second, least, paired=False)
+    return _larger(student.p, welch.p), equivalence_p(first, second, least, paired=False) if least else None
 
 
 def alike(first: FloatArray, second: FloatArray, margin: float) -> PValues:
@@ -104,17 +104,39 @@ def _share(resamples: np.ndarray[Any, np.dtype[np.bool_]]) -> float:
     return float(min(1.0, 2 * (1 + resamples.sum()) / (len(resamples) + 1)))
 
 
-def findable(deviation: float, n: tuple[int, int], tests: int) -> float:
-    """Return the difference of two means that Bonferroni's correction over tests finds with the power `POWER`."""
+def findable(deviation: float, n: tuple[int, int]) -> float:
+    """Return the difference of two means that a two-sided test finds with the power `POWER`."""
     freedom = max(1, sum(n) - 2)
-    quantiles = stats.t.ppf(1 - SIGNIFICANT / 2 / tests, freedom) + stats.t.ppf(POWER, freedom)
+    quantiles = stats.t.ppf(1 - SIGNIFICANT / 2, freedom) + stats.t.ppf(POWER, freedom)
     return float(quantiles * deviation * (1 / n[0] + 1 / n[1]) ** 0.5)
 
 
-def needed(effect: float, tests: int) -> int:
+def needed(effect: float) -> int:
     """Return the repetitions that find a difference of so many standard deviations with the power `POWER`."""
-    quantiles = stats.norm.ppf(1 - SIGNIFICANT / 2 / tests) + stats.norm.ppf(POWER)
+    quantiles = stats.norm.ppf(1 - SIGNIFICANT / 2) + stats.norm.ppf(POWER)
     return int(np.ceil(2 * (quantiles / effect) ** 2))
+
+
+def estimate(first: FloatArray, second: FloatArray, unit: float, *, paired: bool = False, base: float = 0.0) -> str:
+    """Return a difference of means in a unit, with its 90 % interval, in words.
+
+    Args:
+        first: `(n,)`.
+        second: `(m,)`; what is subtracted.
+        unit: the mean of direct; nan for none.
+        paired: whether the values of one repetition belong together.
+        base: added to the difference: 1 for a ratio to direct.
+    """
+    if not len(first) or not len(second):
+        return ""
+    scale = 1.0 if np.isnan(unit) else unit
+    ends = difference_interval(first, second, paired=paired)
+    form = ".2f" if base else "+.3f"
+    value, *known = (
+        f"{base + end / scale:{form}}" for end in (float(first.mean() - second.mean()), *ends) if end is not None
+    )
+    told = f"{value} ({' to '.join(known)})" if known else value
+    return told.replace("-", "\N{MINUS SIGN}")
 
 
 def _greater(test: Test) -> float | None:

@@ -160,14 +160,16 @@ def read_study(store: Store, archives: Sequence[Path]) -> Study:
 
     Raises:
         InvalidArchive: a file is no archive.
-        SystemExit: the archives differ in robot, engines, reality, budget or seed.
+        SystemExit: the archives differ in robot, engines, reality, budget, tuner, optimizers or seed.
     """
     parts = [_part(store, archive) for archive in archives]
     reads = tuple(read for _, experiments_of in parts for read in experiments_of)
     with store.reading() as session:
         arms = _arms(session, reads)
     if len(parts) > 1 and len({_settings(arm.spec) for arm in arms}) > 1:
-        raise SystemExit(f"{', '.join(map(str, archives))}: robot, engines, reality, budget or seed differ")
+        raise SystemExit(
+            f"{', '.join(map(str, archives))}: robot, engines, reality, budget, tuner, optimizers or seed differ"
+        )
     drawn = curves(store, [read.id for read in reads])
     names = _names(arms)
     return Study(
@@ -196,8 +198,8 @@ def _part(store: Store, archive: Path) -> tuple[str, tuple[ExperimentRead, ...]]
 
 def _settings(spec: ResolvedSpec) -> str:
     """Return the settings that experiments of one study share."""
-    shared = {"robot", "controller", "task", "engine", "tunables", "reality", "budget", "controller_optimizer", "seed"}
-    return spec.model_dump_json(include=shared)
+    world = {"robot", "controller", "task", "engine", "tunables", "reality", "seed"}
+    return spec.model_dump_json(include=world | {"budget", "tuner", "discrepancy", "optimizer", "controller_optimizer"})
 
 
 def _arms(session: Session, reads: Sequence[ExperimentRead]) -> tuple[Arm, ...]:

@@ -1,6 +1,6 @@
 """The tables of the document: studies, Fig. 4, Fig. 3 and costs, as rows of Markdown."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from benchmarks.findings import Found, found
 from benchmarks.reproduction import paper
 from benchmarks.reproduction.studies import Arm, Study
 from gaplab.schemas.lifecycle import State
+from gaplab.services.core.arrays import FloatArray
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
 from gaplab.services.store.session import Store
@@ -18,7 +19,22 @@ FIGURE_3 = (0, 2, 4, 6, 8)
 TOY = "toy_function"
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def is_toy(study: Study) -> bool:
+    """Return whether a study is of the toy function."""
+    return study.arms[0].spec.robot.name == TOY
+
+
+def in_words(study: Study) -> str:
+    """Return robot, engines, budget and repetitions of a study in words."""
+    spec, reality = study.arms[0].spec, study.arms[0].read.spec["reality"]["engine"]
+    where = "a robot on a bench" if reality is None else reality["name"]
+    return (
+        f"{spec.robot.name}: {spec.engine.name} for a reality in {where}, budget {spec.budget.preset}, controllers by "
+        f"{spec.controller_optimizer.name}, repetitions: {_repetitions(study)}"
+    )
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table as Markdown."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
@@ -32,6 +48,7 @@ def study_row(study: Study, links: Sequence[str]) -> tuple[str, ...]:
     shares = [f"{100 * size / full:.3g} %" for size, full in zip(sizes, paper.EVALUATIONS, strict=True)]
     reused = "; transfers reused" if budget.reuse_transfer else ""
     divided = "; a tuning's divided by its samples" if spec.tuner.options.get("equal_rollouts") else ""
+    divided += "".join(sorted({_weightiest(arm) for arm in study.arms}))
     preset = f"{budget.preset}, {spec.controller_optimizer.name}"
     truth = ", ".join(
         f"{spoken(name).lower()} {'hidden' if value is None else value}"
@@ -64,6 +81,14 @@ STUDY_HEAD = (
     "rollouts",
     "core-hours",
 )
+
+
+def _weightiest(arm: Arm) -> str:
+    """Return how many simulators score a selection, if not all."""
+    options = arm.spec.strategy.options
+    if not options.get("weightiest"):
+        return ""
+    return f"; selections scored by {options['weightiest']} of {options['simulators']} simulators"
 
 
 def _repetitions(study: Study) -> str:
@@ -120,21 +145,25 @@ def direct_in_words(study: Study) -> str:
     return f"Direct is {own.mean():.2f}{deviation} {unit} ({len(own)} repetitions); {printed}."
 
 
-def figure_3(store: Store, study: Study) -> str:
-    """Return how near the simulators of a toy study are to the truth, and its fitness, by number of samples."""
+def figure_3(store: Store, study: Study) -> tuple[str, str]:
+    """Return the distance of the best simulators from the truth, and the fitness, of a toy study; by samples."""
     counts = [count for count in FIGURE_3 if count <= study.last]
-    rows = []
-    for name in study.present:
-        arm = study.arm(name)
-        away: Mapping[int, Found] = found(store, arm.read.id) if arm else {}
-        rows.append((spoken(name), *(_toy_cell(study, name, count, away) for count in counts)))
-    return table(("samples", *map(str, counts)), rows)
+    distances, ratios = [], []
+    for arm in (own for name in study.present if (own := study.arm(name))):
+        away = found(store, arm.read.id)
+        distances.append((spoken(arm.strategy), *(distance(away.get(count)) for count in counts)))
+        ratios.append((spoken(arm.strategy), *(_mean(arm.values(count, count) / study.unit) for count in counts)))
+    head = "samples", *map(str, counts)
+    return table(head, distances), table(head, ratios)
 
 
-def _toy_cell(study: Study, name: str, count: int, away: Mapping[int, Found]) -> str:
-    distance = f"{np.median(np.linalg.norm(away[count].away, axis=1)):.2f}" if count in away else MISSING
-    values = study.values(name, count, count) / study.unit
-    return f"{distance}; {values.mean():.2f}" if len(values) and np.isfinite(values).all() else distance
+def distance(findings: Found | None) -> str:
+    """Return the median distance of simulators from the truth, with the bounds of each tunable scaled to 1."""
+    return MISSING if findings is None else f"{np.median(np.linalg.norm(findings.away, axis=1)):.2f}"
+
+
+def _mean(values: FloatArray) -> str:
+    return f"{values.mean():.2f}" if len(values) and np.isfinite(values).all() else MISSING
 
 
 def cost_rows(label: str, study: Study) -> Iterator[tuple[str, ...]]:
