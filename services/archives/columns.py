@@ -62,6 +62,7 @@ COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
         "token_id": "names a token of one service",
         "sensitivity_id": "names a check of one service",
         "running": "counts leases, and an archive has none",
+        "turn_at": "is about turns in one service",
         "claimable": "follows from the states of repetitions",
         "paused_because": "is about work that goes on, and an archive has none",
         "hardware": "names hardware of one laboratory; it follows from the spec",

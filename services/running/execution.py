@@ -176,7 +176,9 @@ def _claim(
     attempts.begin(session, ids)
     claims = _claims(session, ids)
     row, experiments = ExperimentRow, sorted({claim.experiment_id for claim in claims})
-    session.execute(update(row).where(row.id.in_(experiments)).values(started_at=func.coalesce(row.started_at, now())))
+    moment = now()
+    turn = {"started_at": func.coalesce(row.started_at, moment), "turn_at": moment}
+    session.execute(update(row).where(row.id.in_(experiments)).values(turn))
     settle(session, experiments)
     provenance.record(session, under, claims)
     return claims

@@ -1,4 +1,6 @@
-"""Turns: by priority, then by the fewest claimed repetitions, then by age.
+"""Turns: by priority, then by the fewest claimed repetitions, then by the longest wait since the last turn.
+
+So the experiments of a study advance together, and a study that is stopped has something of each.
 
 Claimed repetitions that still wait for a core count as running.
 """
@@ -14,7 +16,7 @@ from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.experiments import lock
 
 _ROW = ExperimentRow
-_ORDER = (_ROW.precedence, _ROW.running, _ROW.created_at, _ROW.position, _ROW.id)
+_ORDER = (_ROW.precedence, _ROW.running, _ROW.turn_at, _ROW.position, _ROW.id)
 
 _HELD = select(RepetitionRow.hardware).where(RepetitionRow.hardware.is_not(None))
 
@@ -68,24 +70,24 @@ def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: 
         select(_ROW.id, _ROW.precedence, _ROW.running, _ROW.max_parallel, queued.c.queued, _ROW.hardware)
         .join(queued, queued.c.experiment_id == _ROW.id)
         .where(_ROW.claimable.is_(True), permitted)
-        .order_by(_ROW.created_at, _ROW.position, _ROW.id)
+        .order_by(_ROW.turn_at, _ROW.position, _ROW.id)
     ).all()
     heap = [
-        (precedence, running, age, min(waiting, waiting if most is None else most - running))
-        for age, (_, precedence, running, most, waiting, _) in enumerate(candidates)
+        (precedence, running, place, min(waiting, waiting if most is None else most - running))
+        for place, (_, precedence, running, most, waiting, _) in enumerate(candidates)
     ]
     heapify(heap)
     turns: list[str] = []
     used: set[str] = set()
     while heap and len(turns) < limit:
-        precedence, running, age, room = heap[0]
-        if (hardware := candidates[age].hardware) in used:
+        precedence, running, place, room = heap[0]
+        if (hardware := candidates[place].hardware) in used:
             heappop(heap)
             continue
-        turns.append(candidates[age].id)
+        turns.append(candidates[place].id)
         used |= {hardware} - {None}
         if room > 1:
-            heapreplace(heap, (precedence, running + 1, age, room - 1))
+            heapreplace(heap, (precedence, running + 1, place, room - 1))
         else:
             heappop(heap)
     return turns

@@ -1,4 +1,4 @@
-"""Whose turn it is, on both databases: priority, then fairness, then age; and who gives way."""
+"""Whose turn it is, on both databases: priority, then fairness, then the longest wait; and who gives way."""
 
 from typing import Any
 
@@ -41,6 +41,18 @@ def test_who_has_the_fewest_running_is_next(store: Store) -> None:
 
     assert at_once == [(small, 0), (small, 1), (large, 4)]
     assert later == [(large, 5)]
+
+
+def test_all_experiments_of_a_study_advance_also_on_few_cores(store: Store) -> None:
+    ids = [submitted(store, repetitions=2) for _ in range(3)]
+    given = [execution.claim(store, "me", 1)[0] for _ in range(2)]
+
+    for oldest in range(3):
+        run(store, given[oldest])
+        given += execution.claim(store, "me", 1)
+
+    found = [(ids.index(each.experiment_id), each.number) for each in given]
+    assert found == [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1)]
 
 
 def test_the_higher_priority_comes_first_whatever_runs(store: Store) -> None:

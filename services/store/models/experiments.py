@@ -42,6 +42,7 @@ class ExperimentRow(Base):
         precedence: negated priority: the smallest has its turn first, so that one index has the order of turns.
         max_parallel: largest number of repetitions that run at once; NULL for no limit.
         running: number of claimed repetitions.
+        turn_at: when a repetition was last claimed; when it was submitted, before the first.
         claimable: whether one more may be claimed now. `services/experiments/states.py` keeps it and `running`.
         computed_with: engines, machine, version of the spec and external plug-ins that computed its first steps.
         refused_by: the same of a supervisor that skipped the experiment because they differ.
@@ -59,7 +60,7 @@ class ExperimentRow(Base):
     __tablename__ = "experiment"
     __table_args__ = (
         Index(None, "created_at", "position", "id"),
-        Index("ix_experiment_turn", "claimable", "precedence", "running", "created_at", "position", "id"),
+        Index("ix_experiment_turn", "claimable", "precedence", "running", "turn_at", "position", "id"),
         Index(None, "name", "id"),
         Index(None, "strategy", "id"),
         Index(None, "state", "id"),
@@ -80,6 +81,7 @@ class ExperimentRow(Base):
     precedence: Mapped[int] = mapped_column(default=0)
     max_parallel: Mapped[int | None]
     running: Mapped[int] = mapped_column(default=0)
+    turn_at: Mapped[datetime] = mapped_column(default=lambda row: row.get_current_parameters()["created_at"])
     claimable: Mapped[bool] = mapped_column(default=True)
     computed_with: Mapped[str | None] = mapped_column(Text)
     refused_by: Mapped[str | None] = mapped_column(Text)
