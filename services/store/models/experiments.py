@@ -7,6 +7,7 @@ from sqlalchemy import BigInteger, ForeignKey, Index, String, Text, UniqueConstr
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import State
+from gaplab.services.store.clock import now
 from gaplab.services.store.models.base import SPEC_VERSION, Base, Reason
 from gaplab.services.store.models.leased import LeasedRow
 
@@ -42,7 +43,7 @@ class ExperimentRow(Base):
         precedence: negated priority: the smallest has its turn first, so that one index has the order of turns.
         max_parallel: largest number of repetitions that run at once; NULL for no limit.
         running: number of claimed repetitions.
-        turn_at: when a repetition was last claimed; when it was submitted, before the first.
+        turn_at: when one of its repetitions was last claimed; when it was stored, before the first.
         claimable: whether one more may be claimed now. `services/experiments/states.py` keeps it and `running`.
         computed_with: engines, machine, version of the spec and external plug-ins that computed its first steps.
         refused_by: the same of a supervisor that skipped the experiment because they differ.
@@ -81,7 +82,7 @@ class ExperimentRow(Base):
     precedence: Mapped[int] = mapped_column(default=0)
     max_parallel: Mapped[int | None]
     running: Mapped[int] = mapped_column(default=0)
-    turn_at: Mapped[datetime] = mapped_column(default=lambda row: row.get_current_parameters()["created_at"])
+    turn_at: Mapped[datetime] = mapped_column(default=now())
     claimable: Mapped[bool] = mapped_column(default=True)
     computed_with: Mapped[str | None] = mapped_column(Text)
     refused_by: Mapped[str | None] = mapped_column(Text)
