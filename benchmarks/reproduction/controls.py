@@ -19,7 +19,7 @@ COUNTS = (1, 2, 3, 5, 10)
 SIZES = {"/iterations", "/repetitions"}
 """Settings that say how much of a study is there."""
 
-HEAD = ("control", "what differs", "strategy", "samples", "study", "control's", "difference", "test", "p")
+HEAD = ("strategy", "samples", "study", "control's", "difference", "test", "p")
 
 
 def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
@@ -34,40 +34,44 @@ def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
     raise SystemExit(f"{control.archives[0]}: no study has its robot, engines and seed")
 
 
-def rows(label: str, control: Study, studies: Mapping[str, Study]) -> Iterator[tuple[str, ...]]:
-    """Yield the difference of a control from its study, for each strategy of both and each number of samples.
+def rows(control: Study, study: Study) -> Iterator[tuple[str, ...]]:
+    """Yield the difference of a control from a study, for each strategy of both and each number of samples.
 
     Fitness is over the direct baseline of its own study; over that of the other one if the control has none. Its
     repetitions share the random numbers of the study's, so they are paired. Where there are two baselines, the
     difference has the errors of both.
 
     Args:
-        label: label of the control in the document.
-        control: has strategies of a study with other settings.
-        studies: the studies, by their labels.
+        control: has strategies of the study with other settings.
+        study: the study.
     """
-    beside = compared_with(control, studies)
-    study = studies[beside]
-    for arm in control.arms:
-        own = study.arm(arm.strategy)
-        if own is None:
-            continue
-        head = f"{label}, beside {beside}", what_differs(own, arm), spoken(arm.strategy)
+    for own, arm in _both(control, study):
         for count in [0] if arm.read.direct else COUNTS:
             row = _by_pairs if arm.read.direct or not len(control.direct) else _by_ratios
             if told := row((study, own), (control, arm), count):
-                yield *head, str(count), *told
+                yield spoken(arm.strategy), str(count), *told
 
 
-def what_differs(own: Arm, other: Arm) -> str:
+def change(control: Study, study: Study) -> str:
+    """Return the settings in which the experiments of a control differ from those of a study."""
+    return "; ".join(dict.fromkeys(each for own, arm in _both(control, study) for each in what_differs(own, arm)))
+
+
+def _both(control: Study, study: Study) -> Iterator[tuple[Arm, Arm]]:
+    """Yield the experiments of each strategy that both have: the study's and the control's."""
+    for arm in control.arms:
+        if (own := study.arm(arm.strategy)) is not None:
+            yield own, arm
+
+
+def what_differs(own: Arm, other: Arm) -> list[str]:
     """Return the settings in which two experiments differ, without their sizes."""
     columns = [SpecColumn(arm.read.id, arm.read.name, (arm.read.spec,)) for arm in (own, other)]
-    told = [
+    return [
         f"{each.setting}: {_told(each.values[1])}, not {_told(each.values[0])}"
         for each in differences(columns).settings
         if each.pointer not in SIZES
     ]
-    return "; ".join(told) or "nothing"
 
 
 def _told(values: Values) -> str:

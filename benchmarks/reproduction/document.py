@@ -198,8 +198,11 @@ class Document:
             "paired; *z* has the errors of both baselines too."
         )
         yield f"### The controls\n\n{self._study_table(self.controls)}"
-        rows = [row for label, each in self.controls.items() for row in controls.rows(label, each, self.studies)]
-        yield f"### What each change does\n\n{tables.table(controls.HEAD, rows)}"
+        for label, control in self.controls.items():
+            beside = controls.compared_with(control, self.studies)
+            told = f"What differs: {controls.change(control, self.studies[beside]) or 'nothing'}."
+            rows = controls.rows(control, self.studies[beside])
+            yield f"### {label}, beside {beside}\n\n{told}\n\n{tables.table(controls.HEAD, rows)}"
 
     def _costs(self) -> str:
         everything = self.studies | self.controls
