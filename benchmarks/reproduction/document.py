@@ -165,7 +165,8 @@ class Document:
         )
         for label, study in self._of_robots():
             if len(study.direct) and study.present:
-                yield f"### Origins: {label}\n\n{tables.table(origins.HEAD, list(origins.rows(self.store, study)))}"
+                told = tables.table(origins.HEAD, origins.rows(self.store, study))
+                yield "\n\n".join(filter(None, (f"### Origins: {label}", origins.lead(self.store, study), told)))
 
     def _claims(self) -> Iterator[str]:
         yield "## The claims"

@@ -9,10 +9,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.findings import found
+from benchmarks.reproduction import paper, statements
 from benchmarks.reproduction.studies import Arm, Study
 from benchmarks.reproduction.tables import distance
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.statistics import finite
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
 from gaplab.services.store.models import MeasurementRow, RepetitionRow
@@ -20,6 +22,9 @@ from gaplab.services.store.queries.repetition_rows import of_experiments
 from gaplab.services.store.session import Session, Store
 
 COUNTS = (1, 3, 10)
+FIRST = 3
+"""Samples from which on the paper compares the strategies."""
+
 HEAD = ("strategy", "samples", "last sample", "best sample", "transferred", "recorded", "from a sample", "distance")
 
 
@@ -43,6 +48,38 @@ def rows(store: Store, study: Study) -> Iterator[tuple[str, ...]]:
             known = np.isfinite(arm.recorded[:, count])
             share = f"{from_sample[known].mean():.0%}" if known.any() else MISSING
             yield spoken(arm.strategy), str(count), *map(_mean, columns), share, distance(away.get(count))
+
+
+def lead(store: Store, study: Study) -> str:
+    """Return in a sentence what simulated fit gains, in transferred controllers alone and in recorded fitness.
+
+    Each repetition is one value, its mean from `FIRST` samples on. Empty if the study lacks one of both groups.
+    """
+    if study.last < FIRST:
+        return ""
+    transferred, recorded = (
+        [
+            [values for name in names if (arm := study.arm(name)) for values in _late(store, arm, only=only)]
+            for names in (paper.SIMULATED_FIT, paper.WEAK)
+        ]
+        for only in (True, False)
+    )
+    if not all((*transferred, *recorded)):
+        return ""
+    told = [statements.estimate(np.array(fit), np.array(weak), study.unit) for fit, weak in (transferred, recorded)]
+    return (
+        f"Over {FIRST} to {study.last} samples, strategies with simulated fit lead the others by {told[0]} of direct "
+        f"in transferred controllers alone, and by {told[1]} in recorded fitness."
+    )
+
+
+def _late(store: Store, arm: Arm, *, only: bool) -> FloatArray:
+    """Return a value for each complete repetition: its recorded fitness, or that of transferred controllers only."""
+    values = arm.recorded
+    if only:
+        with store.reading() as session:
+            values = _fitnesses(session, arm, MeasurementKind.PROBE)
+    return finite(values[:, FIRST:].mean(axis=1))
 
 
 def _fitnesses(session: Session, arm: Arm, kind: MeasurementKind) -> FloatArray:

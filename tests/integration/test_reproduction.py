@@ -335,6 +335,10 @@ def test_recorded_fitness_is_divided_into_samples_and_transfers(document: Docume
         "0.00",
     )
     assert row["transferred"] == row["recorded"] == "1.08"
+    lead = re.search(r"lead the others by (\S+) .* alone, and by (\S+) ", document.sections["Origins: agrees"])
+    assert lead
+    assert lead[1] == lead[2]
+    assert float(lead[1]) == pytest.approx(0.16, abs=0.03)
 
 
 def test_each_statement_has_its_estimate_and_both_p(document: Document) -> None:
