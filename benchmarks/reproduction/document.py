@@ -1,30 +1,18 @@
 """The document, as Markdown, from studies."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.reproduction import controls, origins, rankings, tables
-from benchmarks.reproduction.claims import CLAIMS, Claim
-from benchmarks.reproduction.evidence import RULES, Examined, Judged, Verdict, judge
+from benchmarks.reproduction import claim_tables, controls, origins, rankings, tables
+from benchmarks.reproduction.claims import CLAIMS
+from benchmarks.reproduction.evidence import RULES
 from benchmarks.reproduction.limits import limits
 from benchmarks.reproduction.studies import Study
-from gaplab.services.reports.numbers import probability
 from gaplab.services.store.session import Store
 
 ROOT = Path(__file__).parents[2]
-
-WORDS = {
-    Verdict.REPRODUCED: "**reproduced**",
-    Verdict.SMALLER: "**reproduced**, smaller",
-    Verdict.NOT: "**not**",
-    Verdict.OPEN: "open",
-    Verdict.ABSENT: "not in this study",
-}
-
-
-STATEMENT_HEAD = "study", "statement", "here", "p that shows it", "p that refutes it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +37,7 @@ class Document:
         """Return the document."""
         sections = [
             self._opening(),
+            self._short(),
             *self._rankings(),
             self._verdicts(),
             *self._figure_4(),
@@ -75,6 +64,13 @@ class Document:
             "Tørresen, SIMPAR 2012), beside [stored studies](#the-studies) of gaplab. Fitness is a ratio to *direct*: "
             "the mean fitness of controllers that evolve in reality itself, with as many evaluations."
         )
+
+    def _short(self) -> str:
+        """Return the verdicts of the first study in a sentence each, and what simulated fit gains there."""
+        label, study = next(self._of_robots())
+        lead = origins.lead(self.store, study)
+        meaning = f" {lead} [Why](#where-the-recorded-fitness-comes-from)." if lead else ""
+        return f"**In short**, of {label} ({tables.in_words(study)}): {claim_tables.in_short(study)}.{meaning}"
 
     def _control_options(self) -> str:
         return "".join(f" --control {_files(each)}" for each in self.controls.values())
@@ -111,12 +107,8 @@ class Document:
         yield from (each for each in self.studies.items() if each[0] not in toys or len(toys) == len(self.studies))
 
     def _verdicts(self) -> str:
-        rows = [
-            (f"{claim.key}: {claim.says}", *(WORDS[judged(claim, study)[1].verdict] for study in self.studies.values()))
-            for claim in CLAIMS
-        ]
         return (
-            f"## The verdicts\n\n{tables.table(('claim', *self.studies), rows)}\n\n"
+            f"## The verdicts\n\n{claim_tables.verdicts(self.studies)}\n\n"
             "Each verdict has its reason [below](#the-claims), and follows from [rules](#how-a-verdict-is-reached). "
             "Those on a toy function say nothing of the paper's quadruped: there, evolution in reality finds the "
             "maximum, which no strategy can pass (C2)."
@@ -171,9 +163,8 @@ class Document:
     def _claims(self) -> Iterator[str]:
         yield "## The claims"
         for claim in CLAIMS:
-            rows = [_claim_row(label, *judged(claim, study)) for label, study in self.studies.items()]
-            head = "study", "verdict", "here", "the paper's test", "the careful test", "why"
-            yield f"### {claim.key}\n\n{claim.says}\n\nThe rule: {claim.rule}\n\n{tables.table(head, rows)}"
+            told = claim_tables.reasons(claim, self.studies)
+            yield f"### {claim.key}\n\n{claim.says}\n\nThe rule: {claim.rule}\n\n{told}"
 
     def _statements(self) -> Iterator[str]:
         yield (
@@ -181,12 +172,7 @@ class Document:
             "intervals. Each p is as it is before any correction."
         )
         for claim in CLAIMS:
-            rows = [
-                (label, each.statement, each.estimate, probability(each.supports), probability(each.refutes))
-                for label, study in self.studies.items()
-                for each in claim.examine(study).evidence
-            ]
-            yield f"### {claim.key}, by statement\n\n{tables.table(STATEMENT_HEAD, rows)}"
+            yield f"### {claim.key}, by statement\n\n{claim_tables.statements(claim, self.studies)}"
 
     def _controls(self) -> Iterator[str]:
         if not self.controls:
@@ -224,16 +210,6 @@ class Document:
             "lost, and waiting for a core; early archives lack them. A core-hour is an hour of one thread of the "
             f"engine, on the machines of the archives' provenance.\n\n{tables.table(tables.COST_HEAD, [*rows, total])}"
         )
-
-
-def judged(claim: Claim, study: Study) -> tuple[Examined, Judged]:
-    """Return a claim as a study shows it, and the verdict."""
-    examined = claim.examine(study)
-    return examined, judge(examined)
-
-
-def _claim_row(label: str, examined: Examined, verdict: Judged) -> Sequence[str]:
-    return label, WORDS[verdict.verdict], examined.here, examined.paper_test, verdict.careful, verdict.why
 
 
 def _files(study: Study) -> str:

@@ -1,0 +1,64 @@
+"""The tables of claims: verdicts, reasons and statements, as Markdown."""
+
+from collections.abc import Mapping
+
+from benchmarks.reproduction.claims import CLAIMS, Claim
+from benchmarks.reproduction.evidence import Examined, Judged, Verdict, judge
+from benchmarks.reproduction.studies import Study
+from benchmarks.reproduction.tables import table
+from gaplab.services.reports.numbers import probability
+
+WORDS = {
+    Verdict.REPRODUCED: "**reproduced**",
+    Verdict.SMALLER: "**reproduced**, smaller",
+    Verdict.NOT: "**not**",
+    Verdict.OPEN: "open",
+    Verdict.ABSENT: "not in this study",
+}
+CLAIM_HEAD = "study", "verdict", "here", "the paper's test", "the careful test", "why"
+STATEMENT_HEAD = "study", "statement", "here", "p that shows it", "p that refutes it"
+
+
+def judged(claim: Claim, study: Study) -> tuple[Examined, Judged]:
+    """Return a claim as a study shows it, and the verdict."""
+    examined = claim.examine(study)
+    return examined, judge(examined)
+
+
+def in_short(study: Study) -> str:
+    """Return the claims of each verdict in a study."""
+    verdicts = {claim.key: judged(claim, study)[1].verdict for claim in CLAIMS}
+    return "; ".join(
+        f"{WORDS[verdict].replace('**', '')}: {', '.join(keys)}"
+        for verdict in Verdict
+        if (keys := [key for key, each in verdicts.items() if each is verdict])
+    )
+
+
+def verdicts(studies: Mapping[str, Study]) -> str:
+    """Return the verdict on each claim by study."""
+    rows = (
+        (f"{claim.key}: {claim.says}", *(WORDS[judged(claim, study)[1].verdict] for study in studies.values()))
+        for claim in CLAIMS
+    )
+    return table(("claim", *studies), rows)
+
+
+def reasons(claim: Claim, studies: Mapping[str, Study]) -> str:
+    """Return the verdicts on a claim with numbers, tests and reasons."""
+    found = {label: judged(claim, study) for label, study in studies.items()}
+    rows = (
+        (label, WORDS[verdict.verdict], examined.here, examined.paper_test, verdict.careful, verdict.why)
+        for label, (examined, verdict) in found.items()
+    )
+    return table(CLAIM_HEAD, rows)
+
+
+def statements(claim: Claim, studies: Mapping[str, Study]) -> str:
+    """Return the statements of a claim with estimates and both p."""
+    rows = (
+        (label, each.statement, each.estimate, probability(each.supports), probability(each.refutes))
+        for label, study in studies.items()
+        for each in claim.examine(study).evidence
+    )
+    return table(STATEMENT_HEAD, rows)
