@@ -181,8 +181,9 @@ class Document:
             "## Controls\n\nEach control repeats strategies of a study with one change. Fitness is over the direct "
             "baseline of its own study, and over the other's if the control has none. *Direct* itself is in the unit "
             "of fitness. Brackets have the number of repetitions after a mean, and the 90 % interval after a "
-            "difference. Each p is uncorrected. Repetitions of one number share their random numbers, so tests are "
-            "paired; *z* has the errors of both baselines too."
+            "difference. Each p is uncorrected. A difference is over the repetitions that both have, so it may not be "
+            "that of the means. Repetitions of one number share their random numbers, so tests are paired; *z* has the "
+            "errors of both baselines too."
         )
         yield f"### The controls\n\n{self._study_table(self.controls)}"
         for label, control in self.controls.items():
