@@ -22,7 +22,7 @@ from benchmarks.lean_count import count_table
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.results.comparisons import Margin, compare
-from gaplab.services.results.curves import curves
+from gaplab.services.results.curves import curves, recorded_of
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.store.queries import experiments
 from gaplab.services.store.session import Store
@@ -112,22 +112,25 @@ def equivalence_rows(store: Store, side: Sides, margin: float) -> Iterator[tuple
     for name in side.both:
         pair = [side.lean[name], side.paper[name]]
         known = means(store, pair)
+        with store.reading() as session:
+            _, recorded = recorded_of(session, pair)
         shared = [count for count in COUNTS if all(count in known[id_] for id_ in pair)]
         for count in shared or [0]:
-            (one,) = compare(store, pair, from_evaluations=count, to_evaluations=count, margin=Margin(margin))
+            (one,) = compare(
+                store, pair, from_evaluations=count, to_evaluations=count, margin=Margin(margin), intervals=False
+            )
             assert one.equivalence is not None
-            interval = f"{_number(one.difference)} ({_number(one.lower)} to {_number(one.upper)})"
-            sizes = f"{one.n_first}, {one.n_second}"
-            p = "-" if one.equivalence.p is None else f"{one.equivalence.p:.2g}"
-            found = Difference.of(one.difference, one.lower, one.upper)
+            values = [recorded[id_][:, count] for id_ in pair]
+            found = (Difference.paired if one.shared_streams else Difference.unpaired)(*values)
             if count and found is not None:
                 differences[count].append(found)
-            chance = "-" if found is None else f"{found.chance(margin):.2f}"
-            yield name, str(count), sizes, interval, one.equivalence.test, p, chance, one.equivalence.verdict.value
+            interval, p, power, _ = ("-",) * 4 if found is None else found.cells(margin)
+            sizes = f"{one.n_first}, {one.n_second}"
+            yield name, str(count), sizes, interval, one.equivalence.test, p, power, one.equivalence.verdict.value
     for count, each in sorted(differences.items()):
         if len(each) > 1:
-            interval, *rest = Difference.mean(each).cells(margin)
-            yield f"mean of {len(each)}", str(count), "", interval, "z", *rest
+            interval, *rest = Difference.sum([(1 / len(each), one) for one in each]).cells(margin)
+            yield f"mean of {len(each)}", str(count), "", interval, "welch", *rest
 
 
 def ranking_rows(store: Store, side: Sides) -> Iterator[tuple[str, ...]]:
@@ -145,10 +148,10 @@ def ranking_rows(store: Store, side: Sides) -> Iterator[tuple[str, ...]]:
         apart = [_apart(store, {name: ids[name] for name in names}, count) for ids in (side.lean, side.paper)]
         same, opposite = len(apart[0] & apart[1]), len({(low, high) for high, low in apart[0]} & apart[1])
         told = f"{len(apart[0])}, {len(apart[1])}; {same} in both, {opposite} opposite"
-        yield str(count), *(" > ".join(order) for order in orders), _yes(orders), f"{tau:.2f}", told
+        yield str(count), *(" > ".join(order) for order in orders), _same(orders), f"{tau:.2f}", told
 
 
-def _yes(orders: Sequence[Sequence[str]]) -> str:
+def _same(orders: Sequence[Sequence[str]]) -> str:
     return "yes" if orders[0] == orders[1] else "no"
 
 
@@ -191,10 +194,6 @@ def judge(store: Store, ids: Iterable[str], direct: float | None) -> Iterator[Ta
         for row in ranking_rows(store, side):
             table.add_row(*row)
         yield table
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
 
 
 def main() -> None:

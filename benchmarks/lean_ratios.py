@@ -1,13 +1,11 @@
 """Fitness of `lean` and of `paper` over the direct baseline of each: what the paper's claims are ratios of."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from benchmarks.differences import Difference, Z
+from benchmarks.differences import Difference
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.equivalence import difference_interval
 from gaplab.services.core.statistics import both, finite
 from gaplab.services.results.curves import recorded_of
 from gaplab.services.store.session import Store
@@ -20,10 +18,8 @@ def ratio_rows(
 ) -> Iterator[tuple[str, ...]]:
     """Yield the difference of the ratios to direct, for each strategy and count, and two one-sided tests of it.
 
-    The intervals include the standard errors of both baselines. Repetitions are paired: they share random streams.
-
     Args:
-        store: database with the experiments.
+        store: database with the experiments, all of one seed.
         lean: their ids by strategy, `direct` among them.
         paper: the same.
         counts: numbers of real-world evaluations.
@@ -37,28 +33,35 @@ def ratio_rows(
         for count in counts:
             values = [recorded[side[name]] for side in (lean, paper)]
             if all(count < each.shape[1] for each in values):
-                first, second = (each[:, count] / own.mean() for each, own in zip(values, baselines, strict=True))
-                found = ratio_difference(first, second, baselines)
+                found = ratio_difference(*(each[:, count] for each in values), *baselines)
                 if found is not None:
-                    means = (f"{np.nanmean(each):.3f}" for each in (first, second))
+                    means = (
+                        f"{np.nanmean(each[:, count]) / own.mean():.3f}"
+                        for each, own in zip(values, baselines, strict=True)
+                    )
                     yield name, str(count), *means, *found.cells(margin)
 
 
-def ratio_difference(first: FloatArray, second: FloatArray, baselines: Sequence[FloatArray]) -> Difference | None:
-    """Return the mean difference of paired ratios to direct, with the errors of both baselines; None if undefined.
+def ratio_difference(
+    first: FloatArray, second: FloatArray, baseline: FloatArray, other: FloatArray
+) -> Difference | None:
+    """Return the difference of two means, each over the mean of its own baseline; None for fewer than two values.
+
+    The repetitions are paired: both experiments share random streams. Its error includes those of both baselines.
 
     Args:
-        first: ratios `(r,)` by repetition; nan is missing.
-        second: the same.
-        baselines: fitness of direct behind each, by repetition.
+        first: fitness `(r,)` by repetition; nan is missing.
+        second: the same, of the other experiment.
+        baseline: fitness of direct that belongs to the first, by repetition.
+        other: the same, for the second.
     """
-    lower, upper = difference_interval(first, second, paired=True)
-    one, other = both(first, second)
-    found = Difference.of(float((one - other).mean()) if len(one) else None, lower, upper)
-    if found is None:
+    one, two = both(first, second)
+    bases = Difference.mean(baseline), Difference.mean(other)
+    if bases[0] is None or bases[1] is None:
         return None
-    errors = [
-        Z * float(np.nanmean(ratios)) * float(own.std(ddof=1)) / math.sqrt(len(own)) / float(own.mean())
-        for ratios, own in zip((first, second), baselines, strict=True)
-    ]
-    return found._replace(half=math.hypot(found.half, *errors))
+    pairs = Difference.paired(one / bases[0].value, two / bases[1].value)
+    if pairs is None:
+        return None
+    shares = [float(values.mean()) / base.value**2 for values, base in ((one, bases[0]), (two, bases[1]))]
+    errors = Difference.sum([(1.0, pairs), (shares[0], bases[0]), (-shares[1], bases[1])])
+    return errors._replace(value=pairs.value)

@@ -49,16 +49,15 @@ Archives = tuple[Path, ...]
 
 
 def archives_of(argument: str) -> Archives:
-    """Return the archives of a study, which commas part."""
+    """Return the archives of a study, split at commas."""
     return tuple(Path(each).resolve() for each in argument.split(","))
 
 
 def write(archives: Sequence[Archives], control_archives: Sequence[Archives], output: Path | None) -> None:
     """Write the document and its pictures, or print it."""
     with private_store() as store:
-        studies, controls = (
-            {each[0].stem: read_study(store, each) for each in files} for files in (archives, control_archives)
-        )
+        read = {each: read_study(store, each) for each in dict.fromkeys([*archives, *control_archives])}
+        studies, controls = ({each[0].stem: read[each] for each in files} for files in (archives, control_archives))
         if output is None:
             print(Document(store, studies, ROOT / "docs", {}, controls).text(), end="")
             return
@@ -74,14 +73,18 @@ def main() -> None:
         "archives",
         nargs="+",
         type=archives_of,
-        help="archives of studies, in the order of the document; commas part those of one study",
+        help="archives of studies, in the order of the document; commas between those of one study",
     )
     parser.add_argument("-o", "--output", type=Path, help="file of the document; its pictures go to figures/ beside it")
     parser.add_argument(
-        "--control", action="append", type=archives_of, default=[], help="archive of a control, repeatable"
+        "--control",
+        action="append",
+        type=archives_of,
+        default=[],
+        help="archive of a control, repeatable; it may be a study as well",
     )
     arguments = parser.parse_args()
-    archives = [*arguments.archives, *arguments.control]
+    archives = {*arguments.archives, *arguments.control}
     if len({each[0].stem for each in archives}) < len(archives):
         parser.error("two archives have one name; a name is the label of a study, so rename one")
     write(arguments.archives, arguments.control, arguments.output)

@@ -1,12 +1,12 @@
 """The tables of claims: verdicts, reasons and statements, as Markdown."""
 
 from collections.abc import Mapping
+from functools import cache
 
 from benchmarks.reproduction.claims import CLAIMS, Claim
-from benchmarks.reproduction.evidence import Examined, Judged, Verdict, judge
+from benchmarks.reproduction.evidence import Examined, Judged, Verdict, judge, worded
 from benchmarks.reproduction.studies import Study
 from benchmarks.reproduction.tables import table
-from gaplab.services.reports.numbers import probability
 
 WORDS = {
     Verdict.REPRODUCED: "**reproduced**",
@@ -19,6 +19,7 @@ CLAIM_HEAD = "study", "verdict", "here", "the paper's test", "the careful test",
 STATEMENT_HEAD = "study", "statement", "here", "p that shows it", "p that refutes it"
 
 
+@cache
 def judged(claim: Claim, study: Study) -> tuple[Examined, Judged]:
     """Return a claim as a study shows it, and the verdict."""
     examined = claim.examine(study)
@@ -26,12 +27,12 @@ def judged(claim: Claim, study: Study) -> tuple[Examined, Judged]:
 
 
 def in_short(study: Study) -> str:
-    """Return the claims of each verdict in a study."""
-    verdicts = {claim.key: judged(claim, study)[1].verdict for claim in CLAIMS}
-    return "; ".join(
-        f"{WORDS[verdict].replace('**', '')}: {', '.join(keys)}"
+    """Return the claims of each verdict in a study, as a list in Markdown."""
+    verdicts = {claim: judged(claim, study)[1].verdict for claim in CLAIMS}
+    return "\n".join(
+        f"- {WORDS[verdict]}: {'; '.join(claims)}."
         for verdict in Verdict
-        if (keys := [key for key, each in verdicts.items() if each is verdict])
+        if (claims := [f"{claim.title} ({claim.key})" for claim, each in verdicts.items() if each is verdict])
     )
 
 
@@ -57,8 +58,8 @@ def reasons(claim: Claim, studies: Mapping[str, Study]) -> str:
 def statements(claim: Claim, studies: Mapping[str, Study]) -> str:
     """Return the statements of a claim with estimates and both p."""
     rows = (
-        (label, each.statement, each.estimate, probability(each.supports), probability(each.refutes))
+        (label, each.statement, each.tested.estimate, worded(each.tested.shows), worded(each.tested.refutes))
         for label, study in studies.items()
-        for each in claim.examine(study).evidence
+        for each in judged(claim, study)[0].evidence
     )
     return table(STATEMENT_HEAD, rows)

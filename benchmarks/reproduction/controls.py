@@ -1,55 +1,109 @@
 """Controls: what a single change of a study's spec does to the recorded fitness of its strategies."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from typing import TypeAlias
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.differences import SIGNIFICANT, Difference
 from benchmarks.lean_ratios import ratio_difference
+from benchmarks.reproduction.statements import CONFIDENCE
 from benchmarks.reproduction.studies import Arm, Study
 from gaplab.schemas.differences import Values
-from gaplab.services.core.comparisons import compare_all
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.statistics import both, holm
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING, probability
 from gaplab.services.specs.differences import SpecColumn, differences
 
-COUNTS = (1, 2, 3, 5, 10)
+COUNTS = (0, 1, 2, 3, 5, 10)
 
 SIZES = {"/iterations", "/repetitions"}
 """Settings that say how much of a study is there."""
 
-HEAD = ("strategy", "samples", "study", "control's", "difference", "test", "p")
+HEAD = ("strategy", "samples", "study", "control", "repetitions", "difference", "p")
+
+
+class Row(NamedTuple):
+    """What a control changes in one strategy after one number of samples.
+
+    Attributes:
+        strategy: name of the strategy in words.
+        samples: number of samples.
+        values: fitness `(r,)` of the study and of the control, in the repetitions that both have.
+        difference: the control's mean less the study's.
+    """
+
+    strategy: str
+    samples: int
+    values: tuple[FloatArray, FloatArray]
+    difference: Difference
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the row in words."""
+        means = (f"{each.mean():.2f}" for each in self.values)
+        told = self.difference.told(CONFIDENCE), probability(self.difference.p)
+        return self.strategy, str(self.samples), *means, str(len(self.values[0])), *told
 
 
 def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
-    """Return the label of the first study of the same robot, engines and seed.
+    """Return the label of the study of the same robot, engines and seed that differs least.
+
+    These differ in the fewest settings of a strategy, and share the most strategies.
 
     Raises:
-        SystemExit: there is none.
+        SystemExit: there is none that shares a strategy.
     """
-    for label, study in studies.items():
-        if _world(study.arms[0]) == _world(control.arms[0]):
-            return label
-    raise SystemExit(f"{control.archives[0]}: no study has its robot, engines and seed")
+    changes = {
+        label: (sum(len(what_differs(own, arm)) for own, arm in pairs) / len(pairs), -len(pairs))
+        for label, study in studies.items()
+        if study.archives != control.archives
+        and _world(study.arms[0]) == _world(control.arms[0])
+        and (pairs := list(_both(control, study)))
+    }
+    if not changes:
+        raise SystemExit(f"{control.archives[0]}: no study has its robot, engines and seed, and one of its strategies")
+    return min(changes, key=changes.__getitem__)
 
 
-def rows(control: Study, study: Study) -> Iterator[tuple[str, ...]]:
+def rows(control: Study, study: Study) -> Iterator[Row]:
     """Yield the difference of a control from a study, for each strategy of both and each number of samples.
 
-    Fitness is over the direct baseline of its own study; over that of the other one if the control has none. Its
-    repetitions share the random numbers of the study's, so they are paired. Where there are two baselines, the
-    difference has the errors of both.
+    Fitness is over the direct baseline of its own study. If the control has none, it is over that of the study, whose
+    reality is the same; that of direct itself is as it is. Repetitions of one number share their random numbers, so
+    they are paired. Where there are two baselines, the difference has the errors of both.
 
     Args:
         control: has strategies of the study with other settings.
         study: the study.
+
+    Raises:
+        SystemExit: the control has another reality, and no direct baseline.
     """
+    alone = not len(control.direct)
+    if alone and study.arms[0].spec.reality != control.arms[0].spec.reality:
+        raise SystemExit(f"{control.archives[0]}: it has another reality, so it needs a direct baseline of its own")
     for own, arm in _both(control, study):
+        units = (1.0, 1.0) if arm.read.direct else (study.unit, study.unit if alone else control.unit)
         for count in [0] if arm.read.direct else COUNTS:
-            row = _by_pairs if arm.read.direct or not len(control.direct) else _by_ratios
-            if told := row((study, own), (control, arm), count):
-                yield spoken(arm.strategy), str(count), *told
+            old, new = both(_column(own, count), _column(arm, count))
+            if arm.read.direct or alone:
+                found = Difference.paired(new / units[1], old / units[0])
+            else:
+                found = ratio_difference(new, old, control.direct, study.direct)
+            if found is not None:
+                yield Row(spoken(arm.strategy), count, (old / units[0], new / units[1]), found)
+
+
+def conclusion(found: Sequence[Row]) -> str:
+    """Return in a sentence which differences of a table are shown after Holm's correction over its rows."""
+    corrected = holm([row.difference.p for row in found])
+    shown = [
+        f"{row.strategy.lower()} at {row.samples}"
+        for row, p in zip(found, corrected, strict=True)
+        if p is not None and p < SIGNIFICANT
+    ]
+    return f"Shown after Holm's correction over the table: {', '.join(shown) or 'no difference'}."
 
 
 def change(control: Study, study: Study) -> str:
@@ -83,38 +137,6 @@ def _world(arm: Arm) -> tuple[object, ...]:
     return arm.spec.robot, arm.spec.engine.name, reality and reality.name, arm.spec.seed
 
 
-Side: TypeAlias = tuple[Study, Arm]
-"""An experiment in its study."""
-
-
-def _by_pairs(side: Side, other: Side, count: int) -> tuple[str, ...] | None:
-    """Return both means, their difference and the trusted test; None without values.
-
-    Fitness is over the direct baseline of the first study; that of direct itself is as it is.
-    """
-    unit = 1.0 if side[1].read.direct else side[0].unit
-    compared = [replace(own := arm.compared(), recorded=own.recorded / unit) for _, arm in (other, side)]
-    (pair,) = compare_all(compared, count, count, intervals=False)
-    if pair.difference is None:
-        return None
-    means = (f"{each.mean.value:.2f} ({each.n})" for each in (pair.summary_second, pair.summary_first))
-    told = _interval(pair.difference, pair.lower, pair.upper)
-    return *means, told, pair.trusted.test.replace("_", " "), probability(pair.trusted.p)
-
-
-def _by_ratios(side: Side, other: Side, count: int) -> tuple[str, ...] | None:
-    """Return both means over their own baselines, their difference with the errors of both, and its test."""
-    if any(count >= arm.recorded.shape[1] for _, arm in (side, other)):
-        return None
-    first, second = (arm.recorded[:, count] / study.unit for study, arm in (other, side))
-    found = ratio_difference(first, second, [study.direct for study, _ in (other, side)])
-    if found is None:
-        return None
-    means = (f"{np.nanmean(each):.2f} ({np.isfinite(each).sum()})" for each in (second, first))
-    told = _interval(found.value, found.value - found.half, found.value + found.half)
-    return *means, told, "z", probability(found.p_of_none)
-
-
-def _interval(difference: float, lower: float | None, upper: float | None) -> str:
-    span = "" if lower is None or upper is None else f" ({lower:+.3f} to {upper:+.3f})"
-    return f"{difference:+.3f}{span}".replace("-", "\N{MINUS SIGN}")
+def _column(arm: Arm, count: int) -> FloatArray:
+    """Return recorded fitness `(r,)` after a number of samples; nothing if the experiment never reaches it."""
+    return arm.recorded[:, count] if count < arm.recorded.shape[1] else np.empty(0)

@@ -10,16 +10,13 @@ import numpy as np
 
 from benchmarks.findings import found
 from benchmarks.reproduction import paper, statements
-from benchmarks.reproduction.studies import Arm, Study
-from benchmarks.reproduction.tables import distance
+from benchmarks.reproduction.studies import Arm, Study, measured
+from benchmarks.reproduction.tables import distance, expected_best
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.statistics import finite
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
-from gaplab.services.store.models import MeasurementRow, RepetitionRow
-from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.session import Session, Store
+from gaplab.services.store.session import Store
 
 COUNTS = (1, 3, 10)
 FIRST = 3
@@ -37,14 +34,11 @@ def rows(store: Store, study: Study) -> Iterator[tuple[str, ...]]:
     """
     for arm in (own for name in study.present if (own := study.arm(name))):
         away = found(store, arm.read.id)
-        with store.reading() as session:
-            samples, transferred = (
-                _fitnesses(session, arm, kind) for kind in (MeasurementKind.SAMPLE, MeasurementKind.PROBE)
-            )
+        samples, probed = (measured(store, arm, kind) for kind in (MeasurementKind.SAMPLE, MeasurementKind.PROBE))
         best = np.fmax.accumulate(samples, axis=1)
         for count in (each for each in COUNTS if each <= arm.last):
-            columns = (fitness[:, count] / study.unit for fitness in (samples, best, transferred, arm.recorded))
-            from_sample = best[:, count] > np.nan_to_num(transferred[:, count], nan=-np.inf)
+            columns = (fitness[:, count] / study.unit for fitness in (samples, best, probed, arm.recorded))
+            from_sample = best[:, count] > np.nan_to_num(probed[:, count], nan=-np.inf)
             known = np.isfinite(arm.recorded[:, count])
             share = f"{from_sample[known].mean():.0%}" if known.any() else MISSING
             yield spoken(arm.strategy), str(count), *map(_mean, columns), share, distance(away.get(count))
@@ -53,43 +47,53 @@ def rows(store: Store, study: Study) -> Iterator[tuple[str, ...]]:
 def lead(store: Store, study: Study) -> str:
     """Return in a sentence what simulated fit gains, in transferred controllers alone and in recorded fitness.
 
-    Each repetition is one value, its mean from `FIRST` samples on. Empty if the study lacks one of both groups.
+    Each repetition is one value, and each strategy counts alike. Empty if the study lacks one of both groups.
     """
     if study.last < FIRST:
         return ""
-    transferred, recorded = (
-        [
-            [values for name in names if (arm := study.arm(name)) for values in _late(store, arm, only=only)]
-            for names in (paper.SIMULATED_FIT, paper.WEAK)
-        ]
-        for only in (True, False)
-    )
-    if not all((*transferred, *recorded)):
+    spans = [(FIRST, study.last), (study.last, study.last)]
+    told = [
+        _lead(store, study, span, transferred_only=transferred_only)
+        for span in spans
+        for transferred_only in (True, False)
+    ]
+    if not all(told):
         return ""
-    told = [statements.estimate(np.array(fit), np.array(weak), study.unit) for fit, weak in (transferred, recorded)]
     return (
         f"Over {FIRST} to {study.last} samples, strategies with simulated fit lead the others by {told[0]} of direct "
-        f"in transferred controllers alone, and by {told[1]} in recorded fitness."
+        f"in transferred controllers alone, and by {told[1]} in recorded fitness; after {study.last}, by {told[2]} and "
+        f"{told[3]}.{_searched_as_often(study)}"
     )
 
 
-def _late(store: Store, arm: Arm, *, only: bool) -> FloatArray:
-    """Return a value for each complete repetition: its recorded fitness, or that of transferred controllers only."""
-    values = arm.recorded
-    if only:
-        with store.reading() as session:
-            values = _fitnesses(session, arm, MeasurementKind.PROBE)
-    return finite(values[:, FIRST:].mean(axis=1))
+def _searched_as_often(study: Study) -> str:
+    """Return in a sentence what the best of as many direct searches would have, if direct has enough repetitions."""
+    first, last = (expected_best(study.direct, count + 1) / study.unit for count in (FIRST, study.last))
+    if np.isnan(last):
+        return ""
+    return f" The best of as many direct searches would have {first:.2f} after {FIRST} samples, and {last:.2f} at last."
 
 
-def _fitnesses(session: Session, arm: Arm, kind: MeasurementKind) -> FloatArray:
-    """Return measured fitness `(r, k)` by repetition and number of samples; nan if it failed or is missing."""
-    row = MeasurementRow
-    values = np.full(arm.recorded.shape, np.nan)
-    query = of_experiments(row, [arm.read.id], RepetitionRow.number, row.iteration, row.fitness)
-    for repetition, iteration, fitness in session.execute(query.where(row.kind == kind, row.fitness.is_not(None))):
-        values[repetition, iteration] = fitness
-    return values
+def _lead(store: Store, study: Study, span: tuple[int, int], *, transferred_only: bool) -> str:
+    """Return the difference with its interval; the repetitions are those with both values at all its samples."""
+    sides = [
+        [
+            _over(store, arm, span, transferred_only=transferred_only)
+            for name in names
+            if (arm := study.arm(name)) is not None
+        ]
+        for names in (paper.SIMULATED_FIT, paper.WEAK)
+    ]
+    return statements.contrast(sides[0], sides[1], study.unit) if all(sides) else ""
+
+
+def _over(store: Store, arm: Arm, span: tuple[int, int], *, transferred_only: bool) -> FloatArray:
+    probed = measured(store, arm, MeasurementKind.PROBE)
+    columns = slice(span[0], span[1] + 1)
+    there = np.isfinite(arm.recorded[:, columns] + probed[:, columns]).all(axis=1)
+    chosen = probed if transferred_only else arm.recorded
+    means: FloatArray = chosen[there, columns].mean(axis=1)
+    return means
 
 
 def _mean(values: FloatArray) -> str:

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from benchmarks.reproduction import paper, statements
-from benchmarks.reproduction.evidence import Evidence, Examined
+from benchmarks.reproduction.evidence import NO_TEST, Evidence, Examined
 from benchmarks.reproduction.studies import Study
 from gaplab.schemas.comparisons import Test
 from gaplab.services.core.arrays import FloatArray
@@ -24,13 +24,13 @@ class Pair:
     Attributes:
         first: a strategy.
         second: another one.
-        paper: the difference that the paper found.
+        paper: the difference that the paper found; None if it tests none.
         ahead: whether the paper has the first above the second, and not only different.
     """
 
     first: str
     second: str
-    paper: paper.Difference
+    paper: paper.PaperDifference | None
     ahead: bool = True
 
     def __str__(self) -> str:
@@ -40,8 +40,8 @@ class Pair:
 
     @property
     def least(self) -> float:
-        """Return the least difference that agrees with the paper's, as a share of direct."""
-        return self.paper.least(self.first, self.second)
+        """Return the least difference that agrees with the paper's, as a share of direct; 0 if it gives none."""
+        return self.paper.least(self.first, self.second) if self.paper else 0.0
 
 
 @dataclass(frozen=True)
@@ -82,52 +82,50 @@ class Tested:
     def found_by_student(self) -> bool:
         """Return whether the paper's test finds here what it found in the paper."""
         test = self.student
-        if test.p is None or test.statistic is None:
+        if test.p is None or test.statistic is None or self.pair.paper is None:
             return False
         return test.p < self.pair.paper.p and (test.statistic > 0 or not self.pair.ahead)
 
     def evidence(self) -> Evidence:
         """Return what speaks for and against the statement."""
-        least = 0.0 if np.isnan(self.unit) else self.pair.least * self.unit
         test = statements.above if self.pair.ahead else statements.apart
-        opposed = statements.above(*self.groups[::-1])[0] if self.pair.ahead else None
-        told = statements.estimate(*self.groups, self.unit)
-        return Evidence(str(self.pair), *test(*self.groups, least), told, opposed)
+        opposed = statements.above(*self.groups[::-1], 0.0, self.unit).shows if self.pair.ahead else None
+        return Evidence(str(self.pair), test(*self.groups, self.pair.least, self.unit), opposed)
 
 
 def one_sample_wins(study: Study) -> Examined:
-    """Examine C4."""
+    """Return the evidence that one sample of simulated fit and informative beats all others (C4a)."""
     best = paper.SIMULATED_FIT[2]
     others = [name for name in paper.STRATEGIES if name != best]
     return _examined(study, [Pair(best, other, paper.ONE_SAMPLE) for other in others], 1, 1)
 
 
 def fit_strategies_lead(study: Study) -> Examined:
-    """Examine C5a."""
+    """Return the evidence that strategies with simulated fit end above the others (C5a)."""
     pairs = [Pair(one, other, paper.BEYOND_TWO) for one in paper.SIMULATED_FIT for other in paper.WEAK]
     return _examined(study, pairs, 3, paper.ITERATIONS)
 
 
 def fit_strategies_differ(study: Study) -> Examined:
-    """Examine C5b."""
+    """Return the evidence that strategies with simulated fit differ from each other (C5b)."""
     pairs = [Pair(one, other, paper.BEYOND_TWO, ahead=False) for one, other in combinations(paper.SIMULATED_FIT, 2)]
     return _examined(study, pairs, 3, paper.ITERATIONS)
 
 
 def known_fit_leads_random(study: Study) -> Examined:
-    """Examine C5c."""
+    """Return the evidence that known fit is better than random (C5c)."""
     return _examined(study, [Pair("known_fit", "random", paper.KNOWN_FIT)], 3, paper.ITERATIONS)
 
 
 def weak_strategies_differ(study: Study) -> Examined:
-    """Examine C6."""
+    """Return the evidence that strategies without simulated fit differ from each other (C6)."""
     pairs = [Pair(one, other, paper.BEYOND_FIVE, ahead=False) for one, other in combinations(paper.WEAK, 2)]
     return _examined(study, pairs, 6, paper.ITERATIONS)
 
 
 def uniqueness_gains(study: Study) -> Examined:
-    """Examine C7."""
-    pair = Pair("simulated_fit_and_unique", "simulated_fit", paper.BEYOND_TWO)
+    """Return the evidence that uniqueness gains over plain simulated fit (C7)."""
+    pair = Pair("simulated_fit_and_unique", "simulated_fit", None)
     return _examined(study, [pair], 3, paper.ITERATIONS)
 
 
@@ -159,19 +157,22 @@ def _tested(study: Study, pair: Pair, first: int, last: int) -> Tested:
 
 
 def _here(study: Study, tested: Sequence[Tested]) -> str:
-    """Return the differences of the means, the smallest first for those that the paper has ahead."""
-    ranked = sorted(tested, key=lambda each: each.difference if each.pair.ahead else abs(each.difference))
-    unit = 1.0 if np.isnan(study.unit) else study.unit
-    told = signed(ranked[0].difference / unit)
-    whose = "" if np.isnan(study.unit) else " of direct"
-    least = "difference" if len(ranked) == 1 else "least difference"
-    return f"{least} {told}{whose} ({ranked[0].pair})"
+    """Return the smallest difference of the means; of those that the paper has ahead, the most negative one."""
+    known = [each for each in tested if np.isfinite(each.difference)]
+    if not known:
+        return ""
+    one = min(known, key=lambda each: each.difference if each.pair.ahead else abs(each.difference))
+    whose, unit = ("", 1.0) if np.isnan(study.unit) else (" of direct", study.unit)
+    least = "difference" if len(known) == 1 else "least difference"
+    return f"{least} {signed(one.difference / unit)}{whose} ({one.pair})"
 
 
 def _paper_test(tested: Sequence[Tested], first: int, last: int) -> str:
+    limits = sorted({each.pair.paper.p for each in tested if each.pair.paper})
+    if not limits:
+        return NO_TEST
     where = f"at {number_of('sample', first)}" if first == last else f"pooled over {first} to {last} samples"
     found = sum(each.found_by_student for each in tested)
-    limits = sorted({each.pair.paper.p for each in tested})
     below = " or ".join(f"{limit:g}" for limit in limits)
     p_values = [(each.student.p, each.pair) for each in tested if each.student.p is not None]
     largest = max(p_values, key=lambda each: each[0], default=None)
@@ -180,18 +181,16 @@ def _paper_test(tested: Sequence[Tested], first: int, last: int) -> str:
 
 
 def _findable(study: Study, tested: Sequence[Tested]) -> str:
-    """Return in a sentence what the study could find, and how many repetitions the paper's difference needs."""
-    counted = [each for each in tested if min(map(len, each.groups)) > 1]
+    """Return in a sentence what the study could find, and how many repetitions the paper's differences need."""
+    counted = [each for each in tested if min(map(len, each.groups)) > 1 and each.deviation and each.pair.paper]
     if not counted or np.isnan(study.unit):
         return ""
-    differences = [
-        statements.findable(each.deviation, (len(each.groups[0]), len(each.groups[1]))) / study.unit for each in counted
-    ]
-    widest = int(np.argmax(differences))
-    one = counted[widest]
-    needed = statements.needed(one.pair.least * study.unit / one.deviation) if one.deviation else 2
+    needed = [statements.repetitions_needed(each.pair.least * study.unit / each.deviation) for each in counted]
+    one = counted[int(np.argmax(needed))]
+    sizes = len(one.groups[0]), len(one.groups[1])
+    difference = statements.smallest_found(one.deviation, sizes) / study.unit
     return (
-        f"With {' and '.join(map(str, map(len, one.groups)))} repetitions it finds a difference of "
-        f"{differences[widest]:.2f} of direct. The least that agrees with the paper is {one.pair.least:.2f}: finding "
-        f"it takes {number_of('repetition', needed)}."
+        f"With {' and '.join(map(str, sizes))} repetitions, a true difference of {difference:.2f} of direct is found "
+        f"in {statements.POWER:.0%} of studies ({one.pair}). The least that agrees with the paper is "
+        f"{one.pair.least:.3f}: finding it takes {number_of('repetition', max(needed))}."
     )

@@ -4,10 +4,13 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import combinations
 from string import ascii_lowercase
 
-from benchmarks.reproduction import paper
-from benchmarks.reproduction.statements import SIGNIFICANT
+import numpy as np
+
+from benchmarks.differences import SIGNIFICANT
+from benchmarks.reproduction import paper, statements
 from benchmarks.reproduction.studies import Study
-from gaplab.services.core.comparisons import compare_all
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.statistics import holm
 from gaplab.services.figures.words import number_of, spoken
 from gaplab.services.reports.numbers import MISSING
 
@@ -61,18 +64,18 @@ def _told(first: int, last: int) -> str:
 
 
 def _column(study: Study, first: int, last: int) -> Mapping[str, str]:
-    means = {
-        name: float(values.mean()) / study.unit
+    """Return the mean of each strategy with its letters; without letters before any sample, when all do the same."""
+    values = {name: own for name in study.present if len(own := study.values(name, first, last))}
+    means = {name: float(own.mean()) / study.unit for name, own in values.items()}
+    found = letters(sorted(means, key=means.__getitem__, reverse=True), _differing(values)) if last else {}
+    return {
+        name: f"{means[name]:.2f} {found.get(name, '')}".rstrip() if name in means else MISSING
         for name in study.present
-        if len(values := study.values(name, first, last))
     }
-    ordered = sorted(means, key=means.__getitem__, reverse=True)
-    arms = {arm.read.id: arm for name in ordered if (arm := study.arm(name))}
-    pairs = compare_all([arm.compared() for arm in arms.values()], first, last, intervals=False)
-    differing = {
-        frozenset({arms[pair.first].strategy, arms[pair.second].strategy})
-        for pair in pairs
-        if pair.trusted.p_holm is not None and pair.trusted.p_holm < SIGNIFICANT
-    }
-    found = letters(ordered, differing)
-    return {name: f"{means[name]:.2f} {found[name]}" if name in means else MISSING for name in study.present}
+
+
+def _differing(values: Mapping[str, FloatArray]) -> set[frozenset[str]]:
+    """Return the pairs that Welch's t tells apart after Holm's correction."""
+    pairs = list(combinations(values, 2))
+    corrected = holm([statements.apart(values[one], values[other], 0.0, np.nan).shows for one, other in pairs])
+    return {frozenset(pair) for pair, p in zip(pairs, corrected, strict=True) if p is not None and p < SIGNIFICANT}

@@ -1,80 +1,94 @@
-"""Tests of single statements: each returns the p-values that support it and refute it.
+"""Tests of single statements: each returns the p-values that show it and refute it, and its estimate in words.
 
 The first is p of the hypothesis that the statement does not hold, the second p of the hypothesis that it holds in the
-least size that the paper implies. They are None for fewer than `FEWEST_REPETITIONS` values, or if nothing varies.
+least size that the paper implies. All are two-sided: a p of 0.05 is one of 0.025 on one side. They are None for fewer
+than `FEWEST_REPETITIONS` values, or if nothing varies. Tests and intervals are by Welch's t, so an interval has 0 or
+the size within it exactly if the p is above 0.05.
 """
 
-from collections.abc import Sequence
-from typing import Any, TypeAlias
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy import stats
 
-from gaplab.schemas.comparisons import Test
+from benchmarks.differences import SIGNIFICANT, Difference
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.equivalence import difference_interval, equivalence_p
-from gaplab.services.core.statistics import compare, compare_paired
 from gaplab.services.core.streams import stream
 from gaplab.services.core.trends import FEWEST_REPETITIONS
 
-SIGNIFICANT = 0.05
+CONFIDENCE = 1 - SIGNIFICANT
 POWER = 0.8
 RESAMPLES = 2_000
 
-PValues: TypeAlias = tuple[float | None, float | None]
-"""p-values that support and refute a statement."""
-
-UNKNOWN: PValues = (None, None)
+Test: TypeAlias = Callable[[Difference], tuple[float, float | None]]
+"""Returns p that shows a statement on a difference, and p that refutes it."""
 
 
-def above(first: FloatArray, second: FloatArray, least: float = 0.0) -> PValues:
+class Tested(NamedTuple):
+    """A tested statement.
+
+    Attributes:
+        shows: p of the hypothesis that it does not hold; None if undefined.
+        refutes: p of the hypothesis that it holds in the paper's size; None if undefined.
+        estimate: the estimate with its 95 % interval, in words.
+    """
+
+    shows: float | None
+    refutes: float | None
+    estimate: str
+
+
+def above(first: FloatArray, second: FloatArray, least: float, unit: float) -> Tested:
     """Test a mean above another one.
 
     Args:
         first: `(n,)`.
         second: `(m,)`.
-        least: the difference, in the unit of the values, whose absence refutes the statement.
+        least: the difference, as a share of direct, whose absence refutes the statement.
+        unit: the mean of direct; nan for none.
     """
-    if min(len(first), len(second)) < FEWEST_REPETITIONS:
-        return UNKNOWN
-    student, welch, _ = compare(first, second)
-    against = compare(first - least, second)[1]
-    return _larger(_greater(student), _greater(welch)), _less(against)
+    found = _over(Difference.unpaired(first, second), unit)
+    return _tested(found, (first, second), lambda one: (one.above(0.0), one.below(_size(least, unit))))
 
 
-def apart(first: FloatArray, second: FloatArray, least: float = 0.0) -> PValues:
-    """Test a difference of two means, either way; refuted if it is shown to be below `least`, unless that is 0."""
-    if min(len(first), len(second)) < FEWEST_REPETITIONS:
-        return UNKNOWN
-    student, welch, _ = compare(first, second)
-    return _larger(student.p, welch.p), equivalence_p(first, second, least, paired=False) if least else None
+def apart(first: FloatArray, second: FloatArray, least: float, unit: float) -> Tested:
+    """Test a difference of two means, either way; refuted if it is shown to be below `least`, as in `above`."""
+    found = _over(Difference.unpaired(first, second), unit)
+    size = _size(least, unit)
+    return _tested(found, (first, second), lambda one: (one.p, _doubled(one.within(size)) if size else None))
 
 
-def alike(first: FloatArray, second: FloatArray, margin: float) -> PValues:
-    """Test that two means are within a margin of each other."""
-    if min(len(first), len(second)) < FEWEST_REPETITIONS:
-        return UNKNOWN
-    ends = _greater(compare(first - margin, second)[1]), _less(compare(first + margin, second)[1])
-    known = [p for p in ends if p is not None]
-    return equivalence_p(first, second, margin, paired=False), min(known, default=None)
-
-
-def rising(gains: FloatArray, least: float = 0.0) -> PValues:
+def rises(gains: FloatArray, least: float, unit: float) -> Tested:
     """Test a mean gain above 0, one gain `(r,)` for each repetition; refuted if it is shown to be below `least`."""
-    if len(gains) < FEWEST_REPETITIONS:
-        return UNKNOWN
-    zeros = np.zeros_like(gains)
-    return _greater(compare_paired(gains, zeros)[0]), _less(compare_paired(gains - least, zeros)[0])
+    found = _over(Difference.mean(gains), unit)
+    return _tested(found, (gains,), lambda one: (one.above(0.0), one.below(_size(least, unit))))
 
 
-def narrower(narrow: Sequence[FloatArray], wide: Sequence[FloatArray], threshold: float) -> tuple[float, PValues]:
-    """Return the ratio of two standard deviations, and the test that it is below a threshold.
+def reaches(values: FloatArray, direct: FloatArray, share: float) -> Tested:
+    """Test the mean of values `(r,)` above a share of the mean of direct `(s,)`."""
+    found = Difference.ratio(values, direct)
+    return _tested(found, (values, direct), lambda one: (one.above(share), one.below(share)), ".2f")
 
-    A standard deviation is the root of the mean variance over groups and numbers of evaluations. The p-values are
-    shares of resamples of whole repetitions, two-sided.
+
+def near(values: FloatArray, direct: FloatArray, share: float, margin: float) -> Tested:
+    """Test the mean of values `(r,)` within a margin of a share of the mean of direct `(s,)`."""
+    found = Difference.ratio(values, direct)
+
+    def both(one: Difference) -> tuple[float, float]:
+        away = one._replace(value=one.value - share)
+        return _doubled(away.within(margin)), min(away.above(margin), away.below(-margin))
+
+    return _tested(found, (values, direct), both, ".2f")
+
+
+def narrower(narrow: Sequence[FloatArray], wide: Sequence[FloatArray], threshold: float) -> Tested:
+    """Test the ratio of two standard deviations below a threshold, by resamples of whole repetitions.
+
+    A standard deviation is the root of the mean variance over groups and numbers of evaluations.
 
     Args:
-        narrow: groups `(r, k)` by repetition and number of evaluations.
+        narrow: groups `(r, k)` by repetition and number of evaluations, each with two repetitions or more.
         wide: the same, of the denominator.
         threshold: of the ratio.
     """
@@ -83,8 +97,51 @@ def narrower(narrow: Sequence[FloatArray], wide: Sequence[FloatArray], threshold
         ratio = float(np.sqrt(_variance(narrow) / _variance(wide)))
         ratios = np.sqrt(_resampled(narrow, rng) / _resampled(wide, rng))
     if min(map(len, [*narrow, *wide])) < FEWEST_REPETITIONS or not np.isfinite(ratios).all():
-        return ratio, UNKNOWN
-    return ratio, (_share(ratios >= threshold), _share(ratios <= threshold))
+        return Tested(None, None, f"{ratio:.2f}")
+    low, high = np.quantile(ratios, [SIGNIFICANT / 2, 1 - SIGNIFICANT / 2])
+    told = f"{ratio:.2f} ({low:.2f} to {high:.2f})"
+    return Tested(_share(ratios >= threshold), _share(ratios <= threshold), told)
+
+
+def contrast(firsts: Sequence[FloatArray], seconds: Sequence[FloatArray], unit: float) -> str:
+    """Return the mean of some groups' means less that of others, as a share of direct, with its interval, in words.
+
+    Args:
+        firsts: groups `(r,)`; each counts alike, whatever its size.
+        seconds: what is subtracted.
+        unit: the mean of direct; nan for none.
+    """
+    means = [
+        (sign / len(groups), mean)
+        for sign, groups in ((1.0, firsts), (-1.0, seconds))
+        for group in groups
+        if (mean := Difference.mean(group)) is not None
+    ]
+    found = _over(Difference.sum(means), unit) if len(means) == len(firsts) + len(seconds) else None
+    return "" if found is None else found.told(CONFIDENCE)
+
+
+def _tested(found: Difference | None, groups: Sequence[FloatArray], test: Test, form: str = "+.3f") -> Tested:
+    if found is None:
+        return Tested(None, None, "")
+    told = found.told(CONFIDENCE, form)
+    if min(map(len, groups)) < FEWEST_REPETITIONS or not found.error:
+        return Tested(None, None, told)
+    return Tested(*test(found), told)
+
+
+def _over(found: Difference | None, unit: float) -> Difference | None:
+    """Return a difference as a share of direct, if there is one."""
+    return found and Difference.sum([(1.0 if np.isnan(unit) else 1 / unit, found)])
+
+
+def _size(least: float, unit: float) -> float:
+    """Return the least size of a difference: none without a direct baseline."""
+    return 0.0 if np.isnan(unit) else least
+
+
+def _doubled(p: float) -> float:
+    return min(1.0, 2 * p)
 
 
 def _variance(groups: Sequence[FloatArray]) -> float:
@@ -92,11 +149,12 @@ def _variance(groups: Sequence[FloatArray]) -> float:
 
 
 def _resampled(groups: Sequence[FloatArray], rng: np.random.Generator) -> FloatArray:
-    """Return the mean variance of each resample, `(RESAMPLES,)`."""
+    """Return the mean variance of each resample, `(RESAMPLES,)`, without its bias: n values drawn from n vary less."""
     found = np.zeros(RESAMPLES)
     for group in groups:
-        drawn = group[rng.integers(len(group), size=(RESAMPLES, len(group)))]
-        found += drawn.var(axis=1, ddof=1).mean(axis=1) / len(groups)
+        n = len(group)
+        drawn = group[rng.integers(n, size=(RESAMPLES, n))]
+        found += drawn.var(axis=1, ddof=1).mean(axis=1) * n / (n - 1) / len(groups)
     return found
 
 
@@ -104,53 +162,14 @@ def _share(resamples: np.ndarray[Any, np.dtype[np.bool_]]) -> float:
     return float(min(1.0, 2 * (1 + resamples.sum()) / (len(resamples) + 1)))
 
 
-def findable(deviation: float, n: tuple[int, int]) -> float:
+def smallest_found(deviation: float, n: tuple[int, int]) -> float:
     """Return the difference of two means that a two-sided test finds with the power `POWER`."""
     freedom = max(1, sum(n) - 2)
     quantiles = stats.t.ppf(1 - SIGNIFICANT / 2, freedom) + stats.t.ppf(POWER, freedom)
     return float(quantiles * deviation * (1 / n[0] + 1 / n[1]) ** 0.5)
 
 
-def needed(effect: float) -> int:
+def repetitions_needed(effect: float) -> int:
     """Return the repetitions that find a difference of so many standard deviations with the power `POWER`."""
     quantiles = stats.norm.ppf(1 - SIGNIFICANT / 2) + stats.norm.ppf(POWER)
-    return int(np.ceil(2 * (quantiles / effect) ** 2))
-
-
-def estimate(first: FloatArray, second: FloatArray, unit: float, *, paired: bool = False, base: float = 0.0) -> str:
-    """Return a difference of means in a unit, with its 90 % interval, in words.
-
-    Args:
-        first: `(n,)`.
-        second: `(m,)`; what is subtracted.
-        unit: the mean of direct; nan for none.
-        paired: whether the values of one repetition belong together.
-        base: added to the difference: 1 for a ratio to direct.
-    """
-    if not len(first) or not len(second):
-        return ""
-    scale = 1.0 if np.isnan(unit) else unit
-    ends = difference_interval(first, second, paired=paired)
-    form = ".2f" if base else "+.3f"
-    value, *known = (
-        f"{base + end / scale:{form}}" for end in (float(first.mean() - second.mean()), *ends) if end is not None
-    )
-    told = f"{value} ({' to '.join(known)})" if known else value
-    return told.replace("-", "\N{MINUS SIGN}")
-
-
-def _greater(test: Test) -> float | None:
-    """Return p of the hypothesis that a difference is not above 0: two-sided, or 1 if it is not."""
-    if test.p is None or test.statistic is None:
-        return None
-    return test.p if test.statistic > 0 else 1.0
-
-
-def _less(test: Test) -> float | None:
-    if test.p is None or test.statistic is None:
-        return None
-    return test.p if test.statistic < 0 else 1.0
-
-
-def _larger(first: float | None, second: float | None) -> float | None:
-    return None if first is None or second is None else max(first, second)
+    return max(FEWEST_REPETITIONS, int(np.ceil(2 * (quantiles / effect) ** 2)))

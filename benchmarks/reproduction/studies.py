@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.archives import import_file
 from benchmarks.reproduction.paper import ITERATIONS, STRATEGIES
 from gaplab.schemas.curves import Curve
-from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.records import ExperimentRead, MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.comparisons import Compared, Range
@@ -20,8 +20,10 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments import reading
 from gaplab.services.results.curves import curves, recorded_of
+from gaplab.services.store.models import MeasurementRow, RepetitionRow
 from gaplab.services.store.queries import attempts, experiments
 from gaplab.services.store.queries.costs import work_of
+from gaplab.services.store.queries.repetition_rows import of_experiments
 from gaplab.services.store.session import Session, Store
 
 
@@ -52,8 +54,9 @@ class Arm:
 
     @property
     def cores(self) -> int:
-        """Return the cores of one rollout: the threads of the engine, or 1."""
-        return int(self.spec.engine.options.get("threads", 1))
+        """Return the cores of one rollout: the threads of the engine that runs it, or 1."""
+        engine = self.spec.reality.engine if self.read.direct else self.spec.engine
+        return int(engine.options.get("threads", 1)) if engine else 1
 
     @property
     def core_hours(self) -> float:
@@ -67,8 +70,8 @@ class Arm:
 
     @property
     def repetitions(self) -> int:
-        """Return the repetitions that have any recorded fitness."""
-        return int(np.isfinite(self.recorded).any(axis=1).sum())
+        """Return the complete repetitions."""
+        return int(np.isfinite(self.recorded[:, -1]).sum())
 
     @property
     def last(self) -> int:
@@ -117,7 +120,7 @@ class Study:
 
     @property
     def last(self) -> int:
-        """Return the last number of evaluations that the paper's strategies share, up to the paper's ten."""
+        """Return the last planned number of evaluations that the paper's strategies share, up to the paper's ten."""
         return min([ITERATIONS, *(arm.last for name in self.present if (arm := self.arm(name)))])
 
     @property
@@ -153,6 +156,17 @@ class Study:
             return None
         told = ", ".join(f"{name} {size:,}" for name, size in sizes.items())
         return f"samples are selected from searches of unequal size ({told} evaluations)"
+
+
+def measured(store: Store, arm: Arm, kind: MeasurementKind) -> FloatArray:
+    """Return measured fitness `(r, k)` by repetition and number of samples; nan if it failed or is missing."""
+    row = MeasurementRow
+    values = np.full(arm.recorded.shape, np.nan)
+    query = of_experiments(row, [arm.read.id], RepetitionRow.number, row.iteration, row.fitness)
+    with store.reading() as session:
+        for repetition, iteration, fitness in session.execute(query.where(row.kind == kind, row.fitness.is_not(None))):
+            values[repetition, iteration] = fitness
+    return values
 
 
 def read_study(store: Store, archives: Sequence[Path]) -> Study:

@@ -1,14 +1,19 @@
 """The tables of the document: studies, Fig. 4, Fig. 3 and costs, as rows of Markdown."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from math import comb
 
 import numpy as np
 
 from benchmarks.findings import Found, found
 from benchmarks.reproduction import paper
-from benchmarks.reproduction.studies import Arm, Study
+from benchmarks.reproduction.studies import Arm, Study, measured
 from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import MeasurementKind
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.curves import mean_and_deviation
+from gaplab.services.core.statistics import finite
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
 from gaplab.services.store.session import Store
@@ -38,6 +43,36 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table as Markdown."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
+
+
+def paper_rows(studies: Sequence[Study]) -> Iterator[tuple[str, ...]]:
+    """Yield the settings of the paper and of studies, each a row with a name."""
+    specs = [study.arms[0].spec for study in studies]
+    yield "robot", "quadruped with 12 joints", *(spec.robot.name for spec in specs)
+    realities = ["a bench" if spec.reality.engine is None else spec.reality.engine.name for spec in specs]
+    engines = (f"{spec.engine.name}, {where}" for spec, where in zip(specs, realities, strict=True))
+    yield "simulators, reality", "physx, physx", *engines
+    yield "optimizer of controllers", "steady state", *(spec.controller_optimizer.name for spec in specs)
+    yield "evaluations of a search for a controller", _sizes(paper.EVALUATIONS[:1]), *map(_searches, specs)
+    yield "evaluations of a tuning", f"{paper.EVALUATIONS[2]:,}", *map(_tunings, specs)
+    yield "samples", str(paper.ITERATIONS), *(str(study.last) for study in studies)
+    yield "repetitions", f"{paper.REPETITIONS} (direct {paper.DIRECT_REPETITIONS})", *map(_repetitions, studies)
+    truths = [study.arms[0].read.spec["reality"]["parameters"] for study in studies]
+    told = (", ".join("hidden" if value is None else str(value) for value in truth.values()) for truth in truths)
+    yield "static friction, dynamic friction, restitution", "1.0, 0.8, 0.0", *told
+
+
+def _searches(spec: ResolvedSpec) -> str:
+    return _sizes(sorted({spec.budget.controller_evaluations, spec.budget.selection_evaluations}, reverse=True))
+
+
+def _sizes(sizes: Sequence[int]) -> str:
+    return " or ".join(f"{size:,}" for size in sizes)
+
+
+def _tunings(spec: ResolvedSpec) -> str:
+    divided = " / samples" if spec.tuner.options.get("equal_rollouts") else ""
+    return f"{spec.budget.simulator_evaluations:,}{divided}"
 
 
 def study_row(study: Study, links: Sequence[str]) -> tuple[str, ...]:
@@ -94,7 +129,7 @@ def _weightiest(arm: Arm) -> str:
 def _repetitions(study: Study) -> str:
     """Return the repetitions that most experiments have, and those that differ."""
     counts = [arm.repetitions for arm in study.arms]
-    usual = max(set(counts), key=counts.count)
+    usual = max(counts, key=lambda count: (counts.count(count), count))
     others = [
         _exception(arm) for arm in study.arms if arm.repetitions != usual or arm.read.state is not State.COMPLETED
     ]
@@ -108,30 +143,33 @@ def _exception(arm: Arm) -> str:
 
 
 def figure_4(study: Study) -> str:
-    """Return the recorded fitness over direct by number of samples, beside the paper's."""
+    """Return the recorded fitness over direct by number of samples, beside the paper's and that of many searches."""
     arms = [arm for arm in study.arms if not arm.read.direct]
     counts = range(min(paper.ITERATIONS, max(arm.last for arm in arms)) + 1)
-    rows = [_paper_row("the paper, with simulated fit", counts, learned=True)]
-    rows += [_paper_row("the paper, the other three", counts, learned=False)]
+    learned = {0: f"{paper.START:.2f}", 3: f"≥ {paper.AFTER_THREE:.2f}", 10: f"{paper.AFTER_TEN:.2f}"}
+    others = {0: f"{paper.START:.2f}", 10: f"about {paper.AT_LAST:.2f}"}
+    rows = [("the paper, with simulated fit", *(learned.get(count, MISSING) for count in counts))]
+    rows += [("the paper, the other three", *(others.get(count, MISSING) for count in counts))]
+    best = (expected_best(study.direct, count + 1) / study.unit for count in counts)
+    rows += [("direct, the best of samples + 1", *(MISSING if np.isnan(each) else f"{each:.2f}" for each in best))]
     rows += [_ratios(study, arm, counts) for arm in arms]
     return table(("samples", *map(str, counts)), rows)
 
 
-def _paper_row(name: str, counts: Sequence[int], *, learned: bool) -> tuple[str, ...]:
-    spread = f" ± {paper.LEARNED_SD[0]:.2f} to {paper.LEARNED_SD[1]:.2f}"
-    known = {0: f"{paper.START:.2f}"}
-    if learned:
-        known |= {3: f"≥ {paper.AFTER_THREE:.2f}{spread}", 10: f"{paper.AFTER_TEN:.2f}{spread}"}
-    return name, *(known.get(count, MISSING) for count in counts)
+def expected_best(values: FloatArray, size: int) -> float:
+    """Return the mean of the largest of `size` values, over all choices from values `(n,)`; nan if n is smaller."""
+    n = len(values)
+    if size > n:
+        return float("nan")
+    chances = np.array([comb(rank, size - 1) / comb(n, size) for rank in range(n)])
+    return float(np.sort(values) @ chances)
 
 
 def _ratios(study: Study, arm: Arm, counts: Sequence[int]) -> tuple[str, ...]:
-    cells = []
-    for count in counts:
-        values = arm.values(count, count) / study.unit
-        deviation = f" ± {values.std(ddof=1):.2f}" if len(values) > 1 else ""
-        cells.append(f"{values.mean():.2f}{deviation}" if len(values) and np.isfinite(values).all() else MISSING)
-    return f"{spoken(arm.read.name)} ({arm.repetitions})", *cells
+    return (
+        f"{spoken(arm.read.name)} ({arm.repetitions})",
+        *(_mean(arm.values(count, count) / study.unit, spread=True) for count in counts),
+    )
 
 
 def direct_in_words(study: Study) -> str:
@@ -140,19 +178,18 @@ def direct_in_words(study: Study) -> str:
     printed = f"the paper's is {paper.DIRECT:.2f} ± {paper.DIRECT_SD:.2f} ({paper.DIRECT_REPETITIONS} repetitions)"
     if not len(own):
         return f"The study has no direct baseline, so it has no ratios; {printed}."
-    deviation = f" ± {own.std(ddof=1):.2f}" if len(own) > 1 else ""
     unit = next((curve.unit for curve in study.curves if curve.unit), "")
-    return f"Direct is {own.mean():.2f}{deviation} {unit} ({len(own)} repetitions); {printed}."
+    return f"Direct is {_mean(own, spread=True)} {unit} ({len(own)} repetitions); {printed}."
 
 
 def figure_3(store: Store, study: Study) -> tuple[str, str]:
-    """Return the distance of the best simulators from the truth, and the fitness, of a toy study; by samples."""
+    """Return the distance of the best simulators from the truth, and the fitness of transferred controllers."""
     counts = [count for count in FIGURE_3 if count <= study.last]
     distances, ratios = [], []
     for arm in (own for name in study.present if (own := study.arm(name))):
-        away = found(store, arm.read.id)
+        away, probed = found(store, arm.read.id), measured(store, arm, MeasurementKind.PROBE) / study.unit
         distances.append((spoken(arm.strategy), *(distance(away.get(count)) for count in counts)))
-        ratios.append((spoken(arm.strategy), *(_mean(arm.values(count, count) / study.unit) for count in counts)))
+        ratios.append((spoken(arm.strategy), *(_mean(finite(probed[:, count])) for count in counts)))
     head = "samples", *map(str, counts)
     return table(head, distances), table(head, ratios)
 
@@ -162,8 +199,11 @@ def distance(findings: Found | None) -> str:
     return MISSING if findings is None else f"{np.median(np.linalg.norm(findings.away, axis=1)):.2f}"
 
 
-def _mean(values: FloatArray) -> str:
-    return f"{values.mean():.2f}" if len(values) and np.isfinite(values).all() else MISSING
+def _mean(values: FloatArray, *, spread: bool = False) -> str:
+    """Return the mean of values `(n,)`, and their standard deviation if asked; a dash without values."""
+    _, mean, deviation = mean_and_deviation(values)
+    told = MISSING if mean is None else f"{mean:.2f}"
+    return f"{told} ± {deviation:.2f}" if spread and deviation is not None else told
 
 
 def cost_rows(label: str, study: Study) -> Iterator[tuple[str, ...]]:
