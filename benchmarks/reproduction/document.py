@@ -8,6 +8,7 @@ from pathlib import Path
 from benchmarks.reproduction import claim_tables, controls, evidence, origins, rankings, tables
 from benchmarks.reproduction.claims import CLAIMS
 from benchmarks.reproduction.limits import limits
+from benchmarks.reproduction.opening import OPENING, WORDS
 from benchmarks.reproduction.paper import LEARNED_SD
 from benchmarks.reproduction.studies import Study
 from gaplab.services.store.session import Store
@@ -36,8 +37,9 @@ class Document:
     def text(self) -> str:
         """Return the document."""
         sections = [
-            self._opening(),
-            self._short(),
+            OPENING,
+            *self._short(),
+            WORDS,
             self._differences(),
             *self._rankings(),
             *self._verdicts(),
@@ -58,32 +60,15 @@ class Document:
         """Return the address of a file, seen from the document."""
         return Path(os.path.relpath(ROOT / path, self.folder)).as_posix()
 
-    def _opening(self) -> str:
-        return (
-            "# The paper's figures and claims\n\n"
-            "*A Comparison of Sampling Strategies for Parameter Estimation of a Robot Simulator* (Klaus, Glette and "
-            "Tørresen, SIMPAR 2012) asks which controllers to try on a real robot, so that few trials tune its "
-            "simulator. This page repeats its experiment with another robot, other engines and, mostly, another "
-            "optimizer, fewer evaluations and fewer repetitions ([what differs](#what-differs-from-the-paper)). As in "
-            "the paper, *reality* is a simulator whose friction and restitution are hidden."
-        )
-
-    def _short(self) -> str:
-        """Return the verdicts of the first study of a robot, and what simulated fit gains there."""
-        label, study = next(self._of_robots())
-        lead = origins.lead(self.store, study)
-        meaning = f"\n\n{lead} [Why](#where-the-recorded-fitness-comes-from)." if lead else ""
-        return (
-            f"**In short**, of {label} ({tables.in_words(study)}):\n\n{claim_tables.in_short(study)}{meaning}\n\n"
-            "A **sample** is a controller that is tried in reality. After each number of samples, a simulator is tuned "
-            "on them, a controller is searched in it and **transferred** to reality. The larger of its fitness and the "
-            "best sample's is the **recorded** fitness. All fitness is a ratio to ***direct***: the mean fitness of "
-            "controllers from one search in reality itself, of as many evaluations. The six strategies choose the "
-            "samples: *simulated fit* takes the fittest controller of the tuned simulator; *unique* keeps it away from "
-            "earlier samples; *informative* takes the one on which 20 simulators disagree most; *simulated fit and "
-            "informative* adds both aims; *random* draws controllers, and *known fit* draws them around one that "
-            "walks."
-        )
+    def _short(self) -> Iterator[str]:
+        """Yield the verdicts of each whole figure of a robot, and what simulated fit gains there."""
+        robots = dict(self._of_robots())
+        whole = {label: each for label, each in robots.items() if each.whole}
+        for label, study in (whole or robots).items():
+            yield f"**In short**, {label} ({tables.in_words(study)}):"
+            yield claim_tables.in_short(study)
+            if lead := origins.lead(self.store, study):
+                yield f"{lead} [Why](#where-the-recorded-fitness-comes-from)."
 
     def _differences(self) -> str:
         columns = dict(self._of_robots())

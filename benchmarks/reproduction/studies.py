@@ -124,6 +124,11 @@ class Study:
         return min([ITERATIONS, *(arm.last for name in self.present if (arm := self.arm(name)))])
 
     @property
+    def whole(self) -> bool:
+        """Return whether it has all of the paper's strategies, samples and direct."""
+        return self.present == STRATEGIES and self.last == ITERATIONS and bool(len(self.direct))
+
+    @property
     def direct(self) -> FloatArray:
         """Return the fitness `(r,)` of the direct baseline; empty without it."""
         return next((finite(arm.recorded[:, 0]) for arm in self.arms if arm.read.direct), np.empty(0))
