@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 from gaplab import migrations
 from gaplab.schemas.archives import ImportRead
 from gaplab.services.archives import import_archive
+from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.store.session import Store
 
 
@@ -28,7 +29,10 @@ def import_file(store: Store, path: Path) -> ImportRead:
     """Import an archive, and return the ids of its study and its experiments.
 
     Raises:
-        InvalidArchive: the file is no archive.
+        SystemExit: the file cannot be read, or is no archive.
     """
-    with path.open("rb") as file:
-        return import_archive(store, file)
+    try:
+        with path.open("rb") as file:
+            return import_archive(store, file)
+    except (OSError, InvalidArchive) as error:
+        raise SystemExit(f"{path}: {error}") from error

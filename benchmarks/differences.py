@@ -11,13 +11,12 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
 from scipy import stats
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.statistics import both, constant, finite
+from gaplab.services.core.equivalence import SIGNIFICANT
+from gaplab.services.core.statistics import both, constant, constant_difference, finite
 
-SIGNIFICANT = 0.05
 MINUS = "\N{MINUS SIGN}"
 
 
@@ -48,7 +47,8 @@ class Difference(NamedTuple):
         """Return the mean difference of the repetitions that both `(r,)` and `(s,)` have; None for fewer than two."""
         one, other = both(first, second)
         found = cls.mean(one - other)
-        return found._replace(error=0.0, freedom=math.inf) if found and _rounding(one, other) else found
+        fixed = found is not None and constant_difference(one, other)
+        return found._replace(error=0.0, freedom=math.inf) if found and fixed else found
 
     @classmethod
     def unpaired(cls, first: FloatArray, second: FloatArray) -> "Difference | None":
@@ -67,7 +67,7 @@ class Difference(NamedTuple):
 
     @classmethod
     def sum(cls, parts: Sequence[tuple[float, "Difference"]]) -> "Difference":
-        """Return the sum of independent estimates, each after its factor."""
+        """Return the sum of independent estimates, each times its factor."""
         squares = [(factor * each.error) ** 2 for factor, each in parts]
         parted = sum(square**2 / each.freedom for square, (_, each) in zip(squares, parts, strict=True))
         value = sum(factor * each.value for factor, each in parts)
@@ -124,8 +124,3 @@ class Difference(NamedTuple):
     def _tail(self, distance: float) -> float:
         """Return the probability of an estimate that is further above the truth than a distance."""
         return float(stats.t.sf(distance / self.error, self.freedom)) if self.error else float(distance <= 0)
-
-
-def _rounding(first: FloatArray, second: FloatArray) -> bool:
-    """Return whether paired values `(n,)` differ by one number, up to rounding."""
-    return constant(first - second, np.concatenate([first, second]))

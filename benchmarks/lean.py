@@ -16,10 +16,11 @@ from rich.table import Table
 from scipy.stats import kendalltau
 
 from benchmarks import lean_ratios
-from benchmarks.differences import SIGNIFICANT, Difference
+from benchmarks.differences import Difference
 from benchmarks.findings import opened, table_of
 from benchmarks.lean_count import count_table
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.equivalence import SIGNIFICANT
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.results.curves import curves, recorded_of

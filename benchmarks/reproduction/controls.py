@@ -5,12 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.differences import SIGNIFICANT, Difference
+from benchmarks.differences import Difference
 from benchmarks.lean_ratios import ratio_difference
 from benchmarks.reproduction.statements import CONFIDENCE
 from benchmarks.reproduction.studies import Arm, Study
 from gaplab.schemas.differences import Values
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.equivalence import SIGNIFICANT
 from gaplab.services.core.statistics import both, holm
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING, probability

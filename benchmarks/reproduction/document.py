@@ -184,7 +184,8 @@ class Document:
 
     def _statements(self) -> Iterator[str]:
         yield (
-            "## The statements\n\nDifferences, and gains, are of direct; ratios are to direct. Brackets have 95 % "
+            "## The statements\n\nDifferences, and gains, are of direct, whose mean they take as exact; ratios are to "
+            "direct, and have its error. Brackets have 95 % "
             f"intervals. Each p is as it is before any correction. *{evidence.OTHER_WAY.capitalize()}*: the estimate "
             "points away from what the p would show."
         )

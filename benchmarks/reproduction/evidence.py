@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from benchmarks.differences import SIGNIFICANT
 from benchmarks.reproduction.paper import CORRELATION, SIMULATED_FIT, WEAK, deviation
 from benchmarks.reproduction.paper import POWER as PAPER_POWER
 from benchmarks.reproduction.statements import POWER, Tested
+from gaplab.services.core.equivalence import SIGNIFICANT
 from gaplab.services.core.statistics import holm
 from gaplab.services.core.trends import FEWEST_REPETITIONS
 from gaplab.services.reports.numbers import probability

@@ -6,10 +6,10 @@ from string import ascii_lowercase
 
 import numpy as np
 
-from benchmarks.differences import SIGNIFICANT
 from benchmarks.reproduction import paper, statements
 from benchmarks.reproduction.studies import Study
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.equivalence import SIGNIFICANT
 from gaplab.services.core.statistics import holm
 from gaplab.services.figures.words import number_of, spoken
 from gaplab.services.reports.numbers import MISSING

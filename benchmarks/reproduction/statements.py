@@ -12,14 +12,15 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from scipy import stats
 
-from benchmarks.differences import SIGNIFICANT, Difference
+from benchmarks.differences import Difference
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.equivalence import SIGNIFICANT
+from gaplab.services.core.intervals import RESAMPLES
 from gaplab.services.core.streams import stream
 from gaplab.services.core.trends import FEWEST_REPETITIONS
 
 CONFIDENCE = 1 - SIGNIFICANT
 POWER = 0.8
-RESAMPLES = 2_000
 
 Test: TypeAlias = Callable[[Difference], tuple[float, float | None]]
 """Returns p that shows a statement on a difference, and p that refutes it."""

@@ -178,8 +178,8 @@ def read_study(store: Store, archives: Sequence[Path]) -> Study:
     """Import archives of studies or of single experiments, and return them as one study, named by the first.
 
     Raises:
-        InvalidArchive: a file is no archive.
-        SystemExit: the archives differ in robot, engines, reality, budget, tuner, optimizers or seed.
+        SystemExit: a file is no archive, or the archives differ in robot, engines, reality, budget, tuner,
+            optimizers or seed.
     """
     parts = [_part(store, archive) for archive in archives]
     reads = tuple(read for _, experiments_of in parts for read in experiments_of)

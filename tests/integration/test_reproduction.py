@@ -550,6 +550,18 @@ def test_the_published_archives_have_a_document() -> None:
     assert "nan" not in re.findall(r"\w+", text)
 
 
+def test_what_is_no_archive_is_refused_by_name(tmp_path: Path) -> None:
+    (tmp_path / "text.zip").write_text("no archive")
+
+    for name, why in (("text.zip", "it is not a readable zip"), ("missing.zip", "No such file")):
+        command = [sys.executable, "-m", "benchmarks.reproduction", str(tmp_path / name)]
+        ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+
+        assert ended.returncode == 1
+        assert ended.stderr.startswith(str(tmp_path / name))
+        assert why in ended.stderr
+
+
 def test_two_archives_of_one_name_are_refused(tmp_path: Path) -> None:
     archives = [str(tmp_path / folder / "one.zip") for folder in "ab"]
 
