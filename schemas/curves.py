@@ -36,3 +36,8 @@ class Curve(Frozen):
     direct: bool = Field(default=False, description="true for the direct baseline, which evolves in reality itself")
     level: bool = Field(default=False, description="true for a strategy without samples: a level across the figure")
     points: tuple[CurvePoint, ...]
+    best_of: tuple[Statistic, ...] = Field(
+        default=(),
+        description="for the direct baseline, the expected best of 1, 2, 3 … of its searches, up to half of its "
+        "repetitions; empty if it has fewer than 20. A strategy makes one search before any sample and one after each",
+    )

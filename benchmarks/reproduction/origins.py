@@ -11,9 +11,10 @@ import numpy as np
 from benchmarks.findings import found
 from benchmarks.reproduction import paper, statements
 from benchmarks.reproduction.studies import Arm, Study, measured
-from benchmarks.reproduction.tables import distance, expected_best
+from benchmarks.reproduction.tables import distance
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.curves import expected_largest
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
 from gaplab.services.store.session import Store
@@ -68,10 +69,13 @@ def lead(store: Store, study: Study) -> str:
 
 def _searched_as_often(study: Study) -> str:
     """Return in a sentence what the best of as many direct searches would have, if direct has enough repetitions."""
-    first, last = (expected_best(study.direct, count + 1) / study.unit for count in (FIRST, study.last))
-    if np.isnan(last):
+    first, last = (expected_largest(study.direct, count + 1) for count in (FIRST, study.last))
+    if first is None or last is None:
         return ""
-    return f" The best of as many direct searches would have {first:.2f} after {FIRST} samples, and {last:.2f} at last."
+    return (
+        f" The best of as many direct searches would have {first / study.unit:.2f} after {FIRST} samples, and "
+        f"{last / study.unit:.2f} at last."
+    )
 
 
 def _lead(store: Store, study: Study, span: tuple[int, int], *, transferred_only: bool) -> str:

@@ -1,7 +1,6 @@
 """The tables of the document: studies, Fig. 4, Fig. 3 and costs, as rows of Markdown."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from math import comb
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import mean_and_deviation
+from gaplab.services.core.curves import expected_largest, mean_and_deviation
 from gaplab.services.core.statistics import finite
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
@@ -150,19 +149,11 @@ def figure_4(study: Study) -> str:
     others = {0: f"{paper.START:.2f}", 10: f"about {paper.AT_LAST:.2f}"}
     rows = [("the paper, with simulated fit", *(learned.get(count, MISSING) for count in counts))]
     rows += [("the paper, the other three", *(others.get(count, MISSING) for count in counts))]
-    best = (expected_best(study.direct, count + 1) / study.unit for count in counts)
-    rows += [("direct, the best of samples + 1", *(MISSING if np.isnan(each) else f"{each:.2f}" for each in best))]
+    best = [expected_largest(study.direct, count + 1) for count in counts]
+    cells = (MISSING if each is None else f"{each / study.unit:.2f}" for each in best)
+    rows += [("direct, the best of samples + 1", *cells)]
     rows += [_ratios(study, arm, counts) for arm in arms]
     return table(("samples", *map(str, counts)), rows)
-
-
-def expected_best(values: FloatArray, size: int) -> float:
-    """Return the mean of the largest of `size` values, over all choices from values `(n,)`; nan if n is smaller."""
-    n = len(values)
-    if size > n:
-        return float("nan")
-    chances = np.array([comb(rank, size - 1) / comb(n, size) for rank in range(n)])
-    return float(np.sort(values) @ chances)
 
 
 def _ratios(study: Study, arm: Arm, counts: Sequence[int]) -> tuple[str, ...]:

@@ -11,6 +11,9 @@ from gaplab.services.core.arrays import FloatArray
 
 CONFIDENCE = 0.95
 
+MANY = 20
+"""Searches in reality from which on the best of several says something."""
+
 
 def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
     """Return one point for each number of real-world evaluations, from 0 on.
@@ -42,6 +45,33 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
         upper=upper,
         values=tuple(float(value) if np.isfinite(value) else None for value in values),
     )
+
+
+def best_of_searches(values: FloatArray) -> tuple[float | None, ...]:
+    """Return the expected best of 1, 2, 3 … searches, up to half of all; empty if there are fewer than 20.
+
+    Args:
+        values: `(r,)`: the fitness that each search reached; nan counts for nothing.
+    """
+    values = values[np.isfinite(values)]
+    return tuple(expected_largest(values, size + 1) for size in range(len(values) // 2)) if len(values) >= MANY else ()
+
+
+def expected_largest(values: FloatArray, size: int) -> float | None:
+    """Return the mean of the largest of `size` values, over all choices from them; None if there are too few.
+
+    It is unbiased for the largest of `size` new values, however they are distributed.
+
+    Args:
+        values: `(n,)`, finite.
+        size: how many are chosen, without replacement; at least 1.
+    """
+    n = len(values)
+    if size > n:
+        return None
+    below = np.arange(n - 1, 0, -1)  # how many are smaller than each, from the largest to the second smallest
+    chances = size / n * np.concatenate([[1.0], np.cumprod((below - size + 1) / below)])  # that each is the largest
+    return known(float(np.sort(values)[::-1] @ chances))
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -8,7 +8,7 @@ import numpy as np
 
 from gaplab.schemas.curves import Curve
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import curve_points
+from gaplab.services.core.curves import best_of_searches, curve_points
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.results.texts import cell
 from gaplab.services.specs.resolution import is_direct
@@ -104,13 +104,15 @@ def recorded_of(session: Session, ids: Sequence[str]) -> tuple[tuple[ExperimentR
 
 def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
     spec = spec_of(row.spec)
+    direct = is_direct(spec)
     return Curve(
         experiment=row.id,
         name=row.name,
         strategy=row.strategy,
         state=row.state,
         unit=unit(spec),
-        direct=is_direct(spec),
+        direct=direct,
         level=row.iterations == 1,
         points=curve_points(values),
+        best_of=best_of_searches(values[:, 0]) if direct else (),
     )

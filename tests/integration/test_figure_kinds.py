@@ -26,7 +26,7 @@ from gaplab.services.running import execution
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, toy
-from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, coordinates, curve, point, prediction, tuned
+from tests.figures import DIMENSIONS, DIRECT, ERRORS, PREDICTIONS, TRUTH, coordinates, curve, point, prediction, tuned
 
 
 def marks(figure: FigureDefinition, panel: int = 0) -> dict[str, Mark]:
@@ -261,6 +261,7 @@ def test_every_figure_is_drawn_however_large_its_numbers_are(large: float) -> No
         curves_figure([curve("a", *ends)], band="sd", each=True),
         curves_figure([curve("a", *ends)], band="interval"),
         curves_figure([curve("a", point(0, large, sd=large)).model_copy(update={"level": True})]),
+        curves_figure([curve("a", *ends), DIRECT.model_copy(update={"best_of": (large, None, 1.0)})]),
         predictions_figure([prediction(large, -large, large), prediction(0.5, 1.0, 1.0, 1)]),
         squared_error_figure({1: {0: large, 1: large, 2: 1.0}, 2: {0: large}}, each=True),
         squared_error_figure({1: {0: large}, 2: {0: large, 1: large}}),

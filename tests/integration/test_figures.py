@@ -94,6 +94,35 @@ def test_curves_are_drawn_against_what_they_cost_where_that_is_known() -> None:
     assert levels(figure)
 
 
+BEST = DIRECT.model_copy(update={"best_of": (1.33, 1.4, 1.45, 1.48)})
+
+
+def test_the_best_of_as_many_direct_searches_as_a_strategy_makes_is_a_line() -> None:
+    figure = curves_figure([RISING, BEST])
+
+    (_, best) = lines(figure)
+    assert (best.name, best.x, best.y) == ("Direct, best of as many searches", (0, 1, 2), (1.33, 1.4, 1.45))
+    assert figure.panels[0].y.limits[1] > 1.45
+    assert figure.table is not None
+    assert figure.table.rows[-1] == (best.name, "1.330 (best of 1)", "1.400 (best of 2)", "1.450 (best of 3)")
+    assert "Best of as many searches: " in figure.caption
+    assert figure.alt.endswith("Direct is at 1.33; Direct, best of as many searches, ends at 1.45.")
+
+
+@pytest.mark.parametrize(
+    ("curves", "against"),
+    [
+        ([RISING, DIRECT], None),
+        ([RISING, BEST], CostAxis("Time (h)", "", {(RISING.experiment, 0): 2.5})),  # each search costs, too
+        ([BEST], None),  # nothing to compare with
+    ],
+)
+def test_there_is_no_such_line_where_it_says_nothing(curves: Any, against: Any) -> None:
+    figure = curves_figure(curves, against=against)
+
+    assert all("est of as many" not in text for text in (*(line.name for line in lines(figure)), figure.caption))
+
+
 @pytest.mark.parametrize("band", ["interval", "sd"])
 def test_nothing_that_is_drawn_is_cut_off_by_the_frame(band: Any) -> None:
     wide = CurvePoint(evaluations=1, n=2, mean=1.2, sd=3.0, lower=-50, upper=50, values=(-8.1, 9.3))

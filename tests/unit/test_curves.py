@@ -1,11 +1,12 @@
 """Curves: the numbers that the figure shows."""
 
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gaplab.services.core.curves import curve_point, curve_points
+from gaplab.services.core.curves import best_of_searches, curve_point, curve_points, expected_largest
 
 RECORDED = np.array([[0.9, 1.2], [0.8, 1.4], [1.0, np.nan]])
 
@@ -58,3 +59,20 @@ def test_values_too_large_to_be_squared_have_no_spread_and_are_no_error(large: A
 
     assert (point.sd, point.lower, point.upper) == (None, None, None)
     assert point.values == (large, -large / 2, large)
+
+
+@pytest.mark.parametrize("size", range(1, 7))
+def test_the_expected_largest_is_the_mean_of_the_largest_over_all_choices(size: int) -> None:
+    values = np.array([3.0, -1.0, 2.5, 2.5, 0.25, 7.0])
+
+    largest = [max(choice) for choice in combinations(values, size)]
+
+    assert expected_largest(values, size) == pytest.approx(np.mean(largest))
+    assert expected_largest(values, 7) is None
+
+
+def test_the_best_of_searches_is_known_up_to_half_of_twenty_or_more() -> None:
+    best = best_of_searches(np.array([0.1 * rank for rank in range(20)] + [np.nan]))
+
+    assert best == pytest.approx([0.1 * (21 * size / (size + 1) - 1) for size in range(1, 11)])
+    assert best_of_searches(np.array([1.0] * 19 + [np.nan])) == ()

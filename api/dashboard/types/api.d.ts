@@ -175,6 +175,7 @@ declare namespace Api {
     direct: boolean;
     level: boolean;
     points: Array<CurvePoint>;
+    best_of: Array<number | null>;
   }
   interface CurvePoint {
     evaluations: number;

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gaplab.schemas.curves import Curve, CurvePoint
+from gaplab.services.figures.kinds.restarts import restarts_line
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Line, Mark, Panel, Table, faint_lines
 from gaplab.services.figures.style import INK, Style, strategy_styles, style_of
 from gaplab.services.figures.words import distinct_names, drawable, heading, limits, number, number_of, with_unit
@@ -75,21 +76,24 @@ def curves_figure(
     ]
     marks += [_level(one, style) for one, style in zip(levels, _level_styles(levels), strict=True)]
     span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
+    restarts = _restarts(levels, span) if lines and not against else []
+    marks += restarts
     x = Axis(against.label if against else EVALUATIONS, (-0.02 * span, 1.02 * span), whole=against is None)
     y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
     return FigureDefinition(
         name="curves",
         title=heading(title),
         panels=(Panel(tuple(marks), x, y),),
-        caption=_caption(lines, levels, BANDS[band], against, each=each),
-        alt=_alt(lines, levels, x, y),
-        table=_table(placed),
+        caption=_caption(lines, levels, BANDS[band], against, each=each) + _restarts_in_words(restarts),
+        alt=_alt(lines, levels, restarts, x, y),
+        table=_table(placed, restarts),
     )
 
 
 def _drawable(curve: Curve) -> Curve:
     """Return the curve without values too large to compute with."""
-    return curve.model_copy(update={"points": tuple(map(_drawable_point, curve.points))})
+    points, best = tuple(map(_drawable_point, curve.points)), tuple(map(drawable, curve.best_of))
+    return curve.model_copy(update={"points": points, "best_of": best})
 
 
 def _drawable_point(point: CurvePoint) -> CurvePoint:
@@ -144,6 +148,17 @@ def _level(one: _Placed, style: Style) -> Level:
     return Level(one.name, mean, style, *_ends(point, "sd"), marked=not style.ink)
 
 
+def _restarts(levels: Sequence[_Placed], last: float) -> list[Line]:
+    found = (restarts_line(one.name, one.curve, last) for one in levels if one.curve.direct)
+    return [line for line in found if line]
+
+
+def _restarts_in_words(restarts: Sequence[Line]) -> str:
+    if not restarts:
+        return ""
+    return " Best of as many searches: of one and one more for each evaluation, as many as a strategy makes; mean."
+
+
 def _level_styles(levels: Sequence[_Placed]) -> list[Style]:
     """Return the styles of levels: the colour of text for the direct baseline, and of their strategies for others."""
     looks = zip(levels, strategy_styles([one.curve.strategy for one in levels]), strict=True)
@@ -189,17 +204,19 @@ def _level_in_words(one: _Placed) -> str:
     return f"{mean:.2f}{deviation} (n = {point.n})".replace(" ", "\N{NO-BREAK SPACE}")
 
 
-def _alt(lines: Sequence[_Placed], levels: Sequence[_Placed], x: Axis, y: Axis) -> str:
+def _alt(lines: Sequence[_Placed], levels: Sequence[_Placed], restarts: Sequence[Line], x: Axis, y: Axis) -> str:
     told = [
         f"{one.name} goes from {number(one.points[0][1])} to {number(one.points[-1][1])}" for one in lines if one.points
     ]
     told += [f"{one.name} is at {number(one.points[0][1])}" for one in levels]
+    told += [f"{line.name}, ends at {number(line.y[-1])}" for line in restarts]
     return f"{y.label} against {x.label[0].lower()}{x.label[1:]}: {'; '.join(told) or 'no results yet'}."
 
 
-def _table(placed: Sequence[_Placed]) -> Table:
+def _table(placed: Sequence[_Placed], restarts: Sequence[Line]) -> Table:
     counts = sorted({point.evaluations for one in placed for _, _, point in one.points})
     rows = [(one.name, {point.evaluations: _written(point) for _, _, point in one.points}) for one in placed]
+    rows += [(line.name, dict(enumerate(line.hover))) for line in restarts]
     return Table(
         ("Mean ± SD (n) by number of evaluations", *map(str, counts)),
         tuple((name, *(cells.get(count, "") for count in counts)) for name, cells in rows),
