@@ -48,7 +48,7 @@ class Row(NamedTuple):
 
 
 def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
-    """Return the label of the study of the same robot, engines and seed that differs least.
+    """Return the label of the study of the same robot, engine of simulators and seed that differs least.
 
     These differ in the fewest settings of a strategy, and share the most strategies.
 
@@ -63,7 +63,7 @@ def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
         and (pairs := list(_both(control, study)))
     }
     if not changes:
-        raise SystemExit(f"{control.archives[0]}: no study has its robot, engines and seed, and one of its strategies")
+        raise SystemExit(f"{control.archives[0]}: no study has its robot, engine and seed, and one of its strategies")
     return min(changes, key=changes.__getitem__)
 
 
@@ -134,8 +134,7 @@ def _told(values: Values) -> str:
 
 
 def _world(arm: Arm) -> tuple[object, ...]:
-    reality = arm.spec.reality.engine
-    return arm.spec.robot, arm.spec.engine.name, reality and reality.name, arm.spec.seed
+    return arm.spec.robot, arm.spec.engine.name, arm.spec.seed
 
 
 def _column(arm: Arm, count: int) -> FloatArray:

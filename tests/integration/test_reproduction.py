@@ -515,7 +515,7 @@ def test_a_control_of_no_study_is_refused(document: Document) -> None:
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
 
     assert ended.returncode == 1
-    assert "no study has its robot, engines and seed, and one of its strategies" in ended.stderr
+    assert "no study has its robot, engine and seed, and one of its strategies" in ended.stderr
 
 
 def test_a_control_of_another_reality_needs_its_own_direct(document: Document, tmp_path: Path) -> None:

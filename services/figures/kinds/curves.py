@@ -156,7 +156,7 @@ def _restarts(levels: Sequence[_Placed], last: float) -> list[Line]:
 def _restarts_in_words(restarts: Sequence[Line]) -> str:
     if not restarts:
         return ""
-    return " Best of as many searches: of one and one more for each evaluation, as many as a strategy makes; mean."
+    return " Best of as many searches: expected of one direct search, and one more for each evaluation."
 
 
 def _level_styles(levels: Sequence[_Placed]) -> list[Style]:
