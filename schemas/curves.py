@@ -38,6 +38,6 @@ class Curve(Frozen):
     points: tuple[CurvePoint, ...]
     best_of: tuple[Statistic, ...] = Field(
         default=(),
-        description="for the direct baseline, the expected best of 1, 2, 3 … of its searches, up to half of its "
-        "repetitions; empty if it has fewer than 20. A strategy makes one search before any sample and one after each",
+        description="for the direct baseline, the expected largest fitness of 1, 2, 3 … of its repetitions, up to half "
+        "of them; empty if it has fewer than 20. Recorded fitness after e samples is the largest of e + 1 controllers",
     )

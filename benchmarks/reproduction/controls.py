@@ -50,13 +50,18 @@ class Row(NamedTuple):
 def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
     """Return the label of the study of the same robot, engine of simulators and seed that differs least.
 
-    These differ in the fewest settings of a strategy, and share the most strategies.
+    These differ in the fewest settings of a strategy, and share the most strategies. A control without direct is
+    compared with a study of its own reality, if there is one.
 
     Raises:
         SystemExit: there is none that shares a strategy.
     """
     changes = {
-        label: (sum(len(what_differs(own, arm)) for own, arm in pairs) / len(pairs), -len(pairs))
+        label: (
+            _alone(control) and not _same_reality(control, study),
+            sum(len(what_differs(own, arm)) for own, arm in pairs) / len(pairs),
+            -len(pairs),
+        )
         for label, study in studies.items()
         if study.archives != control.archives
         and _world(study.arms[0]) == _world(control.arms[0])
@@ -81,8 +86,8 @@ def rows(control: Study, study: Study) -> Iterator[Row]:
     Raises:
         SystemExit: the control has another reality, and no direct baseline.
     """
-    alone = not len(control.direct)
-    if alone and study.arms[0].spec.reality != control.arms[0].spec.reality:
+    alone = _alone(control)
+    if alone and not _same_reality(control, study):
         raise SystemExit(f"{control.archives[0]}: it has another reality, so it needs a direct baseline of its own")
     for own, arm in _both(control, study):
         units = (1.0, 1.0) if arm.read.direct else (study.unit, study.unit if alone else control.unit)
@@ -131,6 +136,15 @@ def what_differs(own: Arm, other: Arm) -> list[str]:
 
 def _told(values: Values) -> str:
     return ", ".join("none" if value is None else str(value) for value in values) or MISSING
+
+
+def _alone(control: Study) -> bool:
+    """Return whether a control has no direct baseline."""
+    return not len(control.direct)
+
+
+def _same_reality(control: Study, study: Study) -> bool:
+    return study.arms[0].spec.reality == control.arms[0].spec.reality
 
 
 def _world(arm: Arm) -> tuple[object, ...]:

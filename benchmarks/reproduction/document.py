@@ -131,8 +131,8 @@ class Document:
             "brackets), by number of real-world evaluations. A dash in the paper's rows is a number that its text does "
             "not have. It has a range of standard deviations, without a number of samples: "
             f"{LEARNED_SD[0]:.2f} to {LEARNED_SD[1]:.2f} with simulated fit, and about three times as much for the "
-            "others. *The best of samples + 1* is the fitness that the best of so many direct searches would have: a "
-            "strategy makes one search before any sample, and one more for each."
+            "others. *The best of samples + 1* is the mean fitness of the best of so many direct searches, of 20 or "
+            "more: recorded fitness is the largest of as many controllers, the samples and the transferred one."
         )
         for label, study in self.studies.items():
             yield f"### {label}\n\n{tables.direct_in_words(study)}"

@@ -11,10 +11,9 @@ import numpy as np
 from benchmarks.findings import found
 from benchmarks.reproduction import paper, statements
 from benchmarks.reproduction.studies import Arm, Study, measured
-from benchmarks.reproduction.tables import distance
+from benchmarks.reproduction.tables import best_of, distance
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import expected_largest
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
 from gaplab.services.store.session import Store
@@ -68,13 +67,13 @@ def lead(store: Store, study: Study) -> str:
 
 
 def _searched_as_often(study: Study) -> str:
-    """Return in a sentence what the best of as many direct searches would have, if direct has enough repetitions."""
-    first, last = (expected_largest(study.direct, count + 1) for count in (FIRST, study.last))
-    if first is None or last is None:
+    """Return in a sentence what the best of several direct searches has, if direct has enough repetitions."""
+    best = best_of(study)
+    if len(best) <= study.last:
         return ""
+    sizes = FIRST + 1, study.last + 1
     return (
-        f" The best of as many direct searches would have {first / study.unit:.2f} after {FIRST} samples, and "
-        f"{last / study.unit:.2f} at last."
+        f" The best of {sizes[0]} direct searches has {best[FIRST]}, and the best of {sizes[1]} has {best[study.last]}."
     )
 
 

@@ -11,7 +11,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import expected_largest, mean_and_deviation
+from gaplab.services.core.curves import best_of_searches, mean_and_deviation
 from gaplab.services.core.statistics import finite
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
@@ -149,11 +149,15 @@ def figure_4(study: Study) -> str:
     others = {0: f"{paper.START:.2f}", 10: f"about {paper.AT_LAST:.2f}"}
     rows = [("the paper, with simulated fit", *(learned.get(count, MISSING) for count in counts))]
     rows += [("the paper, the other three", *(others.get(count, MISSING) for count in counts))]
-    best = [expected_largest(study.direct, count + 1) for count in counts]
-    cells = (MISSING if each is None else f"{each / study.unit:.2f}" for each in best)
-    rows += [("direct, the best of samples + 1", *cells)]
+    best = best_of(study)[: len(counts)]
+    rows += [("direct, the best of samples + 1", *best, *[MISSING] * (len(counts) - len(best)))]
     rows += [_ratios(study, arm, counts) for arm in arms]
     return table(("samples", *map(str, counts)), rows)
+
+
+def best_of(study: Study) -> list[str]:
+    """Return the expected best of 1, 2, 3 … direct searches over direct; nothing if there are too few searches."""
+    return [f"{each / study.unit:.2f}" for each in best_of_searches(study.direct) if each is not None]
 
 
 def _ratios(study: Study, arm: Arm, counts: Sequence[int]) -> tuple[str, ...]:

@@ -11,8 +11,11 @@ from gaplab.services.core.arrays import FloatArray
 
 CONFIDENCE = 0.95
 
-MANY = 20
-"""Searches in reality from which on the best of several says something."""
+FEWEST_SEARCHES = 20
+"""Least number of direct searches for an estimate of the best of several."""
+
+MOST_SEARCHES = 1_001
+"""Searches of which the best is estimated: one more than the iterations that a spec may have."""
 
 
 def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
@@ -47,31 +50,26 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def best_of_searches(values: FloatArray) -> tuple[float | None, ...]:
-    """Return the expected best of 1, 2, 3 … searches, up to half of all; empty if there are fewer than 20.
+    """Return the expected largest fitness of 1, 2, 3 … direct searches, up to half of all; empty for fewer than 20.
+
+    Each is the mean of the largest over all choices of so many searches. So it is an unbiased estimate for new,
+    independent searches, whatever their distribution. None if it overflows.
 
     Args:
-        values: `(r,)`: the fitness that each search reached; nan counts for nothing.
+        values: `(r,)`: the fitness that each search reached; nan is left out.
     """
-    values = values[np.isfinite(values)]
-    return tuple(expected_largest(values, size + 1) for size in range(len(values) // 2)) if len(values) >= MANY else ()
+    largest_first = np.sort(values[np.isfinite(values)])[::-1]
+    n = len(largest_first)
+    sizes = range(1, min(n // 2, MOST_SEARCHES) + 1) if n >= FEWEST_SEARCHES else ()
+    return tuple(known(float(largest_first @ _chances(n, size))) for size in sizes)
 
 
-def expected_largest(values: FloatArray, size: int) -> float | None:
-    """Return the mean of the largest of `size` values, over all choices from them; None if there are too few.
-
-    It is unbiased for the largest of `size` new values, however they are distributed.
-
-    Args:
-        values: `(n,)`, finite.
-        size: how many are chosen, without replacement; at least 1.
-    """
-    n = len(values)
-    if size > n:
-        return None
-    below = np.arange(n - 1, 0, -1)  # how many are smaller than each, from the largest to the second smallest
-    chances = size / n * np.concatenate([[1.0], np.cumprod((below - size + 1) / below)])  # that each is the largest
-    return known(float(np.sort(values)[::-1] @ chances))
+def _chances(n: int, size: int) -> FloatArray:
+    """Return the probability `(n,)` of each of n values, the largest first, to be the largest of `size` of them."""
+    smaller = np.arange(n - 1, 0, -1)
+    return size / n * np.concatenate([[1.0], np.cumprod((smaller - size + 1) / smaller)])
 
 
 @np.errstate(over="ignore", invalid="ignore")

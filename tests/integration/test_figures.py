@@ -105,8 +105,25 @@ def test_the_best_of_as_many_direct_searches_as_a_strategy_makes_is_a_line() -> 
     assert figure.panels[0].y.limits[1] > 1.45
     assert figure.table is not None
     assert figure.table.rows[-1] == (best.name, "1.330 (best of 1)", "1.400 (best of 2)", "1.450 (best of 3)")
-    assert "Best of as many searches: " in figure.caption
+    assert figure.caption.endswith("drawn at e evaluations; their own evaluations are not counted.")
     assert figure.alt.endswith("Direct is at 1.33; Direct, best of as many searches, ends at 1.45.")
+
+
+def test_the_caption_says_that_the_best_of_few_searches_ends_early() -> None:
+    few = curves_figure([RISING, BEST.model_copy(update={"best_of": (1.33, 1.4)})])
+
+    assert few.caption.endswith("It ends at half of them.")
+
+
+def test_direct_baselines_and_the_best_of_their_searches_have_dashes_of_their_own() -> None:
+    others = [
+        curve(name, point(0, 1.0)).model_copy(update={"level": True, "strategy": name})
+        for name in ("domain_randomization", "noise_envelope", "mine")
+    ]
+    figure = curves_figure([RISING, *others, BEST, DIRECT.model_copy(update={"experiment": "another"})])
+
+    (_, best) = lines(figure)
+    assert len({best.style.dash, *(level.style.dash for level in levels(figure) if level.style.ink)}) == 3
 
 
 @pytest.mark.parametrize(

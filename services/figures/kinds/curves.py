@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gaplab.schemas.curves import Curve, CurvePoint
-from gaplab.services.figures.kinds.restarts import restarts_line
+from gaplab.services.figures.kinds.best_of import best_of_in_words, best_of_line
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Line, Mark, Panel, Table, faint_lines
-from gaplab.services.figures.style import INK, Style, strategy_styles, style_of
+from gaplab.services.figures.style import INK, Dash, Style, strategy_styles
 from gaplab.services.figures.words import distinct_names, drawable, heading, limits, number, number_of, with_unit
 
 Band = Literal["interval", "sd"]
@@ -15,6 +15,9 @@ Band = Literal["interval", "sd"]
 BANDS: dict[Band, str] = {"interval": "95\N{NO-BREAK SPACE}% interval of the mean", "sd": "one standard deviation"}
 
 EVALUATIONS = "Number of real-world evaluations"
+
+BASELINES: tuple[Dash, ...] = ("dashed", "dashdot", "long", "longdot", "solid")
+"""Dashes of direct baselines; the best of several direct searches is dotted."""
 
 FEW = 5  # with fewer repetitions, Student's t widens the interval to 1.6 SD and more, with two to 9 SD
 
@@ -76,17 +79,18 @@ def curves_figure(
     ]
     marks += [_level(one, style) for one, style in zip(levels, _level_styles(levels), strict=True)]
     span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
-    restarts = _restarts(levels, span) if lines and not against else []
-    marks += restarts
+    best_of = _best_of_lines(levels, span) if lines and not against else []
+    marks += best_of
     x = Axis(against.label if against else EVALUATIONS, (-0.02 * span, 1.02 * span), whole=against is None)
     y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
+    caption = _caption(lines, levels, BANDS[band], against, each=each)
     return FigureDefinition(
         name="curves",
         title=heading(title),
         panels=(Panel(tuple(marks), x, y),),
-        caption=_caption(lines, levels, BANDS[band], against, each=each) + _restarts_in_words(restarts),
-        alt=_alt(lines, levels, restarts, x, y),
-        table=_table(placed, restarts),
+        caption=" ".join([caption, *(best_of_in_words(line, span) for line in best_of)]),
+        alt=_alt(lines, levels, best_of, x, y),
+        table=_table(placed, best_of),
     )
 
 
@@ -148,22 +152,16 @@ def _level(one: _Placed, style: Style) -> Level:
     return Level(one.name, mean, style, *_ends(point, "sd"), marked=not style.ink)
 
 
-def _restarts(levels: Sequence[_Placed], last: float) -> list[Line]:
-    found = (restarts_line(one.name, one.curve, last) for one in levels if one.curve.direct)
+def _best_of_lines(levels: Sequence[_Placed], last: float) -> list[Line]:
+    found = (best_of_line(one.name, one.curve, last) for one in levels)
     return [line for line in found if line]
-
-
-def _restarts_in_words(restarts: Sequence[Line]) -> str:
-    if not restarts:
-        return ""
-    return " Best of as many searches: expected of one direct search, and one more for each evaluation."
 
 
 def _level_styles(levels: Sequence[_Placed]) -> list[Style]:
     """Return the styles of levels: the colour of text for the direct baseline, and of their strategies for others."""
     looks = zip(levels, strategy_styles([one.curve.strategy for one in levels]), strict=True)
     return [
-        Style(INK, style_of(position + 1).dash, "circle") if one.curve.direct else style
+        Style(INK, BASELINES[position % len(BASELINES)], "circle") if one.curve.direct else style
         for position, (one, style) in enumerate(looks)
     ]
 
@@ -204,19 +202,19 @@ def _level_in_words(one: _Placed) -> str:
     return f"{mean:.2f}{deviation} (n = {point.n})".replace(" ", "\N{NO-BREAK SPACE}")
 
 
-def _alt(lines: Sequence[_Placed], levels: Sequence[_Placed], restarts: Sequence[Line], x: Axis, y: Axis) -> str:
+def _alt(lines: Sequence[_Placed], levels: Sequence[_Placed], best_of: Sequence[Line], x: Axis, y: Axis) -> str:
     told = [
         f"{one.name} goes from {number(one.points[0][1])} to {number(one.points[-1][1])}" for one in lines if one.points
     ]
     told += [f"{one.name} is at {number(one.points[0][1])}" for one in levels]
-    told += [f"{line.name}, ends at {number(line.y[-1])}" for line in restarts]
+    told += [f"{line.name}, ends at {number(line.y[-1])}" for line in best_of]
     return f"{y.label} against {x.label[0].lower()}{x.label[1:]}: {'; '.join(told) or 'no results yet'}."
 
 
-def _table(placed: Sequence[_Placed], restarts: Sequence[Line]) -> Table:
+def _table(placed: Sequence[_Placed], best_of: Sequence[Line]) -> Table:
     counts = sorted({point.evaluations for one in placed for _, _, point in one.points})
     rows = [(one.name, {point.evaluations: _written(point) for _, _, point in one.points}) for one in placed]
-    rows += [(line.name, dict(enumerate(line.hover))) for line in restarts]
+    rows += [(line.name, dict(enumerate(line.hover))) for line in best_of]
     return Table(
         ("Mean ± SD (n) by number of evaluations", *map(str, counts)),
         tuple((name, *(cells.get(count, "") for count in counts)) for name, cells in rows),
