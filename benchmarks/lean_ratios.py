@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-import numpy as np
-
 from benchmarks.differences import Difference
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.statistics import both, finite
@@ -17,6 +15,8 @@ def ratio_rows(
     store: Store, lean: Mapping[str, str], paper: Mapping[str, str], counts: Sequence[int], margin: float
 ) -> Iterator[tuple[str, ...]]:
     """Yield the difference of the ratios to direct, for each strategy and count, and two one-sided tests of it.
+
+    Means are over the repetitions that both sides have.
 
     Args:
         store: database with the experiments, all of one seed.
@@ -33,12 +33,10 @@ def ratio_rows(
         for count in counts:
             values = [recorded[side[name]] for side in (lean, paper)]
             if all(count < each.shape[1] for each in values):
-                found = ratio_difference(*(each[:, count] for each in values), *baselines)
+                shared = both(*(each[:, count] for each in values))
+                found = ratio_difference(*shared, *baselines)
                 if found is not None:
-                    means = (
-                        f"{np.nanmean(each[:, count]) / own.mean():.3f}"
-                        for each, own in zip(values, baselines, strict=True)
-                    )
+                    means = (f"{each.mean() / own.mean():.3f}" for each, own in zip(shared, baselines, strict=True))
                     yield name, str(count), *means, *found.cells(margin)
 
 

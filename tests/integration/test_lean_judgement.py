@@ -11,7 +11,7 @@ import pytest
 
 from gaplab import migrations
 from gaplab.services.store.session import Store
-from tests.made_studies import Made, Study, archive
+from tests.made_studies import Made, Study, archive, values
 
 ROOT = Path(__file__).parents[2]
 
@@ -21,6 +21,7 @@ PAPER = {
     "random": Made([0.7, 0.72, 0.74, 0.75, 0.76, 0.77]),
 }
 LEAN = {name: made._replace(deviation=0.015) for name, made in PAPER.items()}
+REPETITIONS = 12
 Judged = Callable[..., str]
 
 
@@ -47,13 +48,18 @@ def moved(name: str, by: float) -> dict[str, Made]:
 def judged(tmp_path: Path) -> Judged:
     """What the command says of curves of `lean` and of `paper`."""
 
-    def found(lean: dict[str, Made], paper: dict[str, Made] = PAPER, direct: float | None = None) -> str:
+    def found(
+        lean: dict[str, Made],
+        paper: dict[str, Made] = PAPER,
+        direct: float | None = None,
+        repetitions: tuple[int, int] = (REPETITIONS, REPETITIONS),
+    ) -> str:
         url = f"sqlite:///{tmp_path / 'made.db'}"
         migrations.upgrade(url)
         store = Store(url)
         archives = [
-            archive(store, preset, Study(curves, samples=5, changes={"budget": preset}), tmp_path)
-            for preset, curves in (("lean", lean), ("paper", paper))
+            archive(store, preset, Study(curves, count, samples=5, changes={"budget": preset}), tmp_path)
+            for preset, curves, count in zip(("lean", "paper"), (lean, paper), repetitions, strict=True)
         ]
         store.dispose()
         given = [] if direct is None else ["--direct", str(direct)]
@@ -94,6 +100,16 @@ def test_a_direct_that_is_not_well_known_leaves_ratios_undecided(judged: Judged)
     text = judged(LEAN | {"direct": Made([1.0], 0.3)})
 
     assert verdicts(text, "random")[3:] == ["undecided"] * 3
+
+
+def test_ratios_are_of_the_repetitions_that_both_have(judged: Judged) -> None:
+    spread = LEAN | {"random": LEAN["random"]._replace(deviation=0.2)}
+    both = values("random", spread["random"], REPETITIONS, 6)[: REPETITIONS // 2, 1].mean()
+
+    text = judged(spread, repetitions=(REPETITIONS, REPETITIONS // 2))
+
+    assert round(both, 3) != spread["random"].means[1]
+    assert f"│ random        │ 1     │ {both:.3f} │ 0.720 │" in text
 
 
 def test_a_curve_beyond_the_margin_is_different_and_the_others_stay_equivalent(judged: Judged) -> None:
