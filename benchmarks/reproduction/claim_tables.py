@@ -27,13 +27,17 @@ def judged(claim: Claim, study: Study) -> tuple[Examined, Judged]:
 
 
 def in_short(study: Study) -> str:
-    """Return the claims of each verdict in a study, as a list in Markdown."""
-    verdicts = {claim: judged(claim, study)[1].verdict for claim in CLAIMS}
+    """Return the claims of each verdict in a study, as a list in Markdown; those that it does not decide by key alone."""
+    found = {verdict: [claim for claim in CLAIMS if judged(claim, study)[1].verdict is verdict] for verdict in Verdict}
     return "\n".join(
-        f"- {WORDS[verdict]}: {'; '.join(claims)}."
-        for verdict in Verdict
-        if (claims := [f"{claim.title} ({claim.key})" for claim, each in verdicts.items() if each is verdict])
+        f"- {WORDS[verdict]}: {'; '.join(_named(claim, verdict) for claim in claims)}."
+        for verdict, claims in found.items()
+        if claims
     )
+
+
+def _named(claim: Claim, verdict: Verdict) -> str:
+    return claim.key if verdict in {Verdict.OPEN, Verdict.ABSENT} else f"{claim.title} ({claim.key})"
 
 
 def verdicts(studies: Mapping[str, Study]) -> str:

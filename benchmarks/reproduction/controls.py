@@ -76,8 +76,9 @@ def rows(control: Study, study: Study) -> Iterator[Row]:
     """Yield the difference of a control from a study, for each strategy of both and each number of samples.
 
     Fitness is over the direct baseline of its own study. If the control has none, it is over that of the study, whose
-    reality is the same; that of direct itself is as it is. Repetitions of one number share their random numbers, so
-    they are paired. Where there are two baselines, the difference has the errors of both.
+    reality is the same; that of direct itself is not divided. Repetitions of one number share their random numbers, so
+    they are paired. Where there are two baselines, the difference has the errors of both. Where the change makes no
+    difference in any repetition, there is no row.
 
     Args:
         control: has strategies of the study with other settings.
@@ -97,19 +98,18 @@ def rows(control: Study, study: Study) -> Iterator[Row]:
                 found = Difference.paired(new / units[1], old / units[0])
             else:
                 found = ratio_difference(new, old, control.direct, study.direct)
-            if found is not None:
+            if found is not None and (found.value or found.error):
                 yield Row(spoken(arm.strategy), count, (old / units[0], new / units[1]), found)
 
 
-def conclusion(found: Sequence[Row]) -> str:
-    """Return in a sentence which differences of a table are shown after Holm's correction over its rows."""
+def shown(found: Sequence[Row]) -> str:
+    """Return which differences of a table are shown after Holm's correction over its rows; empty if none is."""
     corrected = holm([row.difference.p for row in found])
-    shown = [
+    return ", ".join(
         f"{row.strategy.lower()} at {row.samples}"
         for row, p in zip(found, corrected, strict=True)
         if p is not None and p < SIGNIFICANT
-    ]
-    return f"Shown after Holm's correction over the table: {', '.join(shown) or 'no difference'}."
+    )
 
 
 def change(control: Study, study: Study) -> str:

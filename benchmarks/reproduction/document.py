@@ -3,10 +3,13 @@
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from benchmarks.reproduction import claim_tables, controls, evidence, origins, rankings, tables
 from benchmarks.reproduction.claims import CLAIMS
+from benchmarks.reproduction.controls import Row
+from benchmarks.reproduction.costs import costs
 from benchmarks.reproduction.limits import limits
 from benchmarks.reproduction.opening import OPENING, WORDS
 from benchmarks.reproduction.paper import LEARNED_SD
@@ -38,15 +41,15 @@ class Document:
         """Return the document."""
         sections = [
             OPENING,
-            *self._short(),
             WORDS,
-            self._differences(),
-            *self._rankings(),
+            *self._short(),
             *self._verdicts(),
             *self._figure_4(),
+            *self._rankings(),
             *self._origins(),
-            *self._claims(),
             *self._controls(),
+            *self._claims(),
+            self._differences(),
             *self._figure_3(),
             "\n".join(["## What the reconstruction cannot know", "", *(f"- {one}" for one in limits(self._link))]),
             "\n".join(["## How a verdict is reached", "", *(f"- {rule}" for rule in evidence.RULES)]),
@@ -69,6 +72,22 @@ class Document:
             yield claim_tables.in_short(study)
             if lead := origins.lead(self.store, study):
                 yield f"{lead} [Why](#where-the-recorded-fitness-comes-from)."
+            changed = [
+                f"[{control}](#{control}-beside-{label}) ({shown})"
+                for control, (beside, rows) in self._beside.items()
+                if beside == label and (shown := controls.shown(rows))
+            ]
+            if changed:
+                yield f"Controls that change it, with the strategies and numbers of samples: {', '.join(changed)}."
+
+    @cached_property
+    def _beside(self) -> dict[str, tuple[str, list[Row]]]:
+        """Return the study beside each control, and the differences from it."""
+        found = {label: controls.compared_with(control, self.studies) for label, control in self.controls.items()}
+        return {
+            label: (beside, list(controls.rows(self.controls[label], self.studies[beside])))
+            for label, beside in found.items()
+        }
 
     def _differences(self) -> str:
         columns = dict(self._of_robots())
@@ -131,8 +150,8 @@ class Document:
             "brackets), by number of real-world evaluations. A dash in the paper's rows is a number that its text does "
             "not have. It has a range of standard deviations, without a number of samples: "
             f"{LEARNED_SD[0]:.2f} to {LEARNED_SD[1]:.2f} with simulated fit, and about three times as much for the "
-            "others. *The best of samples + 1* is the mean fitness of the best of so many direct searches, of 20 or "
-            "more: recorded fitness is the largest of as many controllers, the samples and the transferred one."
+            "others. *The best of samples + 1* is the mean fitness of the best of so many direct searches, if there "
+            "are 20 or more: recorded fitness is the largest of as many controllers, samples and the transferred one."
         )
         for label, study in self.studies.items():
             yield f"### {label}\n\n{tables.direct_in_words(study)}"
@@ -167,9 +186,9 @@ class Document:
             "transferred controller, and that of the best sample so far. So a strategy may lead because its simulators "
             "are better, or because its samples are fit. Means over repetitions, in reality and over direct; the share "
             "of repetitions whose recorded fitness is a sample's; and the median distance of the best simulators from "
-            "the truth: Euclidean, with the bounds of each tunable scaled to 1. The paper has the same view of itself: "
-            'beyond three or four samples "the algorithm is hardly tuning the simulator anymore, instead just '
-            'searching for fitter samples".'
+            "the truth: Euclidean, with the bounds of each tunable scaled to 1. The paper says of itself that beyond "
+            'three or four samples "the algorithm is hardly tuning the simulator anymore, instead just searching for '
+            'fitter samples", because its simulators are nearly perfect by then. Here, distances tell whether they are.'
         )
         for label, study in self._of_robots():
             if len(study.direct) and study.present:
@@ -184,8 +203,8 @@ class Document:
 
     def _statements(self) -> Iterator[str]:
         yield (
-            "## The statements\n\nDifferences, and gains, are of direct, whose mean they take as exact; ratios are to "
-            "direct, and have its error. Brackets have 95 % "
+            "## The statements\n\nDifferences and gains are divided by the mean of direct, which is taken as exact. "
+            "Ratios to direct have its error too. Brackets have 95 % "
             f"intervals. Each p is as it is before any correction. *{evidence.OTHER_WAY.capitalize()}*: the estimate "
             "points away from what the p would show."
         )
@@ -196,38 +215,26 @@ class Document:
         if not self.controls:
             return
         yield (
-            "## Controls\n\nEach control repeats strategies of a study with one change. Fitness is over the direct "
-            "baseline of its own study, and over the other's if the control has none; that of direct itself is as it "
-            "is. Means are over the repetitions that both have. These share their random numbers, so they are paired; "
-            "where there are two baselines, the difference has the errors of both (Welch and Satterthwaite). Brackets "
-            "have 95 % intervals. Each p is uncorrected."
+            "## Controls\n\nEach control repeats strategies of a study with one change, or those between two budgets. "
+            "Fitness is over the direct baseline of its own study, and over the other's if the control has none; rows "
+            "of direct itself are in the unit of fitness. Means are over the repetitions that both have. These share "
+            "their random numbers, so they are paired; where there are two baselines, the difference has the errors of "
+            "both (Welch and Satterthwaite). Brackets have 95 % intervals. Each p is uncorrected. A row that the "
+            "change leaves the same in every repetition is left out."
         )
         yield f"### The controls\n\n{self._study_table(self.controls)}"
         for label, control in self.controls.items():
-            beside = controls.compared_with(control, self.studies)
+            beside, rows = self._beside[label]
             told = f"What differs: {controls.change(control, self.studies[beside]) or 'nothing'}."
-            rows = list(controls.rows(control, self.studies[beside]))
+            found = f"Shown after Holm's correction over the table: {controls.shown(rows) or 'no difference'}."
             table = tables.table(controls.HEAD, (row.cells() for row in rows))
-            yield f"### {label}, beside {beside}\n\n{told} {controls.conclusion(rows)}\n\n{table}"
+            yield f"### {label}, beside {beside}\n\n{told} {found}\n\n{table}"
 
     def _costs(self) -> str:
-        everything = self.studies | self.controls
-        rows = [row for label, study in everything.items() for row in tables.cost_rows(label, study)]
-        arms = [arm for study in everything.values() for arm in study.arms]
-        total = (
-            "all",
-            "",
-            "",
-            f"{sum(arm.read.progress.rollouts_done for arm in arms):,}",
-            f"{sum(arm.read.progress.rollouts_saved for arm in arms):,}",
-            f"{sum(arm.core_hours for arm in arms):.2f}",
-            f"{sum(arm.attempts for arm in arms):,}",
-            f"{sum(arm.held_core_hours for arm in arms):.2f}",
-        )
         return (
             "## What it took\n\nStored steps have the time of their computation. Attempts also have work that was "
             "lost, and waiting for a core; early archives lack them. A core-hour is an hour of one thread of the "
-            f"engine, on the machines of the archives' provenance.\n\n{tables.table(tables.COST_HEAD, [*rows, total])}"
+            f"engine, on the machines of the archives' provenance.\n\n{costs(self.studies | self.controls)}"
         )
 
 

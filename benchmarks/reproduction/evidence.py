@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from benchmarks.reproduction.paper import CORRELATION, SIMULATED_FIT, WEAK, deviation
+from benchmarks.reproduction.paper import CORRELATIONS, SIMULATED_FIT, WEAK, deviation
 from benchmarks.reproduction.paper import POWER as PAPER_POWER
 from benchmarks.reproduction.statements import POWER, Tested
 from gaplab.services.core.equivalence import SIGNIFICANT
@@ -45,29 +45,31 @@ RULES = (
     "A claim needs all of its statements, so the p that show them are not corrected (an intersection–union test). One "
     "refuted statement refutes the claim, so the p that refute are corrected by Holm's method over its statements; the "
     "tables have each p as it is before. Nothing is corrected over the claims, nor over the studies: of many true "
-    "claims that are judged, one in twenty may be *not* by chance.",
+    "claims that are judged, up to one in forty is *not* by chance, and of many false claims of one statement, as many "
+    "are *reproduced*.",
     "The least size of a difference is the one that the paper's design would have found with a power of "
     f"{PAPER_POWER:.0%} (Simonsohn 2015), in the paper's own standard deviations: {deviation(SIMULATED_FIT[0]):.2f} of "
     f"direct for the strategies with simulated fit, and {deviation(WEAK[0]):.2f} for the others. A smaller one could "
     "hardly have given the paper its p. Where the paper takes several numbers of samples together, we suppose that "
-    f"the values of a repetition correlate at {CORRELATION}, as ours do. Sizes are compared as shares of direct. Here "
-    "the strategies vary less than in the paper; in standard deviations, each size would be smaller, and refuting it "
-    "harder.",
+    f"the values of a repetition correlate at {CORRELATIONS[0]} with simulated fit, and at {CORRELATIONS[1]} without, "
+    "about as ours do. If they correlated more, the sizes would be smaller, and refuting harder. Sizes are compared as "
+    "shares of direct. Here the strategies vary less than in the paper; in standard deviations, each size would be "
+    "smaller too.",
     "Margins of ours are a factor in C3, half of the paper's rise in C8, and that the first half gains more in C8.",
     "Sample size: each repetition is one value, its mean over the numbers of samples that the claim names. A group "
     f"of fewer than {FEWEST_REPETITIONS} repetitions says nothing, so its statement is open. A p above {SIGNIFICANT} "
     "refutes nothing: too few repetitions leave a claim open. The reason then says which difference such a study finds "
     f"in {POWER:.0%} of cases.",
     "Equal budgets: the experiments of a study have one robot, engine and budget. A claim that compares strategies is "
-    "open if these select their samples from searches of unequal size, as with `reuse_transfer`. A comparison with the "
-    "direct baseline concerns the search for controllers only.",
+    "open if these select their samples from searches of unequal size, as with `reuse_transfer`. Direct selects no "
+    "samples, so claims on direct are judged nevertheless; but better selections may raise a strategy over direct.",
     "A claim that names more strategies or samples than the study has is refuted by those that it has, but not "
     "reproduced by them.",
     "A verdict holds for the budget, the robot, the engines and the optimizer of its study. Under `lean`, controllers "
     "come from CMA-ES: these are claims on the paper's strategies with another optimizer. Of several experiments with "
     "one strategy, the first counts.",
-    "The hours at hand, and no result, decided how many repetitions a study has. *Simulated fit* and *random* come "
-    "first, because `lean` is compared with the paper's budget by them.",
+    "Computing time decided how many repetitions a study has. The results were read each time before more repetitions "
+    "were added, and no p is corrected for this. The plan is the paper's number.",
 )
 """The rules of a verdict, in sentences."""
 
@@ -166,7 +168,8 @@ def _refutation(one: Evidence) -> str:
 def _careful(evidence: Sequence[Evidence], shown: Sequence[Evidence], refuted: Sequence[Evidence]) -> str:
     """Return how many statements are shown and refuted, with the weakest one."""
     known = [(each.tested.shows, each.statement) for each in evidence if each.tested.shows is not None]
-    parts = [f"{len(shown)} of {len(evidence)} shown"]
+    uncorrected = ", uncorrected" if 0 < len(shown) < len(evidence) else ""
+    parts = [f"{len(shown)} of {len(evidence)} shown{uncorrected}"]
     parts += [f"{len(refuted)} refuted"] if refuted else []
     if known:
         p, statement = max(known)

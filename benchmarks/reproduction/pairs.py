@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -19,24 +18,21 @@ from gaplab.services.reports.numbers import probability, signed
 
 @dataclass(frozen=True)
 class Pair:
-    """A statement on two strategies.
+    """A statement that one strategy is above another.
 
     Attributes:
-        first: a strategy.
-        second: another one.
+        first: the strategy that the paper has ahead.
+        second: the other one.
         paper: the difference that the paper found; None if it tests none.
-        ahead: whether the paper has the first above the second, and not only different.
     """
 
     first: str
     second: str
     paper: paper.PaperDifference | None
-    ahead: bool = True
 
     def __str__(self) -> str:
         """Return the statement in words."""
-        relation = "above" if self.ahead else "differs from"
-        return f"{spoken(self.first)} {relation} {spoken(self.second).lower()}"
+        return f"{spoken(self.first)} above {spoken(self.second).lower()}"
 
     @property
     def least(self) -> float:
@@ -84,13 +80,12 @@ class Tested:
         test = self.student
         if test.p is None or test.statistic is None or self.pair.paper is None:
             return False
-        return test.p < self.pair.paper.p and (test.statistic > 0 or not self.pair.ahead)
+        return test.p < self.pair.paper.p and test.statistic > 0
 
     def evidence(self) -> Evidence:
         """Return what speaks for and against the statement."""
-        test = statements.above if self.pair.ahead else statements.apart
-        opposed = statements.above(*self.groups[::-1], 0.0, self.unit).shows if self.pair.ahead else None
-        return Evidence(str(self.pair), test(*self.groups, self.pair.least, self.unit), opposed)
+        opposed = statements.above(*self.groups[::-1], 0.0, self.unit).shows
+        return Evidence(str(self.pair), statements.above(*self.groups, self.pair.least, self.unit), opposed)
 
 
 def one_sample_wins(study: Study) -> Examined:
@@ -107,8 +102,9 @@ def fit_strategies_lead(study: Study) -> Examined:
 
 
 def fit_strategies_differ(study: Study) -> Examined:
-    """Return the evidence that strategies with simulated fit differ from each other (C5b)."""
-    pairs = [Pair(one, other, paper.BEYOND_TWO, ahead=False) for one, other in combinations(paper.SIMULATED_FIT, 2)]
+    """Return the evidence that strategies with simulated fit differ from each other, as in the paper (C5b)."""
+    plain, unique, informative = paper.SIMULATED_FIT
+    pairs = [Pair(*each, paper.BEYOND_TWO) for each in ((unique, plain), (plain, informative), (unique, informative))]
     return _examined(study, pairs, 3, paper.ITERATIONS)
 
 
@@ -118,9 +114,10 @@ def known_fit_leads_random(study: Study) -> Examined:
 
 
 def weak_strategies_differ(study: Study) -> Examined:
-    """Return the evidence that strategies without simulated fit differ from each other (C6)."""
-    pairs = [Pair(one, other, paper.BEYOND_FIVE, ahead=False) for one, other in combinations(paper.WEAK, 2)]
-    return _examined(study, pairs, 6, paper.ITERATIONS)
+    """Return the evidence that strategies without simulated fit differ from each other, as in the paper (C6)."""
+    informative, random, known_fit = paper.WEAK
+    ordered = (informative, random), (informative, known_fit), (known_fit, random)
+    return _examined(study, [Pair(*each, paper.BEYOND_FIVE) for each in ordered], 6, paper.ITERATIONS)
 
 
 def uniqueness_gains(study: Study) -> Examined:
@@ -157,11 +154,11 @@ def _tested(study: Study, pair: Pair, first: int, last: int) -> Tested:
 
 
 def _here(study: Study, tested: Sequence[Tested]) -> str:
-    """Return the smallest difference of the means; of those that the paper has ahead, the most negative one."""
+    """Return the smallest lead of the strategies that the paper has ahead; it may be negative."""
     known = [each for each in tested if np.isfinite(each.difference)]
     if not known:
         return ""
-    one = min(known, key=lambda each: each.difference if each.pair.ahead else abs(each.difference))
+    one = min(known, key=lambda each: each.difference)
     whose, unit = ("", 1.0) if np.isnan(study.unit) else (" of direct", study.unit)
     least = "difference" if len(known) == 1 else "least difference"
     return f"{least} {signed(one.difference / unit)}{whose} ({one.pair})"
@@ -192,5 +189,5 @@ def _findable(study: Study, tested: Sequence[Tested]) -> str:
     return (
         f"With {' and '.join(map(str, sizes))} repetitions, a true difference of {difference:.2f} of direct is found "
         f"in {statements.POWER:.0%} of studies ({one.pair}). The least that agrees with the paper is "
-        f"{one.pair.least:.3f}: finding it takes {number_of('repetition', max(needed))}."
+        f"{one.pair.least:.3f}: finding it in this pair takes {number_of('repetition', max(needed))}."
     )

@@ -52,21 +52,19 @@ def paper_rows(studies: Sequence[Study]) -> Iterator[tuple[str, ...]]:
     engines = (f"{spec.engine.name}, {where}" for spec, where in zip(specs, realities, strict=True))
     yield "simulators, reality", "physx, physx", *engines
     yield "optimizer of controllers", "steady state", *(spec.controller_optimizer.name for spec in specs)
-    yield "evaluations of a search for a controller", _sizes(paper.EVALUATIONS[:1]), *map(_searches, specs)
+    for what, size, of in (
+        ("search for a transferred controller", 0, "controller_evaluations"),
+        ("search for a sample", 1, "selection_evaluations"),
+    ):
+        told = (f"{getattr(spec.budget, of):,}" for spec in specs)
+        yield f"evaluations of a {what}", f"{paper.EVALUATIONS[size]:,}", *told
+    yield "simulators of an ensemble that score a sample", "20", *map(_scoring, studies)
     yield "evaluations of a tuning", f"{paper.EVALUATIONS[2]:,}", *map(_tunings, specs)
     yield "samples", str(paper.ITERATIONS), *(str(study.last) for study in studies)
     yield "repetitions", f"{paper.REPETITIONS} (direct {paper.DIRECT_REPETITIONS})", *map(_repetitions, studies)
     truths = [study.arms[0].read.spec["reality"]["parameters"] for study in studies]
     told = (", ".join("hidden" if value is None else str(value) for value in truth.values()) for truth in truths)
     yield "static friction, dynamic friction, restitution", "1.0, 0.8, 0.0", *told
-
-
-def _searches(spec: ResolvedSpec) -> str:
-    return _sizes(sorted({spec.budget.controller_evaluations, spec.budget.selection_evaluations}, reverse=True))
-
-
-def _sizes(sizes: Sequence[int]) -> str:
-    return " or ".join(f"{size:,}" for size in sizes)
 
 
 def _tunings(spec: ResolvedSpec) -> str:
@@ -119,10 +117,18 @@ STUDY_HEAD = (
 
 def _weightiest(arm: Arm) -> str:
     """Return how many simulators score a selection, if not all."""
+    return f"; selections scored by {_scored_by(arm)} simulators" if arm.spec.strategy.options.get("weightiest") else ""
+
+
+def _scored_by(arm: Arm) -> str:
+    """Return how many of an ensemble of simulators score a selection; empty without an ensemble."""
     options = arm.spec.strategy.options
-    if not options.get("weightiest"):
-        return ""
-    return f"; selections scored by {options['weightiest']} of {options['simulators']} simulators"
+    size, some = options.get("simulators"), options.get("weightiest")
+    return "" if size is None else f"{some} of {size}" if some else f"{size}"
+
+
+def _scoring(study: Study) -> str:
+    return ", ".join(sorted({_scored_by(arm) for arm in study.arms} - {""})) or MISSING
 
 
 def _repetitions(study: Study) -> str:
@@ -173,8 +179,11 @@ def direct_in_words(study: Study) -> str:
     printed = f"the paper's is {paper.DIRECT:.2f} ± {paper.DIRECT_SD:.2f} ({paper.DIRECT_REPETITIONS} repetitions)"
     if not len(own):
         return f"The study has no direct baseline, so it has no ratios; {printed}."
+    told = f"Direct is {_mean(own, spread=True)}"
+    if is_toy(study):
+        return f"{told} ({len(own)} repetitions)."
     unit = next((curve.unit for curve in study.curves if curve.unit), "")
-    return f"Direct is {_mean(own, spread=True)} {unit} ({len(own)} repetitions); {printed}."
+    return f"{told} {unit} ({len(own)} repetitions); {printed}."
 
 
 def figure_3(store: Store, study: Study) -> tuple[str, str]:
@@ -199,31 +208,3 @@ def _mean(values: FloatArray, *, spread: bool = False) -> str:
     _, mean, deviation = mean_and_deviation(values)
     told = MISSING if mean is None else f"{mean:.2f}"
     return f"{told} ± {deviation:.2f}" if spread and deviation is not None else told
-
-
-def cost_rows(label: str, study: Study) -> Iterator[tuple[str, ...]]:
-    """Yield what each experiment of a study took."""
-    for arm in study.arms:
-        progress = arm.read.progress
-        yield (
-            label,
-            spoken(arm.read.name),
-            str(arm.repetitions),
-            f"{progress.rollouts_done:,}",
-            f"{progress.rollouts_saved:,}",
-            f"{arm.core_hours:.2f}",
-            f"{arm.attempts:,}" if arm.attempts else MISSING,
-            f"{arm.held_core_hours:.2f}" if arm.attempts else MISSING,
-        )
-
-
-COST_HEAD = (
-    "study",
-    "experiment",
-    "repetitions",
-    "rollouts",
-    "saved",
-    "core-hours of stored steps",
-    "attempts",
-    "core-hours of attempts",
-)
