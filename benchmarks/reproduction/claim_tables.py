@@ -27,7 +27,7 @@ def judged(claim: Claim, study: Study) -> tuple[Examined, Judged]:
 
 
 def in_short(study: Study) -> str:
-    """Return the claims of each verdict in a study, as a list in Markdown; those that it does not decide by key alone."""
+    """Return the claims of each verdict in a study, as a list in Markdown; undecided ones are keys alone."""
     found = {verdict: [claim for claim in CLAIMS if judged(claim, study)[1].verdict is verdict] for verdict in Verdict}
     return "\n".join(
         f"- {WORDS[verdict]}: {'; '.join(_named(claim, verdict) for claim in claims)}."
