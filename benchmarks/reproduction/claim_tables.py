@@ -15,6 +15,7 @@ WORDS = {
     Verdict.OPEN: "open",
     Verdict.ABSENT: "not in this study",
 }
+UNDECIDED = {Verdict.OPEN, Verdict.ABSENT}
 CLAIM_HEAD = "study", "verdict", "here", "the paper's test", "the careful test", "why"
 STATEMENT_HEAD = "study", "statement", "here", "p that shows it", "p that refutes it"
 
@@ -24,6 +25,11 @@ def judged(claim: Claim, study: Study) -> tuple[Examined, Judged]:
     """Return a claim as a study shows it, and the verdict."""
     examined = claim.examine(study)
     return examined, judge(examined)
+
+
+def decides(study: Study) -> bool:
+    """Return whether a study reproduces or refutes a claim."""
+    return any(judged(claim, study)[1].verdict not in UNDECIDED for claim in CLAIMS)
 
 
 def in_short(study: Study) -> str:
@@ -37,7 +43,7 @@ def in_short(study: Study) -> str:
 
 
 def _named(claim: Claim, verdict: Verdict) -> str:
-    return claim.key if verdict in {Verdict.OPEN, Verdict.ABSENT} else f"{claim.title} ({claim.key})"
+    return claim.key if verdict in UNDECIDED else f"{claim.title} ({claim.key})"
 
 
 def verdicts(studies: Mapping[str, Study]) -> str:

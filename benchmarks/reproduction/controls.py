@@ -50,8 +50,8 @@ class Row(NamedTuple):
 def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
     """Return the label of the study of the same robot, engine of simulators and seed that differs least.
 
-    These differ in the fewest settings of a strategy, and share the most strategies. A control without direct is
-    compared with a study of its own reality, if there is one.
+    A whole figure comes before other studies. Else these differ in the fewest settings of a strategy, and share the
+    most strategies. A control without direct is compared with a study of its own reality, if there is one.
 
     Raises:
         SystemExit: there is none that shares a strategy.
@@ -59,6 +59,7 @@ def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
     changes = {
         label: (
             _alone(control) and not _same_reality(control, study),
+            not study.whole,
             sum(len(what_differs(own, arm)) for own, arm in pairs) / len(pairs),
             -len(pairs),
         )

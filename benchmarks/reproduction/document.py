@@ -64,10 +64,10 @@ class Document:
         return Path(os.path.relpath(ROOT / path, self.folder)).as_posix()
 
     def _short(self) -> Iterator[str]:
-        """Yield the verdicts of each whole figure of a robot, and what simulated fit gains there."""
+        """Yield the verdicts of each whole figure of a robot, and of other studies that decide a claim."""
         robots = dict(self._of_robots())
-        whole = {label: each for label, each in robots.items() if each.whole}
-        for label, study in (whole or robots).items():
+        told = {label: each for label, each in robots.items() if each.whole or claim_tables.decides(each)}
+        for label, study in (told or robots).items():
             yield f"**In short**, {label} ({tables.in_words(study)}):"
             yield claim_tables.in_short(study)
             if lead := origins.lead(self.store, study):

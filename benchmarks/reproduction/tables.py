@@ -32,9 +32,11 @@ def in_words(study: Study) -> str:
     """Return robot, engines, budget and repetitions of a study in words."""
     spec, reality = study.arms[0].spec, study.arms[0].read.spec["reality"]["engine"]
     where = "a robot on a bench" if reality is None else reality["name"]
+    search, selection = spec.budget.controller_evaluations, spec.budget.selection_evaluations
+    selections = "" if search == selection else f", samples from searches of {selection:,} evaluations"
     return (
         f"{spec.robot.name}: {spec.engine.name} for a reality in {where}, budget {spec.budget.preset}, controllers by "
-        f"{spec.controller_optimizer.name}, repetitions: {_repetitions(study)}"
+        f"{spec.controller_optimizer.name}{selections}, repetitions: {_repetitions(study)}"
     )
 
 
