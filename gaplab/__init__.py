@@ -14,6 +14,10 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from gaplab.arithmetic import fix_arithmetic
+
+fix_arithmetic()
+
 if TYPE_CHECKING:
     __version__: str
 

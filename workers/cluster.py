@@ -11,6 +11,7 @@ import ray
 from ray._private import ray_constants
 from ray.exceptions import RayError
 
+from gaplab.arithmetic import chosen
 from gaplab.services.core.errors import ClusterUnusable, RayGone
 from gaplab.services.settings import Settings
 from gaplab.workers.nodes import Versions, check_nodes, versions
@@ -133,7 +134,7 @@ def _on_loopback() -> Iterator[None]:
 
 def _join(address: str) -> None:
     try:
-        ray.init(address=address, log_to_driver=False, configure_logging=False)
+        ray.init(address=address, log_to_driver=False, configure_logging=False, runtime_env={"env_vars": chosen()})
     except (ConnectionError, ValueError, RuntimeError, RayError) as error:  # away; no node here; versions; token
         msg = f"the Ray cluster at {address} cannot be joined (docs/scale.md says how): {error}"
         raise ClusterUnusable(msg) from error

@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, packages_distributions, ver
 from pathlib import Path
 from typing import Any
 
+from gaplab.arithmetic import chosen
 from gaplab.schemas.provenance import Provenance
 from gaplab.services.core.external_plugins import file_of
 from gaplab.services.engines import engines
@@ -86,7 +87,7 @@ def _software() -> Provenance:
         commit=_git("rev-parse", "HEAD"),
         dirty=None if (changed := _git("status", "--porcelain", "--untracked-files=no")) is None else bool(changed),
         python=platform.python_version(),
-        libraries={name: _version(name) for name in LIBRARIES},
+        libraries={name: _version(name) for name in LIBRARIES} | chosen(),
         engines={},
         architecture=platform.machine(),
         processor=_processor(),

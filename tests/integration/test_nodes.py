@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 import ray
 from ray.cluster_utils import Cluster
 
+from gaplab.arithmetic import FIXED
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.experiments import reading, submission
@@ -20,6 +22,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers import nodes, task
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
+from tests.arithmetic import told
 from tests.integration.test_workers import expected, run, stored, toy
 
 ROOT = Path(__file__).parents[2]
@@ -28,10 +31,20 @@ SPEC = toy(repetitions=4, iterations=1, budget={"controller_evaluations": 3_000,
 """About a second of work in each repetition."""
 
 
+@contextmanager
+def by_hand() -> Iterator[None]:
+    """An environment as of a person who starts a node, without what gaplab adds to its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in FIXED:
+            patch.delenv(name, raising=False)
+        yield
+
+
 @pytest.fixture(scope="module")
 def head() -> Iterator[Any]:
     """A cluster whose head computes nothing; it grows as the tests ask for nodes."""
-    found = Cluster(initialize_head=True, head_node_args=NODE | {"num_cpus": 0, "include_dashboard": False})
+    with by_hand():
+        found = Cluster(initialize_head=True, head_node_args=NODE | {"num_cpus": 0, "include_dashboard": False})
     yield found
     found.shutdown()
 
@@ -39,9 +52,10 @@ def head() -> Iterator[Any]:
 @pytest.fixture
 def joined(head: Any, request: pytest.FixtureRequest) -> Iterator[Any]:
     """A connection to the cluster with as many nodes of one core as the test asks for."""
-    for _ in range(request.param - len(head.worker_nodes)):
-        head.add_node(**NODE, wait=False)
-    head.wait_for_nodes()
+    with by_hand():
+        for _ in range(request.param - len(head.worker_nodes)):
+            head.add_node(**NODE, wait=False)
+        head.wait_for_nodes()
     with cluster(Settings(ray_address=head.address)) as connection:
         yield connection
 
@@ -77,6 +91,11 @@ def test_the_numbers_do_not_depend_on_how_many_nodes_there_are(
     assert joined.capacity() == 2 * count
     assert len(ran_on()) == count
     assert stored(sqlite_store, experiment) == in_one_process
+
+
+@pytest.mark.parametrize("joined", [2], indirect=True)
+def test_the_nodes_run_the_same_code_of_numpy_as_this_process(joined: Any) -> None:
+    assert ray.get(ray.remote(told).remote()) == told()
 
 
 @pytest.mark.parametrize("joined", [4], indirect=True)

@@ -39,6 +39,7 @@ from gaplab.workers.cluster import cluster
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import Permits, PermittedReality, asking
 from gaplab.workers.supervisor import Supervisor
+from tests.arithmetic import told
 from tests.experiments import cancel
 from tests.fakes import flat, install
 from tests.processes import processes_of_ray
@@ -50,6 +51,10 @@ DEADLINE_S = 180
 def ray_of_our_own() -> Iterator[None]:
     with cluster(Settings(workers=2)):
         yield
+
+
+def test_the_processes_of_ray_run_the_same_code_of_numpy_as_this_one() -> None:
+    assert ray.get(ray.remote(told).remote()) == told()
 
 
 def toy(**changes: Any) -> Any:
