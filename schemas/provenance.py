@@ -15,7 +15,10 @@ class Provenance(Frozen):
     )
     dirty: bool | None = Field(default=None, description="whether the clone has changes since that commit")
     python: str = Field(examples=["3.11.14"])
-    libraries: dict[str, str] = Field(examples=[{"numpy": "2.4.6", "scipy": "1.17.1"}])
+    libraries: dict[str, str] = Field(
+        description="version of each library that numbers depend on, and the variables that choose its code",
+        examples=[{"numpy": "2.4.6", "scipy": "1.17.1", "OPENBLAS_CORETYPE": "Haswell"}],
+    )
     engines: dict[str, str] = Field(
         description="library of each engine, with its version", examples=[{"pybullet": "pybullet 3.2.7"}]
     )

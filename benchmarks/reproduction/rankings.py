@@ -4,8 +4,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import combinations
 from string import ascii_lowercase
 
-import numpy as np
-
 from benchmarks.reproduction import paper, statements
 from benchmarks.reproduction.studies import Study
 from gaplab.services.core.arrays import FloatArray
@@ -77,5 +75,5 @@ def _column(study: Study, first: int, last: int) -> Mapping[str, str]:
 def _differing(values: Mapping[str, FloatArray]) -> set[frozenset[str]]:
     """Return the pairs that Welch's t tells apart after Holm's correction."""
     pairs = list(combinations(values, 2))
-    corrected = holm([statements.apart(values[one], values[other], 0.0, np.nan).shows for one, other in pairs])
+    corrected = holm([statements.differ(values[one], values[other]) for one, other in pairs])
     return {frozenset(pair) for pair, p in zip(pairs, corrected, strict=True) if p is not None and p < SIGNIFICANT}

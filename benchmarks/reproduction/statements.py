@@ -53,11 +53,10 @@ def above(first: FloatArray, second: FloatArray, least: float, unit: float) -> T
     return _tested(found, (first, second), lambda one: (one.above(0.0), one.below(_size(least, unit))))
 
 
-def apart(first: FloatArray, second: FloatArray, least: float, unit: float) -> Tested:
-    """Test a difference of two means, either way; refuted if it is shown to be below `least`, as in `above`."""
-    found = _over(Difference.unpaired(first, second), unit)
-    size = _size(least, unit)
-    return _tested(found, (first, second), lambda one: (one.p, _doubled(one.within(size)) if size else None))
+def differ(first: FloatArray, second: FloatArray) -> float | None:
+    """Return p of a difference of two means, `(n,)` and `(m,)`, either way; None if undefined."""
+    found = Difference.unpaired(first, second)
+    return _tested(found, (first, second), lambda one: (one.p, None)).shows
 
 
 def rises(gains: FloatArray, least: float, unit: float) -> Tested:

@@ -169,6 +169,6 @@ def _other_versions(session: Session, checked: CheckedArchive) -> tuple[str, ...
 def _differing(stored: Provenance, here: Provenance) -> Iterator[str]:
     before = {name: getattr(stored, name) for name in SOFTWARE} | stored.libraries | stored.engines | stored.outside
     now = {name: getattr(here, name) for name in SOFTWARE} | here.libraries | here.engines | here.outside
-    for name, value in before.items():
-        if now.get(name) != value:
-            yield f"{name}: {value} in the archive, {now.get(name, 'none')} here"
+    for name in before | here.libraries:
+        if (there := before.get(name, "none")) != (found := now.get(name, "none")):
+            yield f"{name}: {there} in the archive, {found} here"

@@ -10,6 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
+from gaplab.arithmetic import chosen, has_avx2
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import export_study
 from gaplab.services.archives.rerunning import Recorded, rerun, submitted_spec
@@ -26,6 +27,7 @@ from gaplab.services.specs.shortening import experiment_spec, study_spec
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import run, toy
+from tests.numbers.kept_numbers import FOLDER
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SMALL = {"strategies": ["simulated_fit", "direct"], "robot": "toy_function", "budget": "smoke", "seed": 2**63}
@@ -129,6 +131,14 @@ def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
     assert "2 of 2 repetitions have the same bits." in said.out
     assert json.loads(document.out)["same"] == 2
     assert gaplab("spec", again.out.strip()).out == gaplab("spec", study.id).out
+
+
+@pytest.mark.skipif(not has_avx2(), reason="no code is chosen on such a processor")
+def test_code_that_an_archive_does_not_name_is_named(gaplab: Gaplab) -> None:
+    said = gaplab("rerun", str(FOLDER / "cma_es.zip"), "--verify", "--repetitions", "1")
+
+    assert said.code == 0
+    assert f"OPENBLAS_CORETYPE: none in the archive, {chosen()['OPENBLAS_CORETYPE']} here" in said.out
 
 
 def test_the_first_step_that_differs_is_named() -> None:

@@ -78,6 +78,37 @@ def test_while_it_runs_the_fitness_is_after_the_last_number_that_all_begun_have_
     assert (completed.evaluations, completed.n, completed.mean) == (2, 1, 0.7)
 
 
+def test_a_repetition_that_was_stopped_does_not_take_the_fitness_back_to_where_it_stopped(store: Store) -> None:
+    made = submission.submit_experiment(store, toy(repetitions=2)).id
+    first, second = claims(store)[made]
+    record(store, first, 0.5, 0.6, 0.7)
+    record(store, second, 0.1, complete=False)
+
+    lifecycle.ask_experiment(store, made, Verb.STOP)
+    execution.release(store, second, "killed")
+    read = reading.read_experiment(store, made)
+
+    assert (read.state, read.caveat and read.caveat[:13]) == (State.COMPLETED, "stopped early")
+    assert read.fitness
+    assert (read.fitness.evaluations, read.fitness.n, read.fitness.mean) == (2, 1, 0.7)
+
+
+def test_the_fitness_of_repetitions_that_were_all_stopped_is_after_the_last_number_they_share(store: Store) -> None:
+    made = submission.submit_experiment(store, toy(repetitions=2)).id
+    first, second = claims(store)[made]
+    record(store, first, 0.5, 0.6, complete=False)
+    record(store, second, 0.1, complete=False)
+
+    lifecycle.ask_experiment(store, made, Verb.STOP)
+    for claim in (first, second):
+        execution.release(store, claim, "killed")
+    read = reading.read_experiment(store, made)
+
+    assert read.state is State.COMPLETED
+    assert read.fitness
+    assert (read.fitness.evaluations, read.fitness.n, read.fitness.mean) == (0, 2, pytest.approx(0.3))
+
+
 def test_the_best_of_a_study_is_the_highest_curve_at_the_last_shared_number_without_the_baseline(store: Store) -> None:
     made = study(store, "simulated_fit", "random", "known_fit", "direct")
     assert made.best is None

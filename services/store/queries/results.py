@@ -146,8 +146,9 @@ def _best_recorded() -> Select[Any]:
 def last_common(session: Session, experiments: Sequence[str]) -> dict[str, int]:
     """Return the last number of real-world evaluations that the repetitions of each experiment share.
 
-    The COMPLETED repetitions count. Without any, those that have begun and may go on count; without any of those, all
-    that have begun. An experiment without a point of its curve is missing.
+    The repetitions with all their iterations count. Without any, the COMPLETED ones count, which were stopped early;
+    then those that have begun and may go on; then all that have begun. An experiment without a point of its curve is
+    missing.
     """
     counted = session.execute(_last_common(), {"experiments": list(experiments)})
     return {experiment: done - 1 for experiment, done in counted if done is not None}
@@ -163,12 +164,14 @@ def last_common_of_all() -> Select[Any, Any]:
     """Return the query for the iterations that the repetitions of each experiment share, number 0 included."""
     row = RepetitionRow
 
-    def least(*states: State) -> ColumnElement[int | None]:
-        return func.min(case((row.state.in_(states), row.iterations_done)))
+    def least(where: ColumnElement[bool]) -> ColumnElement[int | None]:
+        return func.min(case((where, row.iterations_done)))
 
-    begun = func.coalesce(least(State.COMPLETED), least(*PENDING), func.min(row.iterations_done))
+    completed = row.state == State.COMPLETED
+    whole = least(completed & (row.iterations_done >= ExperimentRow.iterations))
+    begun = func.coalesce(whole, least(completed), least(row.state.in_(PENDING)), func.min(row.iterations_done))
     query = select(row.experiment_id, begun.label("done")).where(row.iterations_done > 0)
-    return query.group_by(row.experiment_id)
+    return query.join(ExperimentRow, ExperimentRow.id == row.experiment_id).group_by(row.experiment_id)
 
 
 def recorded_at(session: Session, counts: Mapping[str, int]) -> dict[str, list[float]]:
