@@ -1,7 +1,7 @@
 """The members of an archive: their names, and how the rows of a table are written."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from itertools import islice
 from typing import IO, Any
@@ -13,6 +13,7 @@ MANIFEST, CURVES, SPEC = "manifest.json", "curves.json", "spec.json"
 
 Row = dict[str, Any]
 
+_VECTORS = {Kind.VECTOR, Kind.READINGS}
 _AT_ONCE = 1_000
 
 
@@ -37,7 +38,7 @@ def _moment(value: datetime) -> str:
     return value.astimezone(UTC).isoformat()
 
 
-def _write_parquet(columns: Iterable[Column], rows: Iterable[Row], target: IO[bytes]) -> int:
+def _write_parquet(columns: Sequence[Column], rows: Iterable[Row], target: IO[bytes]) -> int:
     import pyarrow as arrow  # takes a second, and only archives need it
     from pyarrow import parquet
 
@@ -47,12 +48,16 @@ def _write_parquet(columns: Iterable[Column], rows: Iterable[Row], target: IO[by
         Kind.REAL: arrow.float64(),
         Kind.TRUTH: arrow.bool_(),
         Kind.MOMENT: arrow.timestamp("us", tz="UTC"),
-        Kind.VECTOR: arrow.list_(arrow.float64()),
-        Kind.READINGS: arrow.list_(arrow.float64()),
+        **dict.fromkeys(_VECTORS, arrow.list_(arrow.float64())),
     }
     schema = arrow.schema([(column.name, types[column.kind]) for column in columns])
+    vectors = [f"{column.name}.list.element" for column in columns if column.kind in _VECTORS]
+    reals = [column.name for column in columns if column.kind is Kind.REAL]
+    others = [column.name for column in columns if column.kind not in {Kind.REAL, *_VECTORS}]
+    # Doubles rarely repeat. With bytes sorted by place and without a dictionary, they take three quarters of the space.
+    encoded = {"compression": "zstd", "use_byte_stream_split": vectors + reals, "use_dictionary": others}
     count = 0
-    with parquet.ParquetWriter(target, schema, compression="zstd") as writer:
+    with parquet.ParquetWriter(target, schema, **encoded) as writer:
         for some in _parts(rows):
             writer.write_batch(arrow.RecordBatch.from_pylist(some, schema))
             count += len(some)
