@@ -32,7 +32,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 """Flags for WebGL without a graphics card."""
 
-PUBLISHED = Path(__file__).parents[1] / "docs" / "studies" / "mujoco-in-mujoco.zip"
+PUBLISHED = Path(__file__).parents[1] / "docs" / "studies" / "figure-4-mujoco.zip"
 
 VIEWS = {
     "list": ("", ".list tbody tr"),

@@ -34,7 +34,7 @@ from tests.experiments import run
 
 ROOT = Path(__file__).parents[1]
 FOLDER = Path(__file__).with_name("pictures")
-STUDIES = ("mujoco-in-mujoco", "pybullet-in-pybullet", "mujoco-in-physx")
+STUDIES = ("quadruped-mujoco-paper", "figure-4-physx", "figure-4-mujoco")
 """The archives to import; the last one is shown."""
 
 LONGEST_S = 600

@@ -3,8 +3,8 @@
 `visit(address, dark=…, width=…)` opens the page in Chromium, and fails the test if the console, a script or a request
 reports an error; `visit(address, beside=page)` does so in another tab of that page's window, which shares its
 connections; `visit.forgive(pattern, …)` names those that a test causes. `archive` is the API alone on a database
-with ended studies, `api` the same on the one of `written`, which tests fill as workers would, `shared_service` the real
-service with workers.
+with ended experiments, `api` the same on the one of `written`, which tests fill as workers would, `shared_service` the
+real service with workers.
 """
 
 import shutil
@@ -17,14 +17,15 @@ import pytest
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.services.archives import import_archive
 from gaplab.services.experiments.listing import ListFilter, list_experiments
+from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
 from tests.e2e.service import Service
-from tests.experiments import cancel
+from tests.experiments import cancel, toy
 from tests.filling import fill
 
-STUDY = Path(__file__).parents[2] / "docs" / "studies" / "mujoco-in-mujoco.zip"
+STUDY = Path(__file__).parents[2] / "docs" / "studies" / "figure-4-mujoco.zip"
 
 
 @pytest.fixture(scope="module")
@@ -74,13 +75,14 @@ def written(written_file: Any) -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def archive(folder: Path, sqlite_template: Path) -> Iterator[Any]:
-    """The API on a database with seventy made-up experiments and the study that is published with this repository."""
+    """The API on a database with seventy made-up experiments, a published study and a cancelled experiment."""
     file = folder / "archive.db"
     shutil.copy(sqlite_template, file)
     store = Store(f"sqlite:///{file}")
     fill(store, 70)
     with STUDY.open("rb") as archived:
         import_archive(store, archived)
+    cancel(store, submit_experiment(store, toy(name="given up")).id)
     store.dispose()
     api = Api(f"sqlite:///{file}", folder / "archive.log").start()
     yield api

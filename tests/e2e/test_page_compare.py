@@ -15,7 +15,7 @@ from tests.experiments import run, some_log, toy
 
 SLOW_MS = 120_000
 expect.set_options(timeout=SLOW_MS)
-STUDY = "MuJoCo in MuJoCo"
+STUDY = "Fig. 4, lean: MuJoCo in MuJoCo"
 
 
 @pytest.fixture
@@ -124,12 +124,12 @@ def test_what_differs_is_what_the_service_found(archive: Any, ids: Any, visit: A
     rows = page.get_by_role("region", name="Pairs").locator("tbody tr")
     expect(rows).to_have_count(len(found))
     heads = page.get_by_role("region", name="Pairs").locator("thead th").all_inner_texts()
-    assert heads[1:5] == ["At 1", "Mean of 1–5", "Mean of 3–5", "At 5"]
+    assert heads[1:6] == ["At 1", "Mean of 1–10", "Mean of 3–10", "Mean of 6–10", "At 10"]
     caution = page.get_by_text("are not independent")
     expect(caution).to_have_count(0)
-    button = page.get_by_role("button", name="mean of 3–5", exact=True)
+    button = page.get_by_role("button", name="mean of 3–10", exact=True)
     button.click()
-    expect(page.get_by_text("The row against the column")).to_contain_text("over 3 to 5")
+    expect(page.get_by_text("The row against the column")).to_contain_text("over 3 to 10")
     expect(button).to_have_attribute("aria-pressed", "true")
     expect(caution).to_be_hidden()
     page.get_by_text("The paper’s tests, pooled over the range").click()
@@ -159,8 +159,8 @@ def test_a_pair_that_shares_random_streams_is_marked_and_a_margin_is_judged(
 def test_a_comparison_begins_at_the_last_number_that_all_share(archive: Any, ids: Any, visit: Any) -> None:
     page = visit(address(archive, *ids))
 
-    expect(page.get_by_text("The row against the column")).to_contain_text("after 5 real-world evaluations")
-    expect(page.get_by_role("button", name="at 5", exact=True)).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_text("The row against the column")).to_contain_text("after 10 real-world evaluations")
+    expect(page.get_by_role("button", name="at 10", exact=True)).to_have_attribute("aria-pressed", "true")
     assert "from=" not in fragment(page)
 
 

@@ -156,7 +156,7 @@ def test_details_are_reached_by_keyboard_and_are_in_the_address(archive: Any, en
 
     page.get_by_role("tab", name="Real-world samples").press("ArrowRight")
     expect(page.get_by_role("tab", name="Misfit")).to_be_focused()
-    expect(panel.get_by_role("table", name="Misfit by iteration").get_by_role("row")).to_have_count(7)
+    expect(panel.get_by_role("table", name="Misfit by iteration").get_by_role("row")).to_have_count(12)
     expect(panel.get_by_role("table", name="Which tunables are identified").get_by_role("row")).to_have_count(4)
     assert page.evaluate("() => location.hash").endswith("?tab=misfit")
     page.get_by_role("tab", name="Misfit").press("End")
@@ -185,11 +185,11 @@ def test_it_is_accessible_and_fits_a_phone(archive: Any, ended: Any, visit: Any,
     shade = "dark" if dark else "light"
     for width in (1280, 375):
         page = visit(address(archive, ended["id"]), dark=dark, width=width)
-        expect(page.locator(".figure-curves .point")).to_have_count(6)
+        expect(page.locator(".figure-curves .point")).to_have_count(11)
         for figure in page.locator(".figures > section").all():
             figure.scroll_into_view_if_needed()
             expect(figure.locator(".plot .main-svg").first).to_be_visible()
-        expect(page.get_by_role("tabpanel").locator("tbody tr")).to_have_count(20)
+        expect(page.get_by_role("tabpanel").locator("tbody tr")).to_have_count(40)
         axe(page)
         fits(page)
         screenshot(page, f"experiment-{shade}-{width}")

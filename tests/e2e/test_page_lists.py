@@ -15,7 +15,7 @@ from tests.e2e.api_alone import Api
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import toy
 
-PUBLISHED = "MuJoCo in MuJoCo"
+PUBLISHED = "Fig. 4, lean: MuJoCo in MuJoCo"
 QUEUED = {"robot": "toy_function", "strategies": ["random", "direct"], "budget": "smoke"}
 REFUSED = ("422",)
 
@@ -89,7 +89,7 @@ def test_experiments_are_filtered_sorted_and_shown_page_by_page(visit: Any, arch
     page.locator("tr.experiment").nth(59).wait_for()
     page.get_by_label("State").select_option("CANCELLED")
     page.locator("tr.experiment", has_text="completed").first.wait_for(state="detached")
-    assert "Informative" in page.locator("tr.experiment").get_by_role("link").all_text_contents()
+    assert "given up" in page.locator("tr.experiment").get_by_role("link").all_text_contents()
     page.get_by_label("Strategy").select_option("known_fit")
     page.get_by_text("Nothing fits these filters").wait_for()
     page.get_by_role("link", name="Show everything").click()

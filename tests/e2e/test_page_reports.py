@@ -10,7 +10,7 @@ from tests.e2e.service import wait_until
 
 SLOW_MS = 120_000
 expect.set_options(timeout=SLOW_MS)
-STUDY = "MuJoCo in MuJoCo"
+STUDY = "Fig. 4, lean: MuJoCo in MuJoCo"
 
 
 @pytest.fixture

@@ -525,9 +525,9 @@ def test_a_control_of_no_study_is_refused(document: Document) -> None:
 
 
 def test_a_control_may_have_its_reality_in_another_engine() -> None:
-    text = reproduce(STORED / "mujoco-in-mujoco.zip", "--control", STORED / "mujoco-in-physx.zip")
+    text = reproduce(STORED / "figure-4-mujoco.zip", "--control", STORED / "figure-4-physx.zip")
 
-    assert "### mujoco-in-physx, beside mujoco-in-mujoco\n\nWhat differs: engine of reality: physx, not mujoco" in text
+    assert "### figure-4-physx, beside figure-4-mujoco\n\nWhat differs: engine of reality: physx, not mujoco" in text
 
 
 def test_a_control_of_another_reality_needs_its_own_direct(document: Document, tmp_path: Path) -> None:
