@@ -13,11 +13,14 @@ KNOWN_AFTER_S = 10.0
 """Shortest time of work over which a pace is measured."""
 
 KNOWN_FROM = 0.1
-"""Smallest share of the work over which a pace is measured."""
+"""Smallest share of the work over which a pace is measured, before `SETTLED_AFTER_S`."""
+
+SETTLED_AFTER_S = 120.0
+"""Time of work over which a pace is measured whatever its share: processes that start have no weight any more."""
 
 LEAST_SPREAD, MOST_SPREAD = 0.25, 2.0
-"""Relative half-width of the interval for much finished work, and at `KNOWN_FROM`: processes that start make the first
-steps slow."""
+"""Relative half-width of the interval for much finished work, and up to `KNOWN_FROM`: processes that start make the
+first steps slow, and iterations cost more than the first transfer."""
 
 Span = tuple[datetime, datetime]
 """Begin and end of the work of an attempt."""
@@ -41,7 +44,9 @@ def estimate_s(finished: int, left: int, busy: float) -> float | None:
         left: rollouts that remain.
         busy: seconds of work so far.
     """
-    if busy < KNOWN_AFTER_S or finished < KNOWN_FROM * (finished + left):
+    if busy < KNOWN_AFTER_S or not finished:
+        return None
+    if busy < SETTLED_AFTER_S and finished < KNOWN_FROM * (finished + left):
         return None
     return left * busy / finished
 
@@ -54,5 +59,6 @@ def interval(finished: int, left: int, busy: float) -> TimeLeft | None:
     seconds = estimate_s(finished, left, busy)
     if seconds is None or not left:
         return None
-    spread = 1 + LEAST_SPREAD + (MOST_SPREAD - LEAST_SPREAD) * KNOWN_FROM * (finished + left) / finished
+    little = min(1.0, KNOWN_FROM * (finished + left) / finished)
+    spread = 1 + LEAST_SPREAD + (MOST_SPREAD - LEAST_SPREAD) * little
     return TimeLeft(low_s=seconds / spread, high_s=seconds * spread)

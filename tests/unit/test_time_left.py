@@ -20,8 +20,18 @@ def test_the_time_left_is_not_known_before_a_pace_is_measured() -> None:
     assert interval(0, 1000, 100.0) is None
     assert interval(500, 500, 9.0) is None
     assert interval(99, 901, 100.0) is None
+    assert interval(0, 1000, 1000.0) is None
     assert interval(100, 900, 100.0) is not None
     assert interval(1000, 0, 100.0) is None
+
+
+def test_of_a_long_study_it_is_known_after_two_minutes_and_no_wider_than_at_a_tenth_of_the_work() -> None:
+    short, long = interval(100, 900, 100.0), interval(10, 9_990, 120.0)
+
+    assert short
+    assert long
+    assert long.low_s < 119_880 < long.high_s
+    assert long.high_s / long.low_s == pytest.approx(short.high_s / short.low_s)
 
 
 def test_pauses_do_not_count_as_slowness_and_attempts_at_once_count_once() -> None:
