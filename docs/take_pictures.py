@@ -69,7 +69,7 @@ VIEWS = (
     View("list", "", ".list tbody tr >> nth=3", 560),
     View("new", "new", ".panel .big", press="Quadruped, quickly"),
     View("study", "studies/{study}", ".plot .scatterlayer .point >> nth=0"),
-    View("experiment", "experiments/{experiment}", ".figure-predictions .scatterlayer .point >> nth=0", 1330),
+    View("experiment", "experiments/{experiment}", ".figure-predictions .scatterlayer .point >> nth=0", 1700),
     View("compare", "compare?experiments={all}", "table.matrix", 1130),
     View("replay", "replay?experiment={experiment}", ".gait .main-svg >> nth=0", fields=(("Time", "2"),)),
     View("bench", "bench?bench=table", ".gait, .motion, h2 >> nth=0", 844, width=390),
@@ -129,6 +129,7 @@ def take(page: Page, view: View, path: Path) -> None:
     if view.press:
         page.get_by_role("button", name=view.press).click()
     page.locator(view.ready).wait_for(timeout=LONGEST_S * 1000)
+    page.get_by_text("still being computed").wait_for(state="detached", timeout=LONGEST_S * 1000)
     for label, value in view.fields:
         page.get_by_label(label, exact=True).fill(value)
     page.wait_for_timeout(1000)  # figures are painted after they are loaded

@@ -140,6 +140,19 @@ def test_there_is_nothing_yet_or_no_such_experiment(api: Any, written: Store, vi
     expect(page.get_by_role("alert")).to_contain_text("nowhere")
 
 
+def test_predictions_are_drawn_once_all_are_computed(archive: Any, ended: Any, visit: Any) -> None:
+    page = visit(address(archive, ended["id"]))
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url) if "/predictions" in request.url else None)
+    page.reload()
+    figure = page.locator(".figure-predictions")
+    figure.scroll_into_view_if_needed()
+
+    expect(figure).to_contain_text("400 samples of 40 repetitions")
+    expect(figure).not_to_contain_text("still being computed")
+    assert [url.split("?")[0].endswith("/figures/predictions") for url in asked][:2] == [False, True]
+
+
 def test_details_are_reached_by_keyboard_and_are_in_the_address(archive: Any, ended: Any, visit: Any) -> None:
     page = visit(address(archive, ended["id"], tab="samples"))
     panel = page.get_by_role("tabpanel")

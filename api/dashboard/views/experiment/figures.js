@@ -59,8 +59,9 @@ function card(page, { kind, title, events, isPending }, options = null, ...files
   const draw = async () => {
     const query = { experiment: page.id, ...options?.query() };
     downloads.replaceChildren(figureDownloads(kind, query, `gaplab-${page.id}-${kind}`, ...files));
+    const wasPending = await isPending?.(page); // asked first: the answer continues the computation, so the figure has all that it counts
     const isCurrent = await drawPlot(query);
-    return !isCurrent || (await isPending?.(page)) === true;
+    return !isCurrent || wasPending === true;
   };
   options?.element.addEventListener("change", draw);
   page.sections.add(place, events, draw);
