@@ -1,4 +1,4 @@
-"""What stored studies found: distances from the truth, coverage of intervals, fitness, and paired differences.
+"""What stored studies found: tunables, distances from the truth, coverage of intervals, fitness, paired differences.
 
 `python -m benchmarks.findings ARCHIVE.zip …` computes them from archives; experiments of all archives are compared.
 """
@@ -22,6 +22,7 @@ from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.results.comparisons import compare
 from gaplab.services.results.curves import curves
+from gaplab.services.results.tuned_simulators import TunedSimulators, tuned_simulators
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator
 from gaplab.services.store.session import Store
@@ -104,6 +105,30 @@ def _found(best: Sequence[BestSimulator], truth: FloatArray, extent: FloatArray)
     return Found(away, (upper - lower) / extent, ((lower <= truth) & (truth <= upper)).astype(float))
 
 
+def tuned_table(store: Store, labels: Imported) -> Table:
+    """Return the tunables of the best simulators, and their error per sample: mean and SD over repetitions.
+
+    Here reality may have other coefficients than the simulators, or none.
+    """
+    columns = "study", "after", "n", "each tunable", "error per sample"
+    table = table_of("Tunables of the best simulators, in the order of the spec", columns)
+    for id_, label in labels.items():
+        tuned = tuned_simulators(store, id_)
+        for samples in tuned.errors:
+            best = [each for each in tuned.simulators if each.iteration == samples]
+            values = np.array([each.parameters for each in best])
+            each = "  ".join(map(_spread, values.T))
+            table.add_row(label, str(samples), str(len(best)), each, _spread(_errors(tuned, samples)))
+    return table
+
+
+def _errors(tuned: TunedSimulators, iteration: int) -> FloatArray:
+    """Return the errors per sample of an iteration, without those of failed physics."""
+    counts = tuned.samples[iteration]
+    errors = tuned.errors[iteration].items()
+    return np.array([tuned.error.per_sample(sum_ / counts[number]) for number, sum_ in errors if sum_ is not None])
+
+
 def distance_table(store: Store, labels: Imported) -> Table:
     """Return medians over repetitions of the distances, and the coverage of intervals."""
     columns = "study", "after", "n", "together", "each tunable", "truth in interval", "each", "median width"
@@ -159,6 +184,12 @@ def _each(values: FloatArray) -> str:
     return " ".join(f"{value:.3f}" for value in values)
 
 
+def _spread(values: FloatArray) -> str:
+    """Return mean and standard deviation, as far as there are enough values."""
+    mean = f"{values.mean():.4f}" if len(values) else "-"
+    return f"{mean} ± {values.std(ddof=1):.4f}" if len(values) > 1 else mean
+
+
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
@@ -172,6 +203,7 @@ def main() -> None:
     arguments = parser.parse_args()
     with opened(arguments.archives) as (store, labels):
         console = Console(width=150)
+        console.print(tuned_table(store, labels))
         console.print(distance_table(store, labels))
         console.print(fitness_table(store, labels))
         if len(labels) > 1:
