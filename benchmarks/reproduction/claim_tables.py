@@ -36,14 +36,19 @@ def in_short(study: Study) -> str:
     """Return the claims of each verdict in a study, as a list in Markdown; undecided ones are keys alone."""
     found = {verdict: [claim for claim in CLAIMS if judged(claim, study)[1].verdict is verdict] for verdict in Verdict}
     return "\n".join(
-        f"- {WORDS[verdict]}: {'; '.join(_named(claim, verdict) for claim in claims)}."
+        f"- {WORDS[verdict]}: {'; '.join(_named(claim, study) for claim in claims)}."
         for verdict, claims in found.items()
         if claims
     )
 
 
-def _named(claim: Claim, verdict: Verdict) -> str:
-    return claim.key if verdict in UNDECIDED else f"{claim.title} ({claim.key})"
+def _named(claim: Claim, study: Study) -> str:
+    """Return a claim in a few words, with the statements that refute it; the key alone of an undecided one."""
+    found = judged(claim, study)[1]
+    if found.verdict in UNDECIDED:
+        return claim.key
+    refuted = f"; refuted: {', '.join(each.lower() for each in found.refuted)}" if len(found.refuted) else ""
+    return f"{claim.title} ({claim.key}{refuted})"
 
 
 def verdicts(studies: Mapping[str, Study]) -> str:

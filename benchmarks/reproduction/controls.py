@@ -22,6 +22,8 @@ COUNTS = (0, 1, 2, 3, 5, 10)
 SIZES = {"/iterations", "/repetitions"}
 """Settings that say how much of a study is there."""
 
+DIRECT = spoken("direct")
+
 HEAD = ("strategy", "samples", "study", "control", "repetitions", "difference", "p")
 
 
@@ -107,7 +109,7 @@ def shown(found: Sequence[Row]) -> str:
     """Return which differences of a table are shown after Holm's correction over its rows; empty if none is."""
     corrected = holm([row.difference.p for row in found])
     return ", ".join(
-        f"{row.strategy.lower()} at {row.samples}"
+        f"{row.strategy.lower()} at {row.samples}" if row.strategy != DIRECT else row.strategy.lower()
         for row, p in zip(found, corrected, strict=True)
         if p is not None and p < SIGNIFICANT
     )

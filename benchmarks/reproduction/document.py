@@ -17,6 +17,7 @@ from benchmarks.reproduction.studies import Study
 from gaplab.services.store.session import Store
 
 ROOT = Path(__file__).parents[2]
+OTHER_WAY = f"*{evidence.OTHER_WAY.capitalize()}*: the estimate points away from what the p would show."
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +79,10 @@ class Document:
                 if beside == label and (shown := controls.shown(rows))
             ]
             if changed:
-                yield f"Controls that change it, with the strategies and numbers of samples: {', '.join(changed)}."
+                yield (
+                    "Controls that differ from it, after Holm's correction, with the strategies and their numbers of "
+                    f"samples: {', '.join(changed)}."
+                )
 
     @cached_property
     def _beside(self) -> dict[str, tuple[str, list[Row]]]:
@@ -116,7 +120,8 @@ class Document:
         yield (
             "## Which strategies differ\n\nMean recorded fitness over direct. Strategies with a letter in common are "
             "not told apart by Welch's t after Holm's correction over the pairs of a column. Each repetition is one "
-            "value. Before any sample all strategies do the same, so differences there are chance."
+            "value. Before any sample all strategies do the same, so differences there are chance. The p of a claim "
+            "are [not corrected](#how-a-verdict-is-reached), so it may tell strategies with a common letter apart."
         )
         for label, study in self._of_robots():
             if len(study.present) > 1 and len(study.direct):
@@ -188,7 +193,8 @@ class Document:
             "of repetitions whose recorded fitness is a sample's; and the median distance of the best simulators from "
             "the truth: Euclidean, with the bounds of each tunable scaled to 1. The paper says of itself that beyond "
             'three or four samples "the algorithm is hardly tuning the simulator anymore, instead just searching for '
-            'fitter samples", because its simulators are nearly perfect by then. Here, distances tell whether they are.'
+            'fitter samples", because its simulators are nearly perfect by then. Distances tell how far coefficients '
+            "are from the truth: one that matters little to fitness makes them large, though its simulator may do well."
         )
         for label, study in self._of_robots():
             if len(study.direct) and study.present:
@@ -196,7 +202,7 @@ class Document:
                 yield "\n\n".join(filter(None, (f"### Origins: {label}", origins.lead(self.store, study), told)))
 
     def _claims(self) -> Iterator[str]:
-        yield "## The claims"
+        yield f"## The claims\n\n{OTHER_WAY}"
         for claim in CLAIMS:
             told = claim_tables.reasons(claim, self.studies)
             yield f"### {claim.key}\n\n{claim.says}\n\nThe rule: {claim.rule}\n\n{told}"
@@ -205,8 +211,7 @@ class Document:
         yield (
             "## The statements\n\nDifferences and gains are divided by the mean of direct, which is taken as exact. "
             "Ratios to direct have its error too. Brackets have 95 % "
-            f"intervals. Each p is as it is before any correction. *{evidence.OTHER_WAY.capitalize()}*: the estimate "
-            "points away from what the p would show."
+            f"intervals. Each p is as it is before any correction. {OTHER_WAY}"
         )
         for claim in CLAIMS:
             yield f"### {claim.key}, by statement\n\n{claim_tables.statements(claim, self.studies)}"

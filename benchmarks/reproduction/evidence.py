@@ -46,7 +46,7 @@ RULES = (
     "refuted statement refutes the claim, so the p that refute are corrected by Holm's method over its statements; the "
     "tables have each p as it is before. Nothing is corrected over the claims, nor over the studies: of many true "
     "claims that are judged, up to one in forty is *not* by chance, and of many false claims of one statement, as many "
-    "are *reproduced*.",
+    "are *reproduced*. The rates are higher where results were read while a study grew.",
     "The least size of a difference is the one that the paper's design would have found with a power of "
     f"{PAPER_POWER:.0%} (Simonsohn 2015), in the paper's own standard deviations: {deviation(SIMULATED_FIT[0]):.2f} of "
     f"direct for the strategies with simulated fit, and {deviation(WEAK[0]):.2f} for the others. A smaller one could "
@@ -55,7 +55,7 @@ RULES = (
     "about as ours do. If they correlated more, the sizes would be smaller, and refuting harder. Sizes are compared as "
     "shares of direct. Here the strategies vary less than in the paper; in standard deviations, each size would be "
     "smaller too.",
-    "Margins of ours are a factor in C3, half of the paper's rise in C8, and that the first half gains more in C8.",
+    "Margins of ours are the factors in C3, half of the paper's rise in C8, and that the first half gains more in C8.",
     "Sample size: each repetition is one value, its mean over the numbers of samples that the claim names. A group "
     f"of fewer than {FEWEST_REPETITIONS} repetitions says nothing, so its statement is open. A p above {SIGNIFICANT} "
     "refutes nothing: too few repetitions leave a claim open. The reason then says which difference such a study finds "
@@ -71,7 +71,8 @@ RULES = (
     "Computing time decided how many repetitions a study has. The results were read each time before more repetitions "
     "were added, and no p is corrected for this. The plan is the paper's number. The supposed correlations, and the "
     "direction of C5b and C6, were chosen after results were read; before, both were *open* where they are *not* in "
-    "MuJoCo. Controls were chosen to explain results.",
+    "MuJoCo. So was the second factor of C3: without it, C3 is *reproduced* where it is *reproduced, smaller*. "
+    "Controls were chosen to explain results.",
 )
 """The rules of a verdict, in sentences."""
 
@@ -93,7 +94,12 @@ class Evidence:
     @property
     def shown(self) -> bool:
         """Return whether it is shown."""
-        return self.tested.shows is not None and self.tested.shows < SIGNIFICANT
+        return _significant(self.tested.shows)
+
+    @property
+    def smaller(self) -> bool:
+        """Return whether it is shown to be smaller than in the paper by a test of its own."""
+        return _significant(self.tested.smaller)
 
 
 @dataclass(frozen=True)
@@ -119,11 +125,19 @@ class Examined:
 
 @dataclass(frozen=True)
 class Judged:
-    """A verdict, with the test that it rests on, and the reason."""
+    """A verdict.
+
+    Attributes:
+        verdict: the verdict.
+        careful: the test that it rests on.
+        why: the reason.
+        refuted: the statements that refute the claim; empty unless it is `NOT`.
+    """
 
     verdict: Verdict
     careful: str
     why: str
+    refuted: tuple[str, ...] = ()
 
 
 def judge(examined: Examined) -> Judged:
@@ -132,17 +146,18 @@ def judge(examined: Examined) -> Judged:
     if not examined.evidence:
         return Judged(Verdict.ABSENT, "", lacking)
     shown = [each for each in examined.evidence if each.shown]
-    smaller = _refuted(examined.evidence)
-    refuted = [each for each in smaller if not each.shown]
+    too_small = _refuted(examined.evidence)
+    refuted = [each for each in too_small if not each.shown]
     careful = _careful(examined.evidence, shown, refuted)
     if examined.unequal:
         return Judged(Verdict.OPEN, careful, f"Not a fair comparison: {examined.unequal}. {lacking}".strip())
     if refuted:
-        return Judged(Verdict.NOT, careful, f"Refuted: {'; '.join(map(_refutation, refuted))}.")
+        told = f"Refuted: {'; '.join(map(_refutation, refuted))}."
+        return Judged(Verdict.NOT, careful, told, tuple(each.statement for each in refuted))
     if len(shown) == len(examined.evidence):
         if lacking:
             return Judged(Verdict.OPEN, careful, f"Shown for what the study has. {lacking}")
-        return _all_shown(careful, smaller)
+        return _all_shown(careful, [each for each in examined.evidence if each.smaller or each in too_small])
     told = _undecided([each for each in examined.evidence if not each.shown])
     return Judged(Verdict.OPEN, careful, " ".join(filter(None, (told, examined.findable, lacking))))
 
@@ -157,12 +172,16 @@ def _all_shown(careful: str, smaller: Sequence[Evidence]) -> Judged:
 def _refuted(evidence: Sequence[Evidence]) -> list[Evidence]:
     """Return the evidence that is refuted, by corrected p."""
     corrected = holm([each.tested.refutes for each in evidence])
-    return [each for each, p in zip(evidence, corrected, strict=True) if p is not None and p < SIGNIFICANT]
+    return [each for each, p in zip(evidence, corrected, strict=True) if _significant(p)]
+
+
+def _significant(p: float | None) -> bool:
+    return p is not None and p < SIGNIFICANT
 
 
 def _refutation(one: Evidence) -> str:
     told = f"p {probability(one.tested.refutes)}"
-    if one.opposed is not None and one.opposed < SIGNIFICANT:
+    if one.opposed is not None and _significant(one.opposed):
         told += f"; the opposite is shown, p {probability(one.opposed)}"
     return f"{one.statement} ({told})"
 
@@ -180,7 +199,12 @@ def _careful(evidence: Sequence[Evidence], shown: Sequence[Evidence], refuted: S
 
 
 def worded(p: float | None) -> str:
-    """Return a p in words: without a number if the estimate points away from what the p would show."""
+    """Return a p in words: without a number if the estimate points away from what the p would show.
+
+    A p that three decimals do not tell from the limit has four.
+    """
+    if p is not None and f"{p:.3f}" == f"{SIGNIFICANT:.3f}":
+        return f"{p:.4f}"
     return OTHER_WAY if p == 1.0 else probability(p)
 
 

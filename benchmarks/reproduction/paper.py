@@ -34,6 +34,9 @@ LEARNED_SD = (0.10 / DIRECT, 0.15 / DIRECT)
 TIMES = 3.0
 """How many times smaller these are than those of the others: "about three times"."""
 
+LEAST_TIMES = 2.5
+"""The least that a factor printed as three may have been."""
+
 LEAST_RISE = (1.3 / DIRECT - START) / 2
 """Half of the rise of all curves, from about 0.9 "to more or less 1.3"."""
 

@@ -31,13 +31,15 @@ class Tested(NamedTuple):
 
     Attributes:
         shows: p of the hypothesis that it does not hold; None if undefined.
-        refutes: p of the hypothesis that it holds in the paper's size; None if undefined.
+        refutes: p of the hypothesis that it holds in the size that refutes the claim; None if undefined.
         estimate: the estimate with its 95 % interval, in words.
+        smaller: p of the hypothesis that it holds in the paper's size; None if `refutes` is that, or undefined.
     """
 
     shows: float | None
     refutes: float | None
     estimate: str
+    smaller: float | None = None
 
 
 def above(first: FloatArray, second: FloatArray, least: float, unit: float) -> Tested:
@@ -82,7 +84,7 @@ def near(values: FloatArray, direct: FloatArray, share: float, margin: float) ->
     return _tested(found, (values, direct), both, ".2f")
 
 
-def narrower(narrow: Sequence[FloatArray], wide: Sequence[FloatArray], threshold: float) -> Tested:
+def narrower(narrow: Sequence[FloatArray], wide: Sequence[FloatArray], threshold: float, size: float) -> Tested:
     """Test the ratio of two standard deviations below a threshold, by resamples of whole repetitions.
 
     A standard deviation is the root of the mean variance over groups and numbers of evaluations.
@@ -91,6 +93,7 @@ def narrower(narrow: Sequence[FloatArray], wide: Sequence[FloatArray], threshold
         narrow: groups `(r, k)` by repetition and number of evaluations, each with two repetitions or more.
         wide: the same, of the denominator.
         threshold: of the ratio.
+        size: the greatest ratio that agrees with the paper's.
     """
     rng = stream(0, "standard deviations")
     with np.errstate(all="ignore"):
@@ -100,7 +103,7 @@ def narrower(narrow: Sequence[FloatArray], wide: Sequence[FloatArray], threshold
         return Tested(None, None, f"{ratio:.2f}")
     low, high = np.quantile(ratios, [SIGNIFICANT / 2, 1 - SIGNIFICANT / 2])
     told = f"{ratio:.2f} ({low:.2f} to {high:.2f})"
-    return Tested(_share(ratios >= threshold), _share(ratios <= threshold), told)
+    return Tested(_share(ratios >= threshold), _share(ratios <= threshold), told, _share(ratios <= size))
 
 
 def contrast(firsts: Sequence[FloatArray], seconds: Sequence[FloatArray], unit: float) -> str:

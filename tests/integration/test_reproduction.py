@@ -66,6 +66,10 @@ LUCKY = {name: Made([0.4, 0.646 if name == "simulated_fit_and_informative" else 
 """One strategy leads each other one by a p of 0.03."""
 
 
+HALVED = {name: Made([1.0] * 4, 0.048 if name.startswith("simulated") else 0.1, 0.0) for name in AGREES} | DIRECT
+"""Strategies with simulated fit vary half as much as the others."""
+
+
 def only(curves: Mapping[str, Made], *names: str) -> dict[str, Made]:
     return {name: curves[name] for name in names}
 
@@ -81,6 +85,7 @@ STUDIES = {
     "reversed": Study(only(CONTRADICTS, "simulated_fit", "random")),
     "equal": Study(DIRECT | {"random": Made([0.5] * 7, 0.1), "known_fit": Made([0.5] * 7, 0.1)}, 160, 6),
     "small": Study(DIRECT | {"random": Made([0.50] * 7, 0.01), "known_fit": Made([0.52] * 7, 0.01)}, 40, 6),
+    "halved": Study(HALVED, 80, 3),
     "even": Study(EVEN, 20, 4),
     "steps": Study(DIRECT | {name: Made(means, 0.05, 0.0) for name, means in STEPS.items()}, 20, 1),
     "lucky": Study(LUCKY, 6, 1),
@@ -191,6 +196,8 @@ def test_a_refutation_says_if_the_opposite_is_shown(document: Document) -> None:
 def test_a_difference_that_is_shown_to_be_smaller_than_the_papers_is_told(document: Document) -> None:
     assert document.verdict("C5c", "small") == "reproduced**, smaller"
     assert document.row("C5c", "small")["why"].endswith("smaller than in the paper: Known fit above random.")
+    assert document.verdict("C3", "halved") == "reproduced**, smaller"
+    assert document.row("C3", "halved")["why"].endswith("in the paper: ratio of the deviations below 0.58.")
 
 
 @pytest.mark.parametrize("claim", CLAIMS)
@@ -252,6 +259,7 @@ def test_a_study_that_ends_early_says_which_samples_it_lacks(document: Document)
     assert document.row("C2", "short")["why"].endswith(
         "Missing: value after 10\N{NO-BREAK SPACE}samples: it ends after 3."
     )
+    assert document.row("C3", "lucky")["why"] == "Missing: value after 3 samples: it ends after 1."
     assert document.verdict("C6", "short") == "not in this study"
     assert document.verdict("C8", "short") == "not in this study"
     assert document.verdict("C4a", "short") == "reproduced"
@@ -295,6 +303,13 @@ def test_the_verdicts_at_the_top_are_those_of_the_claims(document: Document) -> 
         assert {study: top[study].strip("*") for study in STUDIES} == {
             study: document.verdict(claim, study) for study in STUDIES
         }
+
+
+def test_the_summary_names_what_refutes_a_claim(document: Document) -> None:
+    short = document.text.partition("**In short**, contradicts ")[2].partition("\n\n**In short**")[0]
+
+    assert "(C7; refuted: simulated fit and unique above simulated fit)" in short
+    assert "; refuted: " not in document.text.partition("**In short**, agrees ")[2].partition("\n\n**In short**")[0]
 
 
 def test_fitness_is_a_ratio_to_direct_beside_the_papers(document: Document) -> None:
@@ -482,7 +497,7 @@ def test_a_control_tells_what_its_change_does_to_fitness_over_its_own_direct(doc
     assert first["p"] == "< 0.001"
     assert first["difference"].startswith("\N{MINUS SIGN}0.100 (\N{MINUS SIGN}0.1")
     assert (direct["study"], direct["control"]) == ("1.00", "2.00")
-    assert "Shown after Holm's correction over the table: direct at 0, simulated fit at 0, " in document.text
+    assert "Shown after Holm's correction over the table: direct, simulated fit at 0, " in document.text
 
 
 def test_a_control_without_direct_is_judged_by_that_of_its_study_as_far_as_it_goes(document: Document) -> None:
