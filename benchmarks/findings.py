@@ -116,17 +116,15 @@ def tuned_table(store: Store, labels: Imported) -> Table:
         tuned = tuned_simulators(store, id_)
         for samples in tuned.errors:
             best = [each for each in tuned.simulators if each.iteration == samples]
-            values = np.array([each.parameters for each in best])
-            each = "  ".join(map(_spread, values.T))
-            table.add_row(label, str(samples), str(len(best)), each, _spread(_errors(tuned, samples)))
+            tunables = "  ".join(map(_spread, np.array([each.parameters for each in best]).T))
+            table.add_row(label, str(samples), str(len(best)), tunables, _spread(_errors(tuned, samples)))
     return table
 
 
 def _errors(tuned: TunedSimulators, iteration: int) -> FloatArray:
-    """Return the errors per sample of an iteration, without those of failed physics."""
-    counts = tuned.samples[iteration]
-    errors = tuned.errors[iteration].items()
-    return np.array([tuned.error.per_sample(sum_ / counts[number]) for number, sum_ in errors if sum_ is not None])
+    """Return the errors per sample of an iteration, of repetitions with samples and without failed physics."""
+    pairs = [(total, tuned.samples[iteration][number]) for number, total in tuned.errors[iteration].items()]
+    return np.array([tuned.error.per_sample(total / count) for total, count in pairs if total is not None and count])
 
 
 def distance_table(store: Store, labels: Imported) -> Table:
@@ -185,7 +183,7 @@ def _each(values: FloatArray) -> str:
 
 
 def _spread(values: FloatArray) -> str:
-    """Return mean and standard deviation, as far as there are enough values."""
+    """Return mean and standard deviation in words, the latter of two values or more."""
     mean = f"{values.mean():.4f}" if len(values) else "-"
     return f"{mean} ± {values.std(ddof=1):.4f}" if len(values) > 1 else mean
 

@@ -47,7 +47,7 @@ def _named(claim: Claim, study: Study) -> str:
     found = judged(claim, study)[1]
     if found.verdict in UNDECIDED:
         return claim.key
-    refuted = f"; refuted: {', '.join(each.lower() for each in found.refuted)}" if len(found.refuted) else ""
+    refuted = f"; refuted: {', '.join(each.lower() for each in found.refuted)}" if found.refuted else ""
     return f"{claim.title} ({claim.key}{refuted})"
 
 

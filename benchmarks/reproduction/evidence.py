@@ -180,9 +180,9 @@ def _significant(p: float | None) -> bool:
 
 
 def _refutation(one: Evidence) -> str:
-    told = f"p {probability(one.tested.refutes)}"
-    if one.opposed is not None and _significant(one.opposed):
-        told += f"; the opposite is shown, p {probability(one.opposed)}"
+    told = f"p {worded(one.tested.refutes)}"
+    if _significant(one.opposed):
+        told += f"; the opposite is shown, p {worded(one.opposed)}"
     return f"{one.statement} ({told})"
 
 

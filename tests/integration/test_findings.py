@@ -3,7 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Iterator
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from shutil import copyfileobj
 
@@ -22,22 +22,22 @@ WORSE = Simulator(frozen([1.9, 1.9]), 9.0)
 BEST = Simulator(frozen([0.2, 0.6]), 0.02), Simulator(frozen([0.4, 1.0]), 0.18)
 
 
-def log(best: Simulator) -> Iterator[Step]:
-    """Two samples, and this best simulator after each."""
+def log(best: Simulator, first: float = 0.1) -> Iterator[Step]:
+    """Two samples, the first with this fitness, and this best simulator after each."""
     for iteration in range(3):
         if iteration:
             yield Selected(iteration, GENOME, Cost(30))
-            yield Measured(iteration, Sample(GENOME, 0.1))
+            yield Measured(iteration, Sample(GENOME, first if iteration == 1 else 0.1))
         yield Tuned(iteration, (best, WORSE), Cost(60) if iteration else Cost())
         yield Transferred(iteration, GENOME, 0.5, Cost(60))
         yield Probed(iteration, 0.5, 0.5)
 
 
-def archive(store: Store, spec: ExperimentSpec, best: tuple[Simulator, ...], folder: Path) -> Path:
+def archive(store: Store, spec: ExperimentSpec, best: tuple[Simulator, ...], folder: Path, first: float = 0.1) -> Path:
     """An experiment whose repetitions have these best simulators, as `made.zip`."""
     made = submission.submit_experiment(store, spec.model_copy(update={"repetitions": len(best)})).id
     for claim in execution.claim(store, "test", limit=len(best)):
-        run(store, claim, log(best[claim.number]))
+        run(store, claim, log(best[claim.number], first))
     path = folder / "made.zip"
     with export_experiment(store, made).file as source, path.open("wb") as target:
         copyfileobj(source, target)
@@ -87,3 +87,9 @@ def test_a_simulator_whose_physics_failed_has_no_error(sqlite_store: Store, tmp_
     found = tables(archive(sqlite_store, toy(), failed, tmp_path))
 
     assert found["Tunables of"][-1][2:] == ["2", "0.3000 ± 0.1414  0.8000 ± 0.2828", "0.1000"]
+
+
+def test_a_repetition_without_a_sample_has_no_error_yet(sqlite_store: Store, tmp_path: Path) -> None:
+    found = tables(archive(sqlite_store, toy(), BEST, tmp_path, first=nan))
+
+    assert [row[-1] for row in found["Tunables of"]] == ["-", "0.2828 ± 0.2000"]
