@@ -11,7 +11,7 @@ const RETRY_MS = 1000;
  * @typedef {object} Section
  * @property {HTMLElement} element
  * @property {Set<string>} kinds of events that change it
- * @property {() => Promise<unknown>} load
+ * @property {() => Promise<Page.Loaded>} load
  * @property {boolean} isStale
  * @property {boolean} isInSight
  * @property {boolean} isBusy
@@ -23,7 +23,8 @@ const RETRY_MS = 1000;
  *
  * `add(element, kinds, load)` has `load()` fill the element. `reload(events)` loads the sections that these kinds of events change, or
  * all if there are no events; sections out of sight wait until they come into sight. No section is loaded twice at a time, and each
- * rests four times as long as its loading took. A section is loaded again if `load()` returns true, or failed after an earlier success.
+ * rests four times as long as its loading took. A section is loaded again if `load()` failed after an earlier success, and after a
+ * second if the service still computes what it shows.
  *
  * @param {AbortSignal} signal
  * @returns {Page.Sections}
@@ -45,14 +46,18 @@ export function sections(signal) {
     if (!section.isStale || !section.isInSight || section.isBusy || signal.aborted) return;
     Object.assign(section, { isBusy: true, isStale: false });
     const start = performance.now();
+    let isPending = false;
     try {
-      section.isStale ||= Boolean(await section.load());
+      const loaded = await section.load();
+      isPending = loaded === "pending";
+      section.isStale ||= isPending || loaded === "failed";
       section.isFilled = true;
     } catch (error) {
       section.isStale ||= section.isFilled;
       if (!signal.aborted && !section.isFilled) section.element.replaceChildren(failed(error, () => reload(section), "h3"));
     }
-    if (section.isFilled) await rest(Math.max(REST_FACTOR * (performance.now() - start), section.isStale ? RETRY_MS : 0), signal);
+    const restMs = isPending ? 0 : REST_FACTOR * (performance.now() - start);  // the service limits the time that a pending answer takes
+    if (section.isFilled) await rest(Math.max(restMs, section.isStale ? RETRY_MS : 0), signal);
     section.isBusy = false;
     load(section);
   }

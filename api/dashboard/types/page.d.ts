@@ -37,8 +37,11 @@ declare namespace Page {
   /** A name as the API takes it: a plug-in without options is its bare name. */
   type PluginName = string | { name: string; options?: Record<string, any> };
 
+  /** Whether an earlier answer stands because loading failed, or the service still computes; else whatever `load()` returns. */
+  type Loaded = "failed" | "pending" | void;
+
   interface Sections {
-    add(element: HTMLElement, kinds: string[], load: () => Promise<unknown>): void;
+    add(element: HTMLElement, kinds: string[], load: () => Promise<Loaded>): void;
     reload(events: ServerEvent[]): void;
   }
 

@@ -61,7 +61,8 @@ function card(page, { kind, title, events, isPending }, options = null, ...files
     downloads.replaceChildren(figureDownloads(kind, query, `gaplab-${page.id}-${kind}`, ...files));
     const wasPending = await isPending?.(page); // asked first: the answer continues the computation, so the figure has all that it counts
     const isCurrent = await drawPlot(query);
-    return !isCurrent || wasPending === true;
+    if (!isCurrent) return "failed";
+    return wasPending ? "pending" : undefined;
   };
   options?.element.addEventListener("change", draw);
   page.sections.add(place, events, draw);
