@@ -44,6 +44,7 @@ clean:  ## remove the environment and caches; results stay
 	$(PYTHON) -m venv .venv
 
 .venv/installed: pyproject.toml constraints.txt | .venv/bin/pip
+	@echo "Installing gaplab and its libraries in .venv; this takes one to five minutes."
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
 	touch $@
 
