@@ -239,7 +239,8 @@ class Document:
         return (
             "## What it took\n\nStored steps have the time of their computation. Attempts also have work that was "
             "lost, and waiting for a core; early archives lack them. A core-hour is an hour of one thread of the "
-            f"engine, on the machines of the archives' provenance, some of which had other work at the time.\n\n{costs(self.studies | self.controls)}"
+            "engine, on the machines of the archives' provenance, some of which had other work at the time.\n\n"
+            f"{costs(self.studies | self.controls)}"
         )
 
 
