@@ -37,7 +37,7 @@ declare namespace Page {
   /** A name as the API takes it: a plug-in without options is its bare name. */
   type PluginName = string | { name: string; options?: Record<string, any> };
 
-  /** Whether an earlier answer stands because loading failed, or the service still computes; else whatever `load()` returns. */
+  /** How loading ended: it failed and an earlier answer stands, the service still computes, or neither. */
   type Loaded = "failed" | "pending" | void;
 
   interface Sections {
