@@ -78,10 +78,10 @@ def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
 def rows(control: Study, study: Study) -> Iterator[Row]:
     """Yield the difference of a control from a study, for each strategy of both and each number of samples.
 
-    Fitness is over the direct baseline of its own study. If the control has none, it is over that of the study, whose
-    reality is the same; that of direct itself is not divided. Repetitions of one number share their random numbers, so
-    they are paired. Where there are two baselines, the difference has the errors of both. Where the change makes no
-    difference in any repetition, there is no row.
+    Fitness is divided by the direct baseline of its own study. That of a control without a baseline is divided by the
+    baseline of the study, whose reality is the same. Direct's own fitness is not divided. Repetitions with the same
+    number share their random numbers, so they are paired. Where there are two baselines, the difference has the errors
+    of both. Where the change makes no difference in any repetition, there is no row.
 
     Args:
         control: has strategies of the study with other settings.
