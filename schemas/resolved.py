@@ -12,6 +12,9 @@ from gaplab.schemas.base import Count, Label, Real, Seed
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.spec import BudgetName, BudgetSpec, ExperimentSpec, Probes, RealitySpec
 
+SPEC_VERSION = 1
+"""Version of newly stored specs."""
+
 
 class ResolvedTunable(TunableRef):
     """A simulator parameter to tune, with its bounds."""

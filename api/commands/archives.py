@@ -8,10 +8,7 @@ import typer
 from gaplab.api.commands.app import KEEPING, AsJson, Id, Url, app, connect
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.services.settings import Settings
-from gaplab.services.store.atomic_files import appearing
-from gaplab.services.store.backup import backup as copy
-from gaplab.services.store.restore import restore as put_back
-from gaplab.services.store.sqlite_file import PRIVATE
+from gaplab.services.store.atomic_files import PRIVATE, appearing
 
 
 @app.command(rich_help_panel=KEEPING)
@@ -47,6 +44,8 @@ def import_(file: Annotated[Path, typer.Argument(help="an archive")], as_json: A
 @app.command(rich_help_panel=KEEPING)
 def backup(file: Annotated[Path, typer.Argument(help="new file for the copy")], as_json: AsJson = False) -> None:
     """Copy the SQLite database of GAPLAB_DATABASE_URL into a file, even while the service writes to it."""
+    from gaplab.services.store.backup import backup as copy
+
     size = copy(Settings.from_environment().database_url, file)
     print_result({"file": str(file), "bytes": size}, f"Wrote {file}: {size:,} bytes, checked.", as_json=as_json)
 
@@ -56,6 +55,8 @@ def restore(
     file: Annotated[Path, typer.Argument(help="a backup, which stays as it is")], as_json: AsJson = False
 ) -> None:
     """Put a backup in the place of the SQLite database of GAPLAB_DATABASE_URL, which is kept under another name."""
+    from gaplab.services.store.restore import restore as put_back
+
     done = put_back(Settings.from_environment().database_url, file)
     kept = f" The former database is now {done.kept}." if done.kept else ""
     found = {"file": str(done.file), "kept": str(done.kept) if done.kept else None, "revision": done.revision}

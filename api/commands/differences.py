@@ -1,7 +1,7 @@
 """The command that compares settings."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -12,9 +12,10 @@ from gaplab.api.clients.records import experiments_of
 from gaplab.api.commands import completion, tables
 from gaplab.api.commands.app import RESULTS, AsJson, Url, app, connect
 from gaplab.api.commands.json_output import print_json
-from gaplab.api.commands.spec_columns import column_of
 from gaplab.schemas.differences import SpecDiff, Values
-from gaplab.services.specs.differences import SpecColumn, differences
+
+if TYPE_CHECKING:
+    from gaplab.services.specs.differences import SpecColumn
 
 FILES = {".zip", ".json"}
 
@@ -47,6 +48,9 @@ def diff(of: Compared, as_json: AsJson = False, url: Url = None) -> None:
 
 def _with_files(names: list[str], url: str | None) -> SpecDiff:
     """Compare what files and the service have; without ids, no service is needed."""
+    from gaplab.api.commands.spec_columns import column_of
+    from gaplab.services.specs.differences import SpecColumn, differences
+
     files = {name: column_of(Path(name)) for name in names if Path(name).suffix in FILES}
     if len(files) == len(names):
         columns = [files[name] for name in names]
@@ -58,7 +62,9 @@ def _with_files(names: list[str], url: str | None) -> SpecDiff:
     return differences(columns)
 
 
-def _stored(client: Client, id: str) -> SpecColumn:
+def _stored(client: Client, id: str) -> "SpecColumn":
+    from gaplab.services.specs.differences import SpecColumn
+
     record = client.find(id)
     return SpecColumn(record.id, record.name, tuple(experiment.spec for experiment in experiments_of(record)))
 

@@ -11,7 +11,6 @@ from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import PLUGINS, AsJson, app
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.api.commands.json_output import print_json, print_result
-from gaplab.services.plugins import folders
 
 if TYPE_CHECKING:
     from gaplab.services.contract.files import CheckedPlugin
@@ -35,6 +34,7 @@ def new(
     """Write a plug-in that runs, to change into your own."""
     from gaplab.services.contract.files import write_skeleton
     from gaplab.services.core.external_plugins import named_folders
+    from gaplab.services.plugins import folders
 
     folders.find()
     named = named_folders()
@@ -51,6 +51,7 @@ def check(
 ) -> None:
     """Check whether the plug-ins in a file keep the contract of their kind."""
     from gaplab.services.contract.files import check_file
+    from gaplab.services.plugins import folders
 
     folders.find()
     found = list(check_file(file))

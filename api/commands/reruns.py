@@ -12,7 +12,6 @@ from gaplab.api.commands.exit_codes import Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.submission import submit_confirmed
 from gaplab.schemas.reruns import RepetitionRerun, RerunRead
-from gaplab.services.plugins import folders
 
 COLORS = {"same": "green", "different": "bold red", "not computed": "yellow"}
 
@@ -31,6 +30,8 @@ def rerun(
     url: Url = None,
 ) -> None:
     """Submit the spec of an archive again, or verify its results on this machine."""
+    from gaplab.services.plugins import folders
+
     folders.load()
     if verify:
         _verify(file, repetitions, as_json=as_json)

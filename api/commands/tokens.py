@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
@@ -13,9 +13,10 @@ from gaplab.api.commands.app import OTHERS, AsJson, app
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.tables import table
 from gaplab.schemas.access import Role, TokenRead
-from gaplab.services import access
 from gaplab.services.settings import Settings
-from gaplab.services.store.session import Store
+
+if TYPE_CHECKING:
+    from gaplab.services.store.session import Store
 
 NONE_LEFT = "No token is left, and the service refuses every request; `gaplab token create --role admin` makes one."
 
@@ -33,6 +34,7 @@ def create(
 ) -> None:
     """Create a token, and print it this once: only its digest is stored."""
     from gaplab.api.process.service import migrate
+    from gaplab.services import access
 
     migrate(Settings.from_environment().database_url)
     with _store() as store:
@@ -47,6 +49,8 @@ def create(
 @tokens.command("list")
 def list_(as_json: AsJson = False) -> None:
     """List the tokens, without their secrets."""
+    from gaplab.services import access
+
     with _store() as store:
         found = access.list_tokens(store)
     if as_json:
@@ -59,6 +63,8 @@ def list_(as_json: AsJson = False) -> None:
 @tokens.command()
 def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="id of the token")], as_json: AsJson = False) -> None:
     """Revoke a token; the service refuses it from the next request on."""
+    from gaplab.services import access
+
     with _store() as store:
         access.revoke_token(store, id)
         left = [token for token in access.list_tokens(store) if token.revoked_at is None]
@@ -68,7 +74,9 @@ def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="id of the token
 
 
 @contextmanager
-def _store() -> Iterator[Store]:
+def _store() -> Iterator["Store"]:
+    from gaplab.services.store.session import Store
+
     store = Store(Settings.from_environment().database_url)
     try:
         store.check()

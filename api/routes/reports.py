@@ -17,7 +17,6 @@ from gaplab.services.reports.blocks import Report
 from gaplab.services.reports.content import experiment_verdict, study_verdict
 from gaplab.services.reports.document import experiment_report, study_report
 from gaplab.services.reports.html import render_html
-from gaplab.services.reports.pdf import render_pdf
 from gaplab.services.reports.takehome import takehome_page, takehome_zip
 
 router = APIRouter(tags=["reports"])
@@ -106,6 +105,8 @@ def _answer(report: Report, format_: Literal["html", "pdf"]) -> Response:
     if format_ == "html":
         answer: Response = page(in_turn(lambda: render_html(report, made)))
     else:
+        from gaplab.services.reports.pdf import render_pdf  # its library takes as long to import as the web server
+
         answer = Response(in_turn(lambda: render_pdf(report, made, at)), media_type="application/pdf")
     answer.headers["Content-Disposition"] = name
     return answer

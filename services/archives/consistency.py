@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
 from gaplab.services.archives.checking import Row
 from gaplab.services.archives.columns import EXPERIMENT, REPETITION
 from gaplab.services.archives.opening import OpenedArchive
@@ -21,7 +21,6 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.specs.resolution import takes_samples
-from gaplab.services.store.models import SPEC_VERSION
 from gaplab.services.store.queries import provenance
 from gaplab.services.store.texts import pack_tags, unpack_tags
 

@@ -4,7 +4,7 @@ from functools import lru_cache
 from math import isfinite
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from gaplab.schemas.curves import CurvePoint
 from gaplab.services.core.arrays import FloatArray
@@ -108,4 +108,4 @@ def known(value: float) -> float | None:
 @lru_cache(maxsize=1024)
 def _quantile(degrees_of_freedom: int) -> float:
     """Return the quantile of Student's t for a two-sided interval; cached, because it dominates the time of a curve."""
-    return float(stats.t.ppf(0.5 + CONFIDENCE / 2, degrees_of_freedom))
+    return float(special.stdtrit(degrees_of_freedom, 0.5 + CONFIDENCE / 2))

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from gaplab.schemas.comparisons import Comparison, Equivalence, EquivalenceVerdict, Trusted
 from gaplab.services.core.arrays import FloatArray
@@ -100,7 +100,7 @@ def _one_test(first: FloatArray, second: FloatArray, shift: float, alternative: 
         return None
     if paired:
         fixed = constant_difference(first, second)
-        return None if fixed else stats.ttest_1samp(first - second, -shift, alternative=alternative)
+        return None if fixed else scipy.stats.ttest_1samp(first - second, -shift, alternative=alternative)
     if not varies(first, second, shift):
         return None
-    return stats.ttest_ind(*moved(first, second, shift), equal_var=False, alternative=alternative)
+    return scipy.stats.ttest_ind(*moved(first, second, shift), equal_var=False, alternative=alternative)

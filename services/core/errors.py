@@ -34,9 +34,10 @@ Diverged physics is not an error: its fitness is nan, which never wins.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from gaplab.services.core.arrays import FloatArray
+if TYPE_CHECKING:
+    from gaplab.services.core.arrays import FloatArray
 
 
 class GaplabError(Exception):
@@ -192,7 +193,7 @@ class RealityAwaited(GaplabError):
         genome: `(g,)`.
     """
 
-    def __init__(self, genome: FloatArray) -> None:
+    def __init__(self, genome: "FloatArray") -> None:
         self.genome = genome
         super().__init__("a measurement of the physical robot is awaited")
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from gaplab.schemas.comparisons import Estimate, Summary
 from gaplab.services.core.arrays import FloatArray
@@ -53,7 +53,7 @@ def improvement(first: FloatArray, second: FloatArray, *, paired: bool, interval
     pairs = len(first) * len(second)
     if not pairs:
         return Estimate()
-    share = float(stats.mannwhitneyu(first, second, method="asymptotic").statistic) / pairs
+    share = float(scipy.stats.mannwhitneyu(first, second, method="asymptotic").statistic) / pairs
     if not intervals or pairs > MOST_PAIRS_OF_VALUES:
         return Estimate(value=share)
     return _estimate(share, _ends_of_improvement(first.tobytes(), second.tobytes(), paired))
@@ -87,7 +87,7 @@ def _ends_of_improvement(first: bytes, second: bytes, paired: bool) -> Ends:
 @np.errstate(over="ignore", invalid="ignore")
 def _ends(data: tuple[Any, ...], statistic: Callable[..., Any], *, paired: bool = False) -> Ends:
     """Return the ends of an interval; None if they overflow, or if all resamples agree."""
-    found = stats.bootstrap(
+    found = scipy.stats.bootstrap(
         data,
         statistic,
         n_resamples=RESAMPLES,
@@ -103,7 +103,7 @@ def _ends(data: tuple[Any, ...], statistic: Callable[..., Any], *, paired: bool 
 
 
 def _interquartile_mean(values: FloatArray, axis: int = -1) -> Any:  # noqa: ANN401 - one number, or one by resample
-    return stats.trim_mean(values, _MIDDLE, axis=axis)
+    return scipy.stats.trim_mean(values, _MIDDLE, axis=axis)
 
 
 def _counts(drawn: Any, n: int) -> FloatArray:  # noqa: ANN401 - whole numbers

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from math import inf, isfinite
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from gaplab.schemas.comparisons import Test
 from gaplab.services.core.arrays import FloatArray
@@ -31,12 +31,12 @@ def compare(first: FloatArray, second: FloatArray) -> tuple[Test, Test, Test]:
     first, second = finite(first), finite(second)
     if min(len(first), len(second)) < 2 or constant(np.concatenate([first, second])):
         return UNDEFINED, UNDEFINED, UNDEFINED
-    ranks = _test(stats.mannwhitneyu(first, second))
+    ranks = _test(scipy.stats.mannwhitneyu(first, second))
     if not varies(first, second):
         return UNDEFINED, UNDEFINED, ranks
     first, second = moved(first, second)
-    student = stats.ttest_ind(first, second)
-    welch = stats.ttest_ind(first, second, equal_var=False)
+    student = scipy.stats.ttest_ind(first, second)
+    welch = scipy.stats.ttest_ind(first, second, equal_var=False)
     return _test(student, student.df), _test(welch, welch.df), ranks
 
 
@@ -52,10 +52,10 @@ def compare_paired(first: FloatArray, second: FloatArray) -> tuple[Test, Test]:
     difference = first - second
     if len(difference) < 2 or not difference.any():
         return UNDEFINED, UNDEFINED
-    ranks = _test(stats.wilcoxon(difference))
+    ranks = _test(scipy.stats.wilcoxon(difference))
     if constant_difference(first, second):
         return UNDEFINED, ranks
-    paired = stats.ttest_1samp(difference, 0.0)
+    paired = scipy.stats.ttest_1samp(difference, 0.0)
     return _test(paired, paired.df), ranks
 
 
@@ -72,7 +72,7 @@ def brown_forsythe(first: FloatArray, second: FloatArray) -> Test:
     groups = [finite(first), finite(second)]
     if min(map(len, groups)) < 2 or all(constant(np.abs(each - np.median(each)), each) for each in groups):
         return UNDEFINED
-    return _test(stats.levene(*groups, center="median"))
+    return _test(scipy.stats.levene(*groups, center="median"))
 
 
 @np.errstate(over="ignore", invalid="ignore")

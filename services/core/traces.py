@@ -10,7 +10,7 @@ Source: gaplab.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
+import scipy
 from scipy.spatial.transform import Rotation, Slerp
 
 from gaplab.services.core.arrays import FloatArray, frozen
@@ -130,7 +130,7 @@ def _correlations(moving: FloatArray, template: FloatArray) -> FloatArray | None
         if wanted.std() < LEAST_CHANGE or recorded.std() < LEAST_CHANGE:
             continue
         centred, recorded_too = wanted - wanted.mean(), recorded - recorded.mean()
-        shared = signal.correlate(recorded_too, centred, mode="valid")
+        shared = scipy.signal.correlate(recorded_too, centred, mode="valid")
         sums = np.concatenate([[0.0], np.cumsum(recorded_too)])
         squares = np.concatenate([[0.0], np.cumsum(recorded_too**2)])
         inside = squares[length:] - squares[:-length] - (sums[length:] - sums[:-length]) ** 2 / length

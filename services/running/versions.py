@@ -12,13 +12,13 @@ from typing import Any
 
 from gaplab.arithmetic import chosen
 from gaplab.schemas.provenance import Provenance
+from gaplab.schemas.resolved import SPEC_VERSION
 from gaplab.services.core.external_plugins import file_of
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.plugins.contents import Contents
 from gaplab.services.plugins.external import external_plugins, named_in
 from gaplab.services.plugins.watching import present
-from gaplab.services.store.models import SPEC_VERSION
 
 CODE = ("schemas", "services", "workers")
 LIBRARIES = ("numpy", "scipy", "cma", "numba")

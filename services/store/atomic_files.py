@@ -6,10 +6,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
 
+PRIVATE = 0o600
+"""Permissions of what holds results: the owner's alone."""
+
 
 def private(path: str, flags: int) -> int:
     """Open a file as `open(…, opener=private)` does; if it is new, only its owner may read it."""
-    return os.open(path, flags, 0o600)
+    return os.open(path, flags, PRIVATE)
 
 
 @contextmanager

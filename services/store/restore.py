@@ -9,11 +9,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
-from gaplab.services.store.atomic_files import replacing
+from gaplab.services.store.atomic_files import PRIVATE, replacing
 from gaplab.services.store.backup import copy_checked
 from gaplab.services.store.engine import parse
 from gaplab.services.store.models import REVISION
-from gaplab.services.store.sqlite_file import COMPANIONS, PRIVATE, file_of, unused
+from gaplab.services.store.sqlite_file import COMPANIONS, file_of, unused
 
 PG_RESTORE = 'pg_restore --clean --if-exists --dbname="postgresql:${{GAPLAB_DATABASE_URL#*:}}" {file}'
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from sqlalchemy import URL
 
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
+from gaplab.services.store.atomic_files import PRIVATE
 
 try:
     import fcntl
@@ -17,9 +18,6 @@ except ImportError:  # not on Windows
 
 HINT = "end the service and run `gaplab restore BACKUP`"
 """What to do about a database that is gone or damaged."""
-
-PRIVATE = 0o600
-"""Permissions of what holds results: the owner's alone."""
 
 _DAMAGED = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
 

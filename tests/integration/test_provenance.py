@@ -14,12 +14,12 @@ from sqlalchemy import text
 from gaplab.api.app import create_app
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import State
+from gaplab.schemas.resolved import SPEC_VERSION
 from gaplab.services import events
 from gaplab.services.core.errors import Conflict, StoreUnavailable
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution, provenance, versions
-from gaplab.services.store.models import SPEC_VERSION
 from gaplab.services.store.session import Store
 from tests.experiments import run, same, some_log, toy
 

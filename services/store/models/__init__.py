@@ -25,7 +25,6 @@ from gaplab.services.store.models.access import IdempotencyRow as IdempotencyRow
 from gaplab.services.store.models.access import TokenRow as TokenRow
 from gaplab.services.store.models.attempts import AttemptRow as AttemptRow
 from gaplab.services.store.models.base import REVISION as REVISION
-from gaplab.services.store.models.base import SPEC_VERSION as SPEC_VERSION
 from gaplab.services.store.models.base import Base as Base
 from gaplab.services.store.models.base import Number as Number
 from gaplab.services.store.models.base import Reason as Reason

@@ -16,9 +16,6 @@ from gaplab.services.store.texts import brief, storable
 REVISION = "0016"
 """The revision with these tables; a database at any other revision is refused."""
 
-SPEC_VERSION = 1
-"""Version of newly stored specs."""
-
 
 def _words(kind: type[StrEnum], name: str) -> Enum:
     """Return a text type that a named constraint limits to the values of an enumeration."""

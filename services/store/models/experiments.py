@@ -7,8 +7,9 @@ from sqlalchemy import BigInteger, ForeignKey, Index, String, Text, UniqueConstr
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import State
+from gaplab.schemas.resolved import SPEC_VERSION
 from gaplab.services.store.clock import now
-from gaplab.services.store.models.base import SPEC_VERSION, Base, Reason
+from gaplab.services.store.models.base import Base, Reason
 from gaplab.services.store.models.leased import LeasedRow
 
 

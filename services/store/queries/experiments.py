@@ -10,11 +10,11 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
-from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
 from gaplab.schemas.spec import Schedule
 from gaplab.services.core.errors import NotFound, StoreUnavailable
 from gaplab.services.store.clock import moment
-from gaplab.services.store.models import SPEC_VERSION, DeletionRow, ExperimentRow, RepetitionRow, StudyRow
+from gaplab.services.store.models import DeletionRow, ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
 

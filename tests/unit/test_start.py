@@ -1,0 +1,23 @@
+"""What processes load at their start: a command or a worker that loads what it does not use starts seconds later."""
+
+import subprocess
+import sys
+
+import pytest
+
+UNUSED = {
+    "gaplab.api.commands.cli": {"numpy", "scipy", "sqlalchemy", "psycopg", "fastapi", "ray"},
+    "gaplab.api.app": {"scipy.stats", "scipy.signal", "matplotlib", "plotly", "fpdf", "pyarrow", "ray"},
+    "gaplab.workers.task": {"scipy", "sqlalchemy", "psycopg", "pybullet", "mujoco", "sapien"},
+    "gaplab.workers.supervisor": {"scipy.stats", "pybullet", "mujoco", "sapien"},
+}
+"""Libraries by the module that a process imports first, which leaves them to the few requests that want them."""
+
+
+@pytest.mark.parametrize("module", UNUSED)
+def test_a_process_starts_without_what_it_may_never_use(module: str) -> None:
+    told = f"import sys, {module}; print(*sorted({UNUSED[module]!r} & sys.modules.keys()))"
+
+    loaded = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True).stdout
+
+    assert loaded.split() == []
