@@ -3,7 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
-from scipy.spatial import ConvexHull
+import scipy
 
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.kinematics import body_poses, product, rotated
@@ -45,7 +45,7 @@ def _moments_by_mass(shape: Shape) -> tuple[float, float, float]:
 def _of_hull(mass_kg: float, points: FloatArray) -> Inertia:
     """Return the inertia of a solid hull about its centroid: the sum over tetrahedra from there to its faces."""
     inner = points.mean(axis=0)
-    hull = ConvexHull(points)
+    hull = scipy.spatial.ConvexHull(points)
     corners = points[hull.simplices] - inner
     volumes = np.abs(np.linalg.det(corners)) / 6
     sums = corners.sum(axis=1)

@@ -3,7 +3,7 @@
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -42,14 +42,20 @@ def asked(alone: Any, genomes: Any, simulators: Any) -> Any:
     return alone.genomes.draw(genomes, rng), alone.parameters.draw(simulators, rng)
 
 
+def wait_until(ready: Callable[[], bool]) -> None:
+    """Wait without work, which would keep helpers from starting."""
+    deadline = time.monotonic() + 300
+    while not ready():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
 @pytest.fixture
 def pool(alone: Any) -> Any:
     """A pool that knows how long a rollout takes, and has a helper."""
     warm = Pool(SPEC, alone.simulate, 1)
-    deadline = time.monotonic() + 300
-    while warm.batch_size() < 2:
-        assert time.monotonic() < deadline
-        warm(*asked(alone, 2, 1))
+    warm(*asked(alone, 2, 1))
+    wait_until(lambda: warm.batch_size() > 1)
     return warm
 
 
@@ -81,11 +87,8 @@ def test_rollouts_are_spread_if_there_are_several(alone: Any, pool: Any, spreads
 
 def until(pool: Any, alone: Any, batch: Any) -> None:
     """Wait until so many rollouts are what keeps the cores busy; one call has said that there is work for them."""
-    deadline = time.monotonic() + 300
     pool(*asked(alone, batch, 1))
-    while pool.batch_size() != batch:
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    wait_until(lambda: pool.batch_size() == batch)
 
 
 def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone: Any, pool: Any) -> None:
@@ -93,11 +96,14 @@ def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone: An
 
 
 def test_a_long_call_gets_help_that_came_after_it_began(alone: Any, spreads: Any) -> None:
+    question = asked(alone, 10, 20)
+
     def slow(genomes: Any, parameters: Any) -> Any:
-        time.sleep(0.1 * len(genomes) * len(parameters))
+        wait_until(lambda: bool(sharing._helpers.ready(*question)))
         return alone.simulate(genomes, parameters)
 
-    Pool(SPEC, slow, 1)(*asked(alone, 10, 20))
+    sharing = Pool(SPEC, slow, 1)
+    sharing(*question)
 
     assert spreads
 

@@ -157,13 +157,13 @@ def test_a_worker_that_hangs_is_ended_with_the_reason_even_if_it_holds_the_inter
 
     monkeypatch.setattr(task, "run", hanging)
     experiment = submission.submit_experiment(sqlite_store, toy()).id
-    patience = Patience(rollout_s=0.25)
+    patience = Patience(rollout_s=1.5)
 
     run(Supervisor(sqlite_store, lambda: 3, lease_s=3.0, patience=patience), sqlite_store, experiment)
 
     states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
     assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
-    assert "GAPLAB_ROLLOUT_LIMIT_S is 0.25 s" in reading.read_experiment(sqlite_store, experiment).reasons[0]
+    assert "GAPLAB_ROLLOUT_LIMIT_S is 1.5 s" in reading.read_experiment(sqlite_store, experiment).reasons[0]
 
 
 class Bench(Analytic):

@@ -1,4 +1,7 @@
-"""What processes load at their start: a command or a worker that loads what it does not use starts seconds later."""
+"""What processes load at their start: a command or a worker that loads what it does not use starts seconds later.
+
+SciPy loads its parts when they are used: `import scipy` costs nothing, and `from scipy import stats` a second.
+"""
 
 import subprocess
 import sys
@@ -9,6 +12,9 @@ UNUSED = {
     "gaplab.api.commands.cli": {"numpy", "scipy", "sqlalchemy", "psycopg", "fastapi", "ray"},
     "gaplab.api.app": {"scipy.stats", "scipy.signal", "matplotlib", "plotly", "fpdf", "pyarrow", "ray"},
     "gaplab.workers.task": {"scipy", "sqlalchemy", "psycopg", "pybullet", "mujoco", "sapien"},
+    "gaplab.services.engines.mujoco": {"scipy.spatial", "mujoco", "numba"},
+    "gaplab.services.engines.pybullet": {"scipy.spatial", "pybullet"},
+    "gaplab.services.engines.physx": {"scipy.spatial", "sapien"},
     "gaplab.workers.supervisor": {"scipy.stats", "pybullet", "mujoco", "sapien"},
 }
 """Libraries by the module that a process imports first, which leaves them to the few requests that want them."""
