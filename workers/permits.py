@@ -98,7 +98,7 @@ class PermittedReality:
             answered.set()
 
     def _expiry(self, known: float) -> float:
-        """Return when the permit expires; what is known, if nobody answers or the permits' process has just died."""
+        """Return when the permit expires; the last known time, if the permits' process does not answer or has died."""
         asked = monotonic()
         with suppress(RayError):
             return asked + self._left()
