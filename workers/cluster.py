@@ -62,7 +62,8 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
             repetitions run at once on a cluster.
 
     Raises:
-        ClusterUnusable: the cluster cannot be joined, a node has other versions, or authentication is switched off.
+        ClusterUnusable: Ray does not start, the cluster cannot be joined, a node has other versions, or authentication
+            is switched off.
     """
     logging.getLogger("ray").setLevel(logging.ERROR)
     with _joined(settings.ray_address) if settings.ray_address else _started(settings.workers):
@@ -105,16 +106,19 @@ def _start(cores: int | None, folder: Path) -> None:
         raise ClusterUnusable(msg)
     limit_files()
     with _on_loopback():
-        ray.init(
-            address="local",  # not another Ray on this machine
-            num_cpus=cores,
-            include_dashboard=False,
-            log_to_driver=False,
-            configure_logging=False,
-            object_store_memory=OBJECT_STORE_BYTES,
-            _node_ip_address="127.0.0.1",
-            _temp_dir=str(folder),
-        )
+        try:
+            ray.init(
+                address="local",  # not another Ray on this machine
+                num_cpus=cores,
+                include_dashboard=False,
+                log_to_driver=False,
+                configure_logging=False,
+                object_store_memory=OBJECT_STORE_BYTES,
+                _node_ip_address="127.0.0.1",
+                _temp_dir=str(folder),
+            )
+        except Exception as error:  # Ray raises it bare where a part of it does not start in time
+            raise ClusterUnusable(f"Ray did not start on this machine: {error}") from error
 
 
 @contextmanager

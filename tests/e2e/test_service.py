@@ -153,7 +153,7 @@ def own_begun(service: Any) -> Any:
 def supervisors_that_broke(service: Any) -> int:
     """The number of supervisors that ended by themselves, but for those whose Ray did not start within its 30 s."""
     log = service.log()
-    return log.count("another starts in") - log.count("node timed out during startup")
+    return log.count("another starts in") - log.count("exit code 1: Ray did not start")
 
 
 def test_an_edit_concerns_the_experiments_that_name_the_plug_in_and_a_person_may_accept_it(

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import ray
 
 from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.settings import Settings
@@ -95,6 +96,17 @@ def test_a_ray_of_our_own_that_would_ask_nobody_is_not_started(monkeypatch: pyte
     monkeypatch.setenv("RAY_AUTH_MODE", "disabled")
 
     with pytest.raises(ClusterUnusable, match="RAY_AUTH_MODE"), cluster(Settings(workers=1)):
+        pass
+
+
+def test_a_ray_that_does_not_start_is_told_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(**options: object) -> None:
+        raise Exception("The current node timed out during startup.")  # as Ray does
+
+    monkeypatch.delenv("RAY_AUTH_MODE", raising=False)
+    monkeypatch.setattr(ray, "init", late)
+
+    with pytest.raises(ClusterUnusable, match=r"Ray did not start on this machine: .+ timed out"), cluster(Settings()):
         pass
 
 
