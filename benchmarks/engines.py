@@ -21,7 +21,7 @@ from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 
 ROBOT = Quadruped()
-NEARBY = {"0.01 more dynamic friction": (1.0, 0.81, 0.0), "half the friction": (0.5, 0.5, 0.0)}
+NEARBY = {"0.01 more dynamic friction": (1.0, 0.81, 0.0), "both frictions 0.5": (0.5, 0.5, 0.0)}
 ALONE_S = 3.0
 
 

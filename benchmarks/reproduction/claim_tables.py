@@ -16,7 +16,7 @@ WORDS = {
     Verdict.ABSENT: "not in this study",
 }
 UNDECIDED = {Verdict.OPEN, Verdict.ABSENT}
-CLAIM_HEAD = "study", "verdict", "here", "the paper's test", "the careful test", "why"
+CLAIM_HEAD = "study", "verdict", "here", "the paper's test", "our test", "why"
 STATEMENT_HEAD = "study", "statement", "here", "p that shows it", "p that refutes it"
 
 
@@ -43,12 +43,14 @@ def in_short(study: Study) -> str:
 
 
 def _named(claim: Claim, study: Study) -> str:
-    """Return a claim in a few words, with the statements that refute it; the key alone of an undecided one."""
-    found = judged(claim, study)[1]
+    """Return a claim in a few words, with its statements if some are refuted; the key alone of an undecided one."""
+    examined, found = judged(claim, study)
     if found.verdict in UNDECIDED:
         return claim.key
-    refuted = f"; refuted: {', '.join(each.lower() for each in found.refuted)}" if found.refuted else ""
-    return f"{claim.title} ({claim.key}{refuted})"
+    shown = [each.statement for each in examined.evidence if each.shown and each.statement not in found.refuted]
+    sides = {"shown": shown, "refuted": found.refuted} if found.refuted else {}
+    told = [f"; {side}: {', '.join(each.lower() for each in names)}" for side, names in sides.items() if names]
+    return f"{claim.title} ({claim.key}{''.join(told)})"
 
 
 def verdicts(studies: Mapping[str, Study]) -> str:

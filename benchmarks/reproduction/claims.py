@@ -182,8 +182,8 @@ CLAIMS = (
         "With one sample, simulated fit and informative is significantly different from the other strategies "
         "(p < 0.01), and better.",
         "It is above each of the five others after one sample. Refuted if its lead is shown to be smaller than "
-        f"{paper.ONE_SAMPLE.least(*paper.SIMULATED_FIT[:2]):.2f} of direct over a strategy with simulated fit, or "
-        f"than {paper.ONE_SAMPLE.least(paper.SIMULATED_FIT[0], paper.WEAK[0]):.2f} over another.",
+        f"{paper.ONE_SAMPLE.least(*paper.SIMULATED_FIT[:2]):.3f} of direct over a strategy with simulated fit, or "
+        f"than {paper.ONE_SAMPLE.least(paper.SIMULATED_FIT[0], paper.WEAK[0]):.3f} over another.",
         one_sample_wins,
     ),
     Claim(
@@ -199,12 +199,12 @@ CLAIMS = (
         "strategies with simulated fit are above the others beyond two samples",
         "Beyond two samples, each strategy with simulated fit is better than each without (p ≪ 0.001).",
         "Over 3 to 10 samples, each of the three is above each of the other three. Refuted if a lead is shown to be "
-        f"smaller than {paper.BEYOND_TWO.least(paper.SIMULATED_FIT[0], paper.WEAK[0]):.2f} of direct.",
+        f"smaller than {paper.BEYOND_TWO.least(paper.SIMULATED_FIT[0], paper.WEAK[0]):.3f} of direct.",
         fit_strategies_lead,
     ),
     Claim(
         "C5b",
-        "uniqueness gains over plain simulated fit beyond two samples, and informativeness loses",
+        "beyond two samples, unique is above plain simulated fit, and both are above the informative one",
         "Beyond two samples, the strategies with simulated fit differ from each other (p ≪ 0.001): the unique one is "
         "above plain simulated fit, and both are above the informative one.",
         "Over 3 to 10 samples, each of the three pairs has this order. Refuted if a lead is shown to be smaller than "

@@ -38,7 +38,8 @@ MOST_NAMED = 3
 RULES = (
     f"A statement is **shown** if the p of the hypothesis that it does not hold is below {SIGNIFICANT}. It is "
     "**refuted** if the p of the hypothesis that it holds, in the size that the claim's rule names, is below "
-    f"{SIGNIFICANT}. All p are of Welch's t, since strategies vary unequally, and two-sided, those of margins too.",
+    f"{SIGNIFICANT}. All p are two-sided, those of margins too. They are of Welch's t, since strategies vary "
+    "unequally; but C3 has a bootstrap over repetitions, and C8 Student's t of gains that are paired by repetition.",
     "*reproduced*: every statement of the claim is shown. *reproduced, smaller*: so it is, but one is shown to be "
     "smaller than in the paper. *not*: a statement is refuted, and is not shown in a smaller size. *open*: anything "
     "else. A claim that the study cannot speak of is *not in this study*.",
@@ -69,10 +70,10 @@ RULES = (
     "come from CMA-ES: these are claims on the paper's strategies with another optimizer. Of several experiments with "
     "one strategy, the first counts.",
     "Computing time decided how many repetitions a study has. The results were read each time before more repetitions "
-    "were added, and no p is corrected for this. The plan is the paper's number. The supposed correlations, and the "
-    "direction of C5b and C6, were chosen after results were read; before, both were *open* where they are *not* in "
-    "MuJoCo. So was the second factor of C3: without it, C3 is *reproduced* where it is *reproduced, smaller*. "
-    "Controls were chosen to explain results.",
+    "were added, and no p is corrected for this. Where fewer were computed than planned, their number is followed by "
+    "the planned one, as in *20 of 40*. The supposed correlations, and the direction of C5b and C6, were chosen after "
+    "results were read; before, both were *open* where they are *not* in MuJoCo. So was the second factor of C3: "
+    "without it, C3 is *reproduced* where it is *reproduced, smaller*. Controls were chosen to explain results.",
 )
 """The rules of a verdict, in sentences."""
 

@@ -41,12 +41,12 @@ def limits(link: Callable[[str], str]) -> Iterator[str]:
     )
     yield (
         "**The engine.** The paper ran a version of PhysX of its time. Today's engines "
-        f"[differ from each other]({link(ENGINES)}) about as much as one engine with half the friction differs from "
-        "itself. Source: paper, section 2."
+        f"[differ from each other]({link(ENGINES)}) about as much as one engine differs from itself "
+        "if both frictions are 0.5. Source: paper, section 2."
     )
     yield (
         "**The tests.** The paper combines the values after several numbers of samples. If it takes those of one "
         "repetition as independent, as it seems, its p-values are too small. If its repetitions behave as ours, "
-        "those of strategies with simulated fit are so by far, and those of the other three are nearly right. Its "
+        "those of strategies with simulated fit are far too small, and those of the other three are nearly right. Its "
         'sentences on strategies that differ "from the others" have two readings (C5b, C6). Source: caption of Fig. 4.'
     )

@@ -36,7 +36,7 @@ def in_words(study: Study) -> str:
     selections = "" if search == selection else f", samples from searches of {selection:,} evaluations"
     return (
         f"{spec.robot.name}: {spec.engine.name} for a reality in {where}, budget {spec.budget.preset}, controllers by "
-        f"{spec.controller_optimizer.name}{selections}, repetitions: {_repetitions(study)}"
+        f"{spec.controller_optimizer.name}{selections}, repetitions: {repetitions_in_words(study)}"
     )
 
 
@@ -63,7 +63,7 @@ def paper_rows(studies: Sequence[Study]) -> Iterator[tuple[str, ...]]:
     yield "simulators of an ensemble that score a sample", "20", *map(_scoring, studies)
     yield "evaluations of a tuning", f"{paper.EVALUATIONS[2]:,}", *map(_tunings, specs)
     yield "samples", str(paper.ITERATIONS), *(str(study.last) for study in studies)
-    yield "repetitions", f"{paper.REPETITIONS} (direct {paper.DIRECT_REPETITIONS})", *map(_repetitions, studies)
+    yield "repetitions", f"{paper.REPETITIONS} (direct {paper.DIRECT_REPETITIONS})", *map(repetitions_in_words, studies)
     truths = [study.arms[0].read.spec["reality"]["parameters"] for study in studies]
     told = (", ".join("hidden" if value is None else str(value) for value in truth.values()) for truth in truths)
     yield "static friction, dynamic friction, restitution", "1.0, 0.8, 0.0", *told
@@ -97,7 +97,7 @@ def study_row(study: Study, links: Sequence[str]) -> tuple[str, ...]:
         "/".join(sorted({str(arm.spec.seed) for arm in study.arms})),
         f"{preset}: {' / '.join(f'{size:,}' for size in sizes)} ({', '.join(shares)} of the paper's){reused}{divided}",
         str(study.last if study.present else 0),
-        _repetitions(study),
+        repetitions_in_words(study),
         f"{sum(arm.read.progress.rollouts_done for arm in study.arms):,}",
         f"{sum(arm.core_hours for arm in study.arms):.2f}",
     )
@@ -133,20 +133,29 @@ def _scoring(study: Study) -> str:
     return ", ".join(sorted({_scored_by(arm) for arm in study.arms} - {""})) or MISSING
 
 
-def _repetitions(study: Study) -> str:
-    """Return the repetitions that most experiments have, and those that differ."""
-    counts = [arm.repetitions for arm in study.arms]
-    usual = max(counts, key=lambda count: (counts.count(count), count))
+def repetitions_in_words(study: Study) -> str:
+    """Return the repetitions that most experiments have, the planned ones if there are more, and what differs."""
+    counts = [(arm.repetitions, arm.spec.repetitions) for arm in study.arms]
+    usual, planned = max(counts, key=lambda count: (counts.count(count), count))
     others = [
-        _exception(arm) for arm in study.arms if arm.repetitions != usual or arm.read.state is not State.COMPLETED
+        _exception(arm, planned)
+        for arm in study.arms
+        if arm.repetitions != usual or arm.read.state is not State.COMPLETED
     ]
-    return f"{usual} ({'; '.join(others)})" if others else f"{usual}"
+    told = _of_planned(usual, planned)
+    return f"{told} ({'; '.join(others)})" if others else told
 
 
-def _exception(arm: Arm) -> str:
+def _exception(arm: Arm, planned: int) -> str:
+    """Return the repetitions of an experiment, where most of its study are planned with this number."""
     state = "" if arm.read.state is State.COMPLETED else f", {arm.read.state.value}"
-    planned = f" of {arm.spec.repetitions}" if arm.repetitions < arm.spec.repetitions else ""
-    return f"{spoken(arm.read.name).lower()} {arm.repetitions}{planned}{state}"
+    own = arm.spec.repetitions
+    count = f"{arm.repetitions}" if own == planned else _of_planned(arm.repetitions, own)
+    return f"{spoken(arm.read.name).lower()} {count}{state}"
+
+
+def _of_planned(count: int, planned: int) -> str:
+    return f"{count} of {planned}" if count < planned else f"{count}"
 
 
 def figure_4(study: Study) -> str:

@@ -9,12 +9,16 @@ import sys
 from collections.abc import Mapping
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from benchmarks.reproduction.tables import repetitions_in_words
 from gaplab import migrations
+from gaplab.schemas.lifecycle import State
 from gaplab.services.store.session import Store
 from tests.made_studies import STEP_S, Made, Study, archive, values
 
@@ -59,6 +63,13 @@ VAGUE = {"direct": Made([1.0], 0.3)} | {
 EVEN = DIRECT | {name: Made([0.9] * 5, 0.01) for name in ("simulated_fit", "simulated_fit_and_unique")}
 """Two strategies that are equally fit."""
 
+ORDERED = {
+    "simulated_fit": Made([0.9] * 5),
+    "simulated_fit_and_unique": Made([1.0] * 5),
+    "simulated_fit_and_informative": Made([0.9] * 5),
+} | DIRECT
+"""The unique strategy is fitter than two that are equally fit."""
+
 STEPS = {"random": [0.50, 0.50], "known_fit": [0.53, 0.53], "informative": [0.56, 0.56]}
 """Each is little above the one before; only the last and the first are told apart."""
 
@@ -87,6 +98,7 @@ STUDIES = {
     "small": Study(DIRECT | {"random": Made([0.50] * 7, 0.01), "known_fit": Made([0.52] * 7, 0.01)}, 40, 6),
     "halved": Study(HALVED, 80, 3),
     "even": Study(EVEN, 20, 4),
+    "ordered": Study(ORDERED, 20, 4),
     "steps": Study(DIRECT | {name: Made(means, 0.05, 0.0) for name, means in STEPS.items()}, 20, 1),
     "lucky": Study(LUCKY, 6, 1),
     "spread": Study(
@@ -269,12 +281,12 @@ def test_a_difference_that_only_equal_spreads_would_show_is_open(document: Docum
     row = document.row("C7", "spread")
 
     assert document.verdict("C7", "spread") == "open"
-    assert "largest p: 0.0" in row["the careful test"]
+    assert "largest p: 0.0" in row["our test"]
 
 
 def test_a_claim_that_needs_all_of_its_statements_needs_no_correction_of_each(document: Document) -> None:
     assert document.verdict("C4a", "lucky") == "reproduced"
-    assert document.row("C4a", "lucky")["the careful test"].startswith("5 of 5 shown; largest p: 0.03")
+    assert document.row("C4a", "lucky")["our test"].startswith("5 of 5 shown; largest p: 0.03")
 
 
 def test_an_open_difference_comes_with_what_the_repetitions_could_find(document: Document) -> None:
@@ -292,7 +304,7 @@ def test_the_papers_own_test_stands_beside_the_careful_one(document: Document) -
     agrees = document.row("C5a", "agrees")
 
     assert agrees["the paper's test"].startswith("Student pooled over 3 to 10 samples: 9 of 9\N{NO-BREAK SPACE}pairs")
-    assert agrees["the careful test"].startswith("9 of 9 shown")
+    assert agrees["our test"].startswith("9 of 9 shown")
     assert document.row("C4a", "agrees")["the paper's test"].startswith("Student at 1\N{NO-BREAK SPACE}sample: 5 of 5")
     assert document.row("C7", "contradicts")["the paper's test"] == "none in the paper"
 
@@ -310,6 +322,32 @@ def test_the_summary_names_what_refutes_a_claim(document: Document) -> None:
 
     assert "(C7; refuted: simulated fit and unique above simulated fit)" in short
     assert "; refuted: " not in document.text.partition("**In short**, agrees ")[2].partition("\n\n**In short**")[0]
+
+
+def test_the_summary_names_what_is_shown_of_a_claim_that_is_refuted(document: Document) -> None:
+    short = document.text.partition("**In short**, ordered ")[2].partition("\n\n**In short**")[0]
+
+    unique, plain, informative = "simulated fit and unique", "simulated fit", "simulated fit and informative"
+    shown = f"{unique} above {plain}, {unique} above {informative}"
+    assert f"(C5b; shown: {shown}; refuted: {plain} above {informative})" in short
+
+
+@pytest.mark.parametrize(
+    ("counts", "told"),
+    [
+        ({"a": (40, 40), "b": (40, 40)}, "40"),
+        ({"a": (20, 40), "b": (20, 40), "c": (19, 40), "direct": (100, 100)}, "20 of 40 (c 19; direct 100)"),
+        ({"a": (12, 12), "b": (12, 12), "c": (3, 8)}, "12 (c 3 of 8)"),
+    ],
+)
+def test_repetitions_are_told_beside_the_planned_ones(counts: Mapping[str, tuple[int, int]], told: str) -> None:
+    def arm(name: str, repetitions: int, planned: int) -> Any:
+        read, spec = SimpleNamespace(name=name, state=State.COMPLETED), SimpleNamespace(repetitions=planned)
+        return SimpleNamespace(repetitions=repetitions, read=read, spec=spec)
+
+    study: Any = SimpleNamespace(arms=[arm(name, *both) for name, both in counts.items()])
+
+    assert repetitions_in_words(study) == told
 
 
 def test_fitness_is_a_ratio_to_direct_beside_the_papers(document: Document) -> None:
