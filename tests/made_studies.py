@@ -8,11 +8,12 @@ from zlib import crc32
 
 import numpy as np
 
+from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_study
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import lifecycle, submission
 from gaplab.services.running import execution
 from gaplab.services.running.execution import TimedStep
 from gaplab.services.store.session import Store
@@ -30,12 +31,13 @@ class Made(NamedTuple):
 
 
 class Study(NamedTuple):
-    """A study to make."""
+    """A study to make; more repetitions may be planned for it, before it is stopped."""
 
     curves: Mapping[str, Made]
     repetitions: int = 12
     samples: int = 10
     changes: Mapping[str, Any] = {}
+    more: int = 0
 
 
 def standard(rng: np.random.Generator, *shape: int) -> np.ndarray:
@@ -68,7 +70,7 @@ def archive(store: Store, label: str, study: Study, folder: Path) -> Path:
     spec |= {
         "budget": "smoke",
         "iterations": study.samples,
-        "repetitions": study.repetitions,
+        "repetitions": study.repetitions + study.more,
         "seed": 7,
         **study.changes,
     }
@@ -79,10 +81,14 @@ def archive(store: Store, label: str, study: Study, folder: Path) -> Path:
         )
         for each in made.experiments
     }
-    claims = execution.claim(store, "test", limit=10_000)
+    every = execution.claim(store, "test", limit=10_000)
+    claims = [claim for claim in every if claim.number < study.repetitions]
     steps = [(claim, log(recorded[claim.experiment_id][claim.number])) for claim in claims]
     execution.record_all(store, [(claim, [TimedStep(step, STEP_S) for step in each]) for claim, each in steps])
     assert all(execution.complete(store, claim) for claim in claims)
+    if study.more:
+        execution.hand_back(store, *(claim for claim in every if claim not in claims))
+        lifecycle.ask_study(store, made.id, Verb.STOP)
     exported = export_study(store, made.id)
     path = folder / f"{label}.zip"
     with exported.file as source, path.open("wb") as target:

@@ -7,13 +7,14 @@ import shutil
 import signal
 import stat
 import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
 import psycopg
+
+from tests.waiting import wait_until
 
 ACCOUNT = "nobody"
 """Account that runs Postgres for root, as Postgres refuses to run as root: every machine has it."""
@@ -26,8 +27,8 @@ PORT = 5432
 
 PR_SET_PDEATHSIG = 1  # Source: man 2 prctl
 
-START_S = 60.0
-"""Time that a server on a busy machine may take until it answers."""
+STOP_S = 60.0
+"""Time that a server on a busy machine may take until it has ended."""
 
 
 class Installation:
@@ -93,14 +94,11 @@ class Server:
     def stop(self) -> None:
         """End the server and its connections; its files stay."""
         self._process.send_signal(signal.SIGINT)
-        self._process.wait(START_S)
+        self._process.wait(STOP_S)
 
     def _wait(self) -> None:
-        deadline = time.monotonic() + START_S
-        while not answers(self._url):
-            running = self._process.poll() is None and time.monotonic() < deadline
-            assert running, f"Postgres does not start\n{self._log.read_text()}"
-            time.sleep(0.05)
+        wait_until(lambda: answers(self._url) or self._process.poll() is not None, otherwise=self._log.read_text)
+        assert self._process.poll() is None, f"Postgres does not start\n{self._log.read_text()}"
 
 
 @contextmanager

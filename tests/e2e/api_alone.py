@@ -9,7 +9,7 @@ from typing import Any
 
 import httpx2
 
-from tests.e2e.service import wait_until
+from tests.waiting import wait_until
 
 
 class Api:
@@ -34,7 +34,7 @@ class Api:
         with self._log.open("ab") as log:
             command = [sys.executable, "-m", "gaplab.api"]
             self._process = subprocess.Popen(command, env=self._environment, stdout=log, stderr=log)
-        wait_until(self._answers, 120, lambda: self._log.read_text())
+        wait_until(self._answers, otherwise=self._log.read_text)
         return self
 
     def kill(self) -> None:

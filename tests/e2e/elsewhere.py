@@ -14,9 +14,9 @@ import psycopg
 
 from gaplab.api.clients.client import Client
 from tests.e2e.reading import ROOT, commands
-from tests.e2e.service import wait_until
 from tests.postgres import Installation, Server
 from tests.processes import processes_with
+from tests.waiting import wait_until
 
 PASSWORD = "correct-horse"
 SERVERS = {"gaplab serve", "python -m workers serve", "python -m api"}
@@ -94,7 +94,7 @@ class Shell:
                 else:
                     self.run(line)
             client = serving.enter_context(Client(f"http://127.0.0.1:{self._port}", token=""))
-            wait_until(client.ready, 120, self.said)
+            wait_until(client.ready, otherwise=self.said)
             yield client
 
     def run(self, line: Any) -> None:
@@ -130,7 +130,7 @@ class Shell:
         for pid in self.processes():
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
-        wait_until(lambda: not self.processes(), 30, self.processes)
+        wait_until(lambda: not self.processes(), otherwise=self.processes)
 
     @contextmanager
     def _serving(self, line: Any) -> Iterator[None]:

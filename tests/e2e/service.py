@@ -5,13 +5,16 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import httpx2
 
 from tests.processes import processes, processes_with
+from tests.waiting import wait_until
+
+STUDY_S = 2_000.0
+"""Longest wait for the end of a study."""
 
 
 class Service:
@@ -42,7 +45,7 @@ class Service:
         with self._log.open("ab") as log:
             command = [sys.executable, "-m", "gaplab", "serve"]
             self._process = subprocess.Popen(command, env=self._environment, stdout=log, stderr=log)
-        wait_until(self._answers, 60, self.log)
+        wait_until(self._answers, otherwise=self.log)
         return self
 
     def stop(self, how: Any = signal.SIGINT) -> None:
@@ -89,9 +92,10 @@ class Service:
         assert self.get(answer.headers["location"])["id"] == answer.json()["id"]
         return answer.json()
 
-    def finish(self, path: Any, within_s: Any) -> Any:
+    def finish(self, path: Any) -> Any:
         """The resource at the path, once it has ended."""
-        wait_until(lambda: self.get(path)["state"] not in {"QUEUED", "RUNNING"}, within_s, lambda: self.get(path))
+        ended = lambda: self.get(path)["state"] not in {"QUEUED", "RUNNING"}  # noqa: E731
+        wait_until(ended, within_s=STUDY_S, otherwise=lambda: self.get(path))
         return self.get(path)
 
     def _answers(self) -> bool:
@@ -99,14 +103,3 @@ class Service:
             return self.http.get("/readyz").status_code == 200
         except httpx2.TransportError:
             return False
-
-
-PATIENCE = 5
-"""How many times as long as expected something may take: machines are shared."""
-
-
-def wait_until(condition: Any, within_s: Any, otherwise: Any = lambda: "it took too long") -> None:
-    deadline = time.monotonic() + PATIENCE * within_s
-    while not condition():
-        assert time.monotonic() < deadline, otherwise()
-        time.sleep(0.1)

@@ -5,10 +5,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+
+from tests.waiting import wait_until
 
 TINY = {"robot": "toy_function", "strategies": ["simulated_fit", "random", "direct"], "iterations": 3, "repetitions": 4}
 TINY_BUDGET = {"controller_evaluations": 40, "selection_evaluations": 40, "simulator_evaluations": 40}
@@ -55,19 +56,14 @@ def left_running(folder: Path) -> list[str]:
 def test_a_demo_killed_outright_leaves_nothing_running_and_goes_on_when_run_again(tmp_path: Path, specs: Path) -> None:
     folder = tmp_path / "my [bold] demo :house:"
     first = demo(folder, specs)
-    deadline = time.monotonic() + 60
-    while not (folder / "demo.json").exists():
-        assert first.poll() is None, first.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    wait_until(lambda: (folder / "demo.json").exists() or first.poll() is not None)
+    assert first.poll() is None, first.communicate()
     os.kill(first.pid, signal.SIGKILL)
     first.communicate()
-    while left_running(folder):
-        assert time.monotonic() < deadline, left_running(folder)
-        time.sleep(0.2)
+    wait_until(lambda: not left_running(folder), otherwise=lambda: left_running(folder))
 
     second = demo(folder, specs)
-    said, _ = second.communicate(timeout=120)
+    said, _ = second.communicate(timeout=600)
 
     assert second.returncode == 0, said
     assert "continuing study" in said

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import pytest
 from gaplab.api.process.local_service import LocalService, local_service
 from tests.experiments import same
 from tests.pretended_robot import SETTINGS
+from tests.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
 SPEC = {
@@ -64,14 +64,6 @@ def driving(service: LocalService, experiment: str, journal: Path, **settings: A
     )
 
 
-def until(done: Any) -> Any:
-    end = time.monotonic() + LONGEST_S
-    while not (found := done()):
-        assert time.monotonic() < end, "it takes too long"
-        time.sleep(0.1)
-    return found
-
-
 def test_without_noise_the_simulators_equal_those_of_the_engine_to_the_bit_also_if_the_driver_is_killed(
     service: LocalService, tmp_path: Path
 ) -> None:
@@ -79,7 +71,7 @@ def test_without_noise_the_simulators_equal_those_of_the_engine_to_the_bit_also_
     engine = service.submit(SPEC)
     journal = tmp_path / "journal"
     first = driving(service, physical.id, journal, latency_s=0.2)
-    until(lambda: journal.exists() and b"repeat" in journal.read_bytes())
+    wait_until(lambda: journal.exists() and b"repeat" in journal.read_bytes())
     first.kill()
     first.communicate()
     second = driving(service, physical.id, journal)

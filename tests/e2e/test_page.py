@@ -3,7 +3,7 @@
 from typing import Any
 
 from tests.e2e.browser import axe, screenshot
-from tests.e2e.service import wait_until
+from tests.waiting import wait_until
 
 LONG_MS = 240_000
 AWAY = ("ERR_CONNECTION_REFUSED", "ERR_CONNECTION_RESET", "ERR_EMPTY_RESPONSE", "ERR_INCOMPLETE_CHUNKED_ENCODING")
@@ -72,7 +72,7 @@ def test_killed_and_started_again_the_service_is_followed_by_pages_that_stayed_o
     row.locator(".running").wait_for()
 
     shared_service.kill()
-    wait_until(lambda: not shared_service.processes(), 60, shared_service.processes)
+    wait_until(lambda: not shared_service.processes(), otherwise=shared_service.processes)
     for page in (one, all_of_them):
         page.get_by_text("The service is away").wait_for()
     screenshot(one, "away")

@@ -2,7 +2,6 @@
 
 from io import BytesIO
 from itertools import islice
-from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log
+from tests.waiting import wait_until
 
 FLAT = "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...options) \
 { return kind === 'webgl2' ? null : get.call(this, kind, ...options); })(HTMLCanvasElement.prototype.getContext)"
@@ -56,10 +56,7 @@ def time_of(page: Any) -> Any:
 
 def eventually(page: Any, holds: Any) -> None:
     """Wait until it does; the page's policy forbids to wait for an expression of its own."""
-    until = monotonic() + 300
-    while not holds():
-        assert monotonic() < until
-        page.wait_for_timeout(50)
+    wait_until(holds, meanwhile=lambda: page.wait_for_timeout(50))
 
 
 def picture(canvas: Any) -> Any:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.service import wait_until
+from tests.waiting import wait_until
 
 SLOW_MS = 120_000
 expect.set_options(timeout=SLOW_MS)
@@ -81,7 +81,8 @@ def test_a_report_is_saved_with_the_verdict_that_the_service_gives(
 def test_a_replay_is_saved_as_a_video_of_the_controller_that_is_shown(archive: Any, walker: Any, visit: Any) -> None:
     query = "repetition=0&iteration=1&kind=sample"
     computed = lambda: archive.http.get(f"/experiments/{walker}/replay?{query}").status_code  # noqa: E731
-    wait_until(lambda: computed() == 200, 300, computed)  # the first rollouts of a process take long
+    # the first rollouts of a process take long
+    wait_until(lambda: computed() == 200, within_s=1_500, otherwise=computed)
 
     page = visit(f"{archive.url}/#/replay?experiment={walker}&{query}")
 

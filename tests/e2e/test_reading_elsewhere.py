@@ -14,7 +14,7 @@ import pytest
 
 from tests.e2e.elsewhere import PASSWORD, Postgres, Shell, free_port
 from tests.e2e.reading import DOCUMENTS, ROOT, blocks
-from tests.e2e.service import wait_until
+from tests.waiting import wait_until
 
 POSTGRES, CLUSTER = (ROOT / "docs" / "how-to" / f"{name}.md" for name in ("postgres", "cluster"))
 TINY = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
@@ -78,7 +78,7 @@ def test_what_is_said_of_postgres_can_be_done(postgres: Any, shell: Any) -> None
 
     assert kept == [after, before]
     assert postgres.stored() == 2
-    wait_until(lambda: not reader.processes(), 30, reader.processes)
+    wait_until(lambda: not reader.processes(), otherwise=reader.processes)
 
 
 def test_what_is_said_of_a_cluster_can_be_done(postgres: Any, shell: Any) -> None:

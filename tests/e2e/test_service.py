@@ -11,7 +11,8 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_study
-from tests.e2e.service import Service, wait_until
+from tests.e2e.service import Service
+from tests.waiting import wait_until
 
 TOY = {
     "name": "toy",
@@ -101,7 +102,7 @@ def test_a_toy_study_goes_from_post_to_curve_with_the_numbers_of_one_process(ser
 
     study = service.post("/studies", TOY)["id"]
 
-    ended = service.finish(f"/studies/{study}", within_s=200)
+    ended = service.finish(f"/studies/{study}")
     assert ended["state"] == "COMPLETED"
     progress = ended["progress"]
     assert progress["rollouts_done"] + progress["rollouts_saved"] == progress["rollouts"]
@@ -116,7 +117,7 @@ def test_a_quadruped_study_on_pybullet_goes_from_post_to_curve(service: Any) -> 
 
     study = service.post("/studies", QUADRUPED)["id"]
 
-    ended = service.finish(f"/studies/{study}", within_s=300)
+    ended = service.finish(f"/studies/{study}")
     assert ended["state"] == "COMPLETED"
     assert ended["progress"]["rollouts_failed"] == 0
     assert told_by(service, study) == computed_here(QUADRUPED)
@@ -125,16 +126,16 @@ def test_a_quadruped_study_on_pybullet_goes_from_post_to_curve(service: Any) -> 
 def test_killed_in_the_middle_it_goes_on_where_it_was_with_the_same_numbers(service: Any) -> None:
     service.start()
     study = service.post("/studies", SLOW_TOY)["id"]
-    wait_until(lambda: service.get(f"/studies/{study}")["progress"]["iterations_done"] >= 5, 60)
+    wait_until(lambda: service.get(f"/studies/{study}")["progress"]["iterations_done"] >= 5)
 
     service.kill()
-    wait_until(lambda: not service.processes(), 30, service.processes)
+    wait_until(lambda: not service.processes(), otherwise=service.processes)
     service.start()
 
     before = service.get(f"/studies/{study}")
     assert before["state"] == "RUNNING"
     assert before["progress"]["iterations_done"] >= 5
-    assert service.finish(f"/studies/{study}", within_s=400)["state"] == "COMPLETED"
+    assert service.finish(f"/studies/{study}")["state"] == "COMPLETED"
     assert told_by(service, study) == computed_here(SLOW_TOY)
 
 
@@ -146,7 +147,7 @@ def own_begun(service: Any) -> Any:
     """The path of an experiment with the strategy of one's own, some iterations after it began."""
     spec = {each: SLOW_TOY[each] for each in ("robot", "budget", "seed")} | {"repetitions": 2, "iterations": 4}
     path = f"/experiments/{service.post('/experiments', spec | {'strategy': 'own'})['id']}"
-    wait_until(lambda: service.get(path)["progress"]["iterations_done"] >= 1, 60)
+    wait_until(lambda: service.get(path)["progress"]["iterations_done"] >= 1)
     return path
 
 
@@ -169,19 +170,19 @@ def test_an_edit_concerns_the_experiments_that_name_the_plug_in_and_a_person_may
     other.write_text("class Other(Strategy")
     service.kill_repetitions()
     before = service.get(path)["progress"]["iterations_done"]
-    wait_until(lambda: service.get(path)["progress"]["iterations_done"] > before, 60, service.log)
+    wait_until(lambda: service.get(path)["progress"]["iterations_done"] > before, otherwise=service.log)
     assert service.get(path)["warnings"] == []
 
     own.write_text(EDITED)
     service.kill_repetitions()
-    wait_until(lambda: [each for each in service.get(path)["warnings"] if "strategy own (own.py" in each], 60)
+    wait_until(lambda: [each for each in service.get(path)["warnings"] if "strategy own (own.py" in each])
     quick = service.post("/experiments", QUICK)["id"]
-    assert service.finish(f"/experiments/{quick}", within_s=60)["state"] == "COMPLETED"
+    assert service.finish(f"/experiments/{quick}")["state"] == "COMPLETED"
     waiting = service.get(path)
     assert waiting["state"] == "RUNNING"
     assert waiting["progress"]["iterations_done"] < 2 * 5
     assert service.http.post(f"{path}/accept-versions").status_code == 200
-    ended = service.finish(path, within_s=200)
+    ended = service.finish(path)
     assert (ended["state"], ended["warnings"]) == ("COMPLETED", [])
     first, *_, last = (each["provenance"]["outside"] for each in service.get(f"{path}/provenance")["uses"])
     assert first["strategy own"] != last["strategy own"]
@@ -207,13 +208,13 @@ def test_a_plug_in_that_is_broken_when_the_service_starts_holds_up_its_own_exper
     assert refused.status_code == 422
     assert why in refused.text
     quick = service.post("/experiments", QUICK)["id"]
-    assert service.finish(f"/experiments/{quick}", within_s=60)["state"] == "COMPLETED"
-    wait_until(lambda: [each for each in service.get(path)["warnings"] if why in each], 60, service.log)
+    assert service.finish(f"/experiments/{quick}")["state"] == "COMPLETED"
+    wait_until(lambda: [each for each in service.get(path)["warnings"] if why in each], otherwise=service.log)
     service.stop()
 
     own.write_text(OWN)
     service.start()
-    ended = service.finish(path, within_s=200)
+    ended = service.finish(path)
     assert (ended["state"], ended["warnings"]) == ("COMPLETED", [])
     assert supervisors_that_broke(service) == 0
 
@@ -221,8 +222,8 @@ def test_a_plug_in_that_is_broken_when_the_service_starts_holds_up_its_own_exper
 def test_stopped_in_order_it_leaves_no_process_behind(service: Any) -> None:
     service.start()
     service.post("/studies", SLOW_TOY)
-    wait_until(lambda: service.get("/studies")["items"][0]["state"] == "RUNNING", 60)
+    wait_until(lambda: service.get("/studies")["items"][0]["state"] == "RUNNING")
 
     service.stop()
 
-    wait_until(lambda: not service.processes(), 20, service.processes)
+    wait_until(lambda: not service.processes(), otherwise=service.processes)

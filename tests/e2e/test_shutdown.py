@@ -10,7 +10,8 @@ import pytest
 from sqlalchemy import text
 
 from gaplab.services.store.session import Store
-from tests.e2e.service import Service, wait_until
+from tests.e2e.service import Service
+from tests.waiting import wait_until
 
 LONG_STEPS = {
     "robot": "toy_function",
@@ -32,13 +33,13 @@ def test_told_to_stop_it_hands_back_what_is_under_way_and_nothing_of_it_stays(se
     service.start()
     study = service.post("/studies", LONG_STEPS)["id"]
     experiment = service.get(f"/studies/{study}")["experiments"][0]["id"]
-    wait_until(lambda: steps_of(tmp_path) > 0, 120)
+    wait_until(lambda: steps_of(tmp_path) > 0)
 
     begun = time.monotonic()
     service.stop(signal.SIGTERM)
     took_s = time.monotonic() - begun
 
-    wait_until(lambda: not service.processes(), 30, service.processes)
+    wait_until(lambda: not service.processes(), otherwise=service.processes)
     assert took_s < 40
     store = Store(f"sqlite:///{tmp_path / 'gaplab.db'}")
     with store.reading() as session:

@@ -14,7 +14,7 @@ import httpx2
 import pytest
 
 from tests.e2e.elsewhere import free_port
-from tests.e2e.service import wait_until
+from tests.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
 PARTS = ("api", "gaplab", "migrations", "schemas", "services", "workers", "pyproject.toml", "README.md", "LICENSE")
@@ -91,7 +91,7 @@ class User:
         with (self._home / "service.log").open("wb") as log:
             service = subprocess.Popen(call, **where, stdout=log, stderr=log)  # type: ignore[call-overload]
         try:
-            wait_until(lambda: service.poll() is not None or self._answers(), 120, self.log)
+            wait_until(lambda: service.poll() is not None or self._answers(), otherwise=self.log)
             yield
         finally:
             service.terminate()

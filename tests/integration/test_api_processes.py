@@ -8,7 +8,6 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -26,15 +25,7 @@ from gaplab.services.access import create_token, revoke_token
 from gaplab.services.core.errors import StoreUnavailable, Unauthenticated
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
-
-
-def within(seconds: float, condition: Callable[[], object]) -> bool:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.05)
-    return True
+from tests.waiting import wait_until
 
 
 def alive(pid: int) -> bool:
@@ -69,7 +60,7 @@ def test_a_service_migrates_its_database_answers_and_ends_in_order(
     process = serve(environment, "--no-workers", "--port", str(port))
 
     with Client(f"http://127.0.0.1:{port}") as client:
-        assert within(60, client.ready)
+        wait_until(client.ready)
     process.send_signal(how)
     said, _ = process.communicate(timeout=60)
 
@@ -153,7 +144,7 @@ def test_a_supervisor_that_dies_is_started_again_and_it_is_said(
     supervisor = SupervisorProcess({}, module="this")
 
     supervisor.start()
-    assert within(60, lambda: caplog.text.count("another starts") >= 2)
+    wait_until(lambda: caplog.text.count("another starts") >= 2)
     supervisor.stop()
     assert "ended by itself (exit code 0)" in caplog.text
 
@@ -166,7 +157,7 @@ def test_a_supervisor_is_ended_when_its_process_is_stopped(tmp_path: Path) -> No
     )
 
     supervisor.start()
-    assert within(60, lambda: note.exists() and note.read_text())
+    wait_until(lambda: note.exists() and note.read_text())
     supervisor.stop()
 
     assert not alive(int(note.read_text()))
@@ -179,13 +170,13 @@ def test_a_child_ends_when_its_parent_is_killed_outright(tmp_path: Path) -> None
         f"open({str(note)!r}, 'w').write(str(start('http.server', '0', '--bind', '127.0.0.1').pid)); time.sleep(60)"
     )
     parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    assert within(60, lambda: note.exists() and note.read_text())
+    wait_until(lambda: note.exists() and note.read_text())
     time.sleep(1.0)
 
     parent.kill()
     parent.wait()
 
-    assert within(10, lambda: not alive(int(note.read_text())))
+    wait_until(lambda: not alive(int(note.read_text())))
 
 
 def test_a_child_that_does_not_end_when_asked_is_killed(tmp_path: Path) -> None:
@@ -195,7 +186,7 @@ def test_a_child_that_does_not_end_when_asked_is_killed(tmp_path: Path) -> None:
     log = tmp_path / "log"
     with log.open("wb") as output:
         process = start("stubborn", environment={"PYTHONPATH": str(tmp_path)}, log=output)
-    assert within(60, lambda: b"ready" in log.read_bytes())
+    wait_until(lambda: b"ready" in log.read_bytes())
 
     end(process, patience_s=0.2)
 

@@ -22,6 +22,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import StepRecorder, recorded
 from tests.experiments import cancel, same, some_log, toy
 from tests.fakes import Recorder, flat, paraboloid, small_setting
+from tests.waiting import wait_until
 
 
 def steps_of(told: Any) -> Any:
@@ -94,10 +95,7 @@ def test_a_repetition_that_nobody_wants_ends() -> None:
 
     steps.close()  # type: ignore[attr-defined]
 
-    deadline = time.monotonic() + 180
-    while any(each.name == "repetition" for each in threads()):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_until(lambda: all(each.name != "repetition" for each in threads()))
 
 
 def part(step: Any, number: Any, answers: Any = b"answers", seconds: Any = 2.0) -> Any:

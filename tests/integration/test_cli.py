@@ -24,6 +24,7 @@ from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab, served
 from tests.experiments import run, some_log
+from tests.waiting import wait_until
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SMOKE = str(EXAMPLES / "smoke.json")
@@ -39,8 +40,7 @@ def finish(store: Store) -> None:
 
 def wait_for_submission(store: Store) -> None:
     """Wait until an experiment is queued, and its watcher has printed a line."""
-    while not listing.list_experiments(store).items:
-        time.sleep(0.05)
+    wait_until(lambda: listing.list_experiments(store).items)
     time.sleep(0.5)
 
 
@@ -188,8 +188,7 @@ def test_the_catalogue_lists_every_kind_of_plug_in(gaplab: Gaplab) -> None:
 
 def checked(store: Store) -> None:
     """Run the check that is queued, as soon as one is."""
-    while (claim := sensitivity.claim(store, "test")) is None:
-        time.sleep(0.05)
+    claim = wait_until(lambda: sensitivity.claim(store, "test"))
     sensitivity.complete(store, claim, check(subject(claim.spec), SteadyState(), Effort(17, 100)))
 
 
@@ -216,8 +215,7 @@ def test_sensitivity_waits_for_a_table_and_warns(gaplab: Gaplab, sqlite_store: S
 
 def test_a_sensitivity_check_that_failed_is_a_sentence(gaplab: Gaplab, sqlite_store: Store) -> None:
     def fail() -> None:
-        while (claim := sensitivity.claim(sqlite_store, "test")) is None:
-            time.sleep(0.05)
+        claim = wait_until(lambda: sensitivity.claim(sqlite_store, "test"))
         sensitivity.fail(sqlite_store, claim, "ValueError: no legs")
 
     worker = threading.Thread(target=fail)

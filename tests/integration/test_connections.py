@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,18 +24,11 @@ from gaplab.api.process.server import Server, listen
 from gaplab.services.logs import Repeats
 from gaplab.services.settings import Limits
 from gaplab.services.store.session import Store
+from tests.waiting import wait_until
 
 DEADLINE_S = 120.0
 HALF = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "
 FILES = 128
-
-
-def within(condition: Callable[[], Any]) -> Any:
-    deadline = time.monotonic() + DEADLINE_S
-    while not (met := condition()):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-    return met
 
 
 def sent(port: int, content: bytes) -> socket.socket:
@@ -82,16 +75,16 @@ def test_more_half_sent_requests_than_files_leave_the_service_alive_and_its_log_
         assert process.stdout is not None
         port = int(process.stdout.readline())
         url = f"http://127.0.0.1:{port}"
-        within(lambda: is_alive(url))
+        wait_until(lambda: is_alive(url))
 
         with ExitStack() as half_sent:
             for _ in range(4 * FILES):
                 half_sent.enter_context(sent(port, HALF))
-            within(lambda: is_alive(url))
-            ready = within(lambda: httpx2.get(f"{url}/readyz", timeout=DEADLINE_S).status_code == 200)
+            wait_until(lambda: is_alive(url))
+            wait_until(lambda: httpx2.get(f"{url}/readyz", timeout=DEADLINE_S).status_code == 200)
 
-        assert ready
-        assert all(within(lambda: is_alive(url)) for _ in range(5))
+        for _ in range(5):
+            wait_until(lambda: is_alive(url))
     finally:
         process.terminate()
         process.communicate(timeout=60)
@@ -227,7 +220,7 @@ def test_beyond_the_most_requests_at_once_all_but_the_sign_of_life_are_refused(a
     app.add_middleware(RequestLimit, most=1)
     with serving(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http:
         with sent(port, b"POST /body HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nhalf") as served:
-            refused = within(lambda: answer if (answer := http.get("/slow")).status_code == 503 else None)
+            refused = wait_until(lambda: answer if (answer := http.get("/slow")).status_code == 503 else None)
             alive = http.get("/livez")
             served.sendall(b"rest!")
             assert served.recv(65536).startswith(b"HTTP/1.1 200 OK")

@@ -58,6 +58,7 @@ from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, some_log, toy
 from tests.integration import test_bench_safety
 from tests.integration.test_bench import compute, measure
+from tests.waiting import wait_until
 
 DEADLINE_S = 180
 OTHER = own().model_copy(update={"architecture": "riscv64"})
@@ -69,15 +70,6 @@ def told(store: Store, which: WantedEvents | None = None, after: int = 0) -> tup
 
 def kinds(store: Store, which: WantedEvents | None = None) -> list[str]:
     return [each.kind.value for each in told(store, which)]
-
-
-def within(condition: Any) -> bool:
-    deadline = time.monotonic() + DEADLINE_S
-    while not condition():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.02)
-    return True
 
 
 def test_the_life_of_an_experiment_is_told_step_by_step(store: Store) -> None:
@@ -384,7 +376,7 @@ def test_a_stream_has_what_was_and_what_comes(store: Store) -> None:
         rest = take(stream, 17)
         assert feed.open == 1
         stream.close()  # type: ignore[attr-defined]
-        assert within(lambda: feed.open == 0)
+        wait_until(lambda: feed.open == 0)
 
     assert [each.number for each in (*first, *rest)] == list(range(1, 19))
     assert rest[-1].kind is EventKind.COMPLETED
@@ -540,7 +532,7 @@ def test_a_service_that_stops_ends_its_streams(sqlite_store: Store) -> None:
     with served(sqlite_store) as (url, feed):
         listening = threading.Thread(target=follow, args=(url,))
         listening.start()
-        assert within(lambda: feed.open == 1)
+        wait_until(lambda: feed.open == 1)
 
     assert ended.wait(DEADLINE_S)
     listening.join()
@@ -585,7 +577,7 @@ def test_a_poll_may_wait_for_what_comes(sqlite_store: Store) -> None:
         asked = {"after": 1, "kind": "cancelled", "wait_s": 60}
         with ThreadPoolExecutor(1) as pool:
             answer = pool.submit(http.get, "/events/page", params=asked)  # type: ignore[arg-type]
-            assert within(lambda: feed.open == 1)
+            wait_until(lambda: feed.open == 1)
             cancel(sqlite_store, id_)
             found = answer.result(DEADLINE_S).json()
         nothing = http.get("/events/page", params={"after": 2, "wait_s": 0.1}).json()
@@ -632,7 +624,7 @@ def test_a_stream_ends_when_its_token_is_revoked_and_those_of_others_go_on(store
                 next(stream)
             with pytest.raises(ServiceError, match="this token is not valid"):
                 next(client.events())
-        assert within(lambda: feed.open == 1)
+        wait_until(lambda: feed.open == 1)
         submission.submit_experiment(store, toy())
         assert take(kept, 1)[0].number == 2
 
@@ -641,11 +633,11 @@ def test_a_stream_ends_when_its_token_is_revoked_and_those_of_others_go_on(store
 def test_a_stream_without_a_token_ends_when_tokens_are_needed(sqlite_store: Store) -> None:
     with served(sqlite_store) as (url, feed), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
         with http.stream("GET", "/events") as answer:
-            assert within(lambda: feed.open == 1)
+            wait_until(lambda: feed.open == 1)
             access.create_token(sqlite_store, Role.ADMIN)
             with suppress(httpx2.RemoteProtocolError):
                 list(answer.iter_lines())
-        assert within(lambda: feed.open == 0)
+        wait_until(lambda: feed.open == 0)
         assert http.get("/events").status_code == 401
 
 
@@ -659,7 +651,7 @@ def test_who_waits_for_events_is_refused_when_the_token_is_revoked(sqlite_store:
         ThreadPoolExecutor(1) as pool,
     ):
         answer = pool.submit(http.get, "/events/page?wait_s=60", headers=headers)
-        assert within(lambda: feed.open == 1)
+        wait_until(lambda: feed.open == 1)
         access.revoke_token(sqlite_store, token.token.id)
         refused = answer.result(DEADLINE_S)
 

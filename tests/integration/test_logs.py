@@ -14,7 +14,7 @@ import httpx2
 import pytest
 
 from gaplab.services import logs
-from tests.integration.test_api_processes import within
+from tests.waiting import wait_until
 
 SECRET = "Zm9vYmFyLTEyMzQ1"
 TOKEN = "0123456789abcdef" * 4
@@ -143,9 +143,9 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
     with log.open("wb") as output:
         process = subprocess.Popen([sys.executable, "-c", script, str(place)], stdout=output, stderr=output)
     try:
-        assert within(60, lambda: place.exists() and place.read_text())
+        wait_until(lambda: place.exists() and place.read_text())
         with httpx2.Client(base_url=f"http://127.0.0.1:{place.read_text()}", timeout=60) as http:
-            assert within(60, lambda: http.get("/readyz").status_code == 200)
+            wait_until(lambda: http.get("/readyz").status_code == 200)
             secret = {"Authorization": f"Bearer {SECRET}", "X-Token": SECRET}
             assert http.get("/experiments/abc", headers=secret).status_code == 401
             assert http.get("/experiments/abc").status_code == 404

@@ -2,8 +2,7 @@
 
 import os
 import signal
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from gaplab.workers.cluster import cluster
 from gaplab.workers.lending import SharedCall, sizes
 from gaplab.workers.pool import Pool
 from tests.processes import processes_of_ray
+from tests.waiting import wait_until
 
 SPEC = resolve_experiment(ExperimentSpec.model_validate({"strategy": "informative", "budget": "smoke"}))
 
@@ -42,20 +42,12 @@ def asked(alone: Any, genomes: Any, simulators: Any) -> Any:
     return alone.genomes.draw(genomes, rng), alone.parameters.draw(simulators, rng)
 
 
-def wait_until(ready: Callable[[], bool]) -> None:
-    """Wait without work, which would keep helpers from starting."""
-    deadline = time.monotonic() + 300
-    while not ready():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-
-
 @pytest.fixture
 def pool(alone: Any) -> Any:
     """A pool that knows how long a rollout takes, and has a helper."""
     warm = Pool(SPEC, alone.simulate, 1)
     warm(*asked(alone, 2, 1))
-    wait_until(lambda: warm.batch_size() > 1)
+    wait_until(lambda: warm.batch_size() > 1)  # without work, which would keep the helper from starting
     return warm
 
 
@@ -99,7 +91,7 @@ def test_a_long_call_gets_help_that_came_after_it_began(alone: Any, spreads: Any
     question = asked(alone, 10, 20)
 
     def slow(genomes: Any, parameters: Any) -> Any:
-        wait_until(lambda: bool(sharing._helpers.ready(*question)))
+        wait_until(lambda: sharing._helpers.ready(*question))
         return alone.simulate(genomes, parameters)
 
     sharing = Pool(SPEC, slow, 1)

@@ -9,16 +9,12 @@ import sys
 from collections.abc import Mapping
 from itertools import combinations
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from benchmarks.reproduction.tables import repetitions_in_words
 from gaplab import migrations
-from gaplab.schemas.lifecycle import State
 from gaplab.services.store.session import Store
 from tests.made_studies import STEP_S, Made, Study, archive, values
 
@@ -92,6 +88,7 @@ STUDIES = {
     "unequal": Study(AGREES, changes={"budget": {"preset": "smoke", "reuse_transfer": True}}),
     "few": Study(AGREES, repetitions=4),
     "short": Study(AGREES, samples=3),
+    "stopped": Study(AGREES, repetitions=4, more=2),
     "two": Study(only(AGREES, "simulated_fit", "random", "direct")),
     "reversed": Study(only(CONTRADICTS, "simulated_fit", "random")),
     "equal": Study(DIRECT | {"random": Made([0.5] * 7, 0.1), "known_fit": Made([0.5] * 7, 0.1)}, 160, 6),
@@ -332,22 +329,9 @@ def test_the_summary_names_what_is_shown_of_a_claim_that_is_refuted(document: Do
     assert f"(C5b; shown: {shown}; refuted: {plain} above {informative})" in short
 
 
-@pytest.mark.parametrize(
-    ("counts", "told"),
-    [
-        ({"a": (40, 40), "b": (40, 40)}, "40"),
-        ({"a": (20, 40), "b": (20, 40), "c": (19, 40), "direct": (100, 100)}, "20 of 40 (c 19; direct 100)"),
-        ({"a": (12, 12), "b": (12, 12), "c": (3, 8)}, "12 (c 3 of 8)"),
-    ],
-)
-def test_repetitions_are_told_beside_the_planned_ones(counts: Mapping[str, tuple[int, int]], told: str) -> None:
-    def arm(name: str, repetitions: int, planned: int) -> Any:
-        read, spec = SimpleNamespace(name=name, state=State.COMPLETED), SimpleNamespace(repetitions=planned)
-        return SimpleNamespace(repetitions=repetitions, read=read, spec=spec)
-
-    study: Any = SimpleNamespace(arms=[arm(name, *both) for name, both in counts.items()])
-
-    assert repetitions_in_words(study) == told
+def test_repetitions_are_told_beside_the_planned_ones(document: Document) -> None:
+    assert "repetitions: 12)" in document.text.partition("**In short**, agrees ")[2].partition("\n")[0]
+    assert "repetitions: 4 of 6)" in document.text.partition("**In short**, stopped ")[2].partition("\n")[0]
 
 
 def test_fitness_is_a_ratio_to_direct_beside_the_papers(document: Document) -> None:

@@ -17,6 +17,7 @@ import pytest
 from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
 from gaplab.services.replay.process import MOST_OUTPUT, NICENESS, AnswerCache, RolloutProcess
 from gaplab.services.waiting_line import WaitingLine
+from tests.waiting import wait_until
 
 DEADLINE_S = 120.0
 
@@ -36,13 +37,6 @@ def gone(pid: Any) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
     except OSError:
         return True
-
-
-def wait_until(holds: Any) -> None:
-    until = time.monotonic() + DEADLINE_S
-    while not holds():
-        assert time.monotonic() < until
-        time.sleep(0.05)
 
 
 def test_calls_are_executed_by_one_subprocess_of_lower_priority(rollouts: Any) -> None:
@@ -119,7 +113,7 @@ def test_of_what_a_call_prints_the_beginning_is_logged(rollouts: Any, caplog: py
 
     for word in ("first", "second"):
         assert rollouts.call(_print, word) == word
-        wait_until(lambda word=word: f"{word} to stderr" in caplog.text)
+        wait_until(lambda word=word: f"{word} to stderr" in caplog.text)  # type: ignore[misc]
     assert rollouts.call(os.write, 1, b"x" * 10_000_000) == 10_000_000
     wait_until(lambda: "no more of this call is logged" in caplog.text)
 

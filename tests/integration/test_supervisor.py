@@ -27,6 +27,7 @@ from gaplab.workers.cluster import cluster
 from gaplab.workers.ray_folder import PREFIX, ray_folder
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import toy
+from tests.waiting import wait_until
 
 DEADLINE_S = 180
 
@@ -52,17 +53,10 @@ def supervisor(sqlite_url: str, log: Path) -> Iterator["subprocess.Popen[bytes]"
     with log.open("wb") as output:
         command = [sys.executable, "-m", "gaplab.workers", "serve"]
         process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
-    wait(lambda: b"ready for" in log.read_bytes(), log)
+    wait_until(lambda: b"ready for" in log.read_bytes(), otherwise=log.read_text)
     yield process
     process.kill()
     process.wait()
-
-
-def wait(until: Any, log: Path) -> None:
-    deadline = time.monotonic() + DEADLINE_S
-    while not until():
-        assert time.monotonic() < deadline, log.read_text()
-        time.sleep(0.1)
 
 
 @pytest.mark.parametrize("part", ["raylet", "gcs_server"])
@@ -130,7 +124,7 @@ def test_a_supervisor_whose_database_is_changed_under_it_writes_nothing_more_and
     supervisor: Any, log: Path, sqlite_store: Store, sqlite_url: str, sqlite_template: Path, how: str
 ) -> None:
     file = Path(sqlite_url.removeprefix("sqlite:///"))
-    wait(lambda: owners(sqlite_store), log)
+    wait_until(lambda: owners(sqlite_store), otherwise=log.read_text)
     if how == "migrated":
         with sqlite3.connect(file, timeout=60) as connection:
             connection.execute("UPDATE alembic_version SET version_num = '9999'")
@@ -157,12 +151,12 @@ def test_a_supervisor_that_is_stopped_is_killed_and_another_goes_on(sqlite_url: 
     kept = SupervisorProcess(environment, silence=Silence(told_s=1, killed_s=15), store=store)
     kept.start()
     try:
-        wait(lambda: owners(store), tmp_path / "none")
+        wait_until(lambda: owners(store))
         (first,) = owners(store)
         os.kill(int(first.split(":")[1]), signal.SIGSTOP)
-        wait(lambda: kept.trouble, tmp_path / "none")
-        wait(lambda: owners(store) - {first}, tmp_path / "none")
-        wait(lambda: reading.read_experiment(store, experiment).state.ended, tmp_path / "none")
+        wait_until(lambda: kept.trouble)
+        wait_until(lambda: owners(store) - {first})
+        wait_until(lambda: reading.read_experiment(store, experiment).state.ended)
     finally:
         kept.stop()
 

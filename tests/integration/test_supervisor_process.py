@@ -20,7 +20,7 @@ from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution, supervisors
 from gaplab.services.store.session import Store
 from tests.experiments import toy
-from tests.integration.test_api_processes import within
+from tests.waiting import wait_until
 
 SOON = Silence(told_s=1, killed_s=3)
 
@@ -96,9 +96,9 @@ def test_a_supervisor_that_stands_still_is_killed_and_its_work_goes_to_another(
     experiment = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
     app.state.supervisor = keep(STANDS_STILL)
 
-    assert within(60, lambda: readyz(app).status_code == 503)
+    wait_until(lambda: readyz(app).status_code == 503)
     told = readyz(app).json()
-    assert within(60, lambda: len(pids(notes)) > 1)
+    wait_until(lambda: len(pids(notes)) > 1)
 
     assert told["type"] == "urn:gaplab:problem:supervisor-unavailable"
     assert "has not answered for" in told["detail"]
@@ -115,11 +115,11 @@ def test_one_that_dies_again_and_again_is_told_with_its_reason(
     monkeypatch.setattr(supervisor_process, "LONGEST_PAUSE_S", 0.1)
     app.state.supervisor = keep(DIES)
 
-    assert within(60, lambda: len(pids(notes)) > 1)
-    assert within(60, lambda: "Ray died on this machine" in readyz(app).text)
-    assert within(60, lambda: "times in a row" in readyz(app).text)
-    assert within(60, lambda: "exit code 1: Ray died on this machine" in readyz(app).text)
-    assert within(60, lambda: readyz(app).status_code == 503)
+    wait_until(lambda: len(pids(notes)) > 1)
+    wait_until(lambda: "Ray died on this machine" in readyz(app).text)
+    wait_until(lambda: "times in a row" in readyz(app).text)
+    wait_until(lambda: "exit code 1: Ray died on this machine" in readyz(app).text)
+    wait_until(lambda: readyz(app).status_code == 503)
 
 
 def test_after_a_long_life_the_trouble_is_forgotten(
@@ -128,12 +128,12 @@ def test_after_a_long_life_the_trouble_is_forgotten(
     monkeypatch.setattr(supervisor_process, "LONG_LIFE_S", 1.0)
     monkeypatch.setattr(supervisor_process, "LONGEST_PAUSE_S", 0.1)
     app.state.supervisor = keep(LIVES)
-    assert within(60, lambda: len(pids(notes)) == 1)
+    wait_until(lambda: len(pids(notes)) == 1)
 
     os.kill(pids(notes)[0], signal.SIGKILL)
-    assert within(60, lambda: "exit code -9" in readyz(app).text)
+    wait_until(lambda: "exit code -9" in readyz(app).text)
 
-    assert within(60, lambda: readyz(app).json() == {"status": "ok"})
+    wait_until(lambda: readyz(app).json() == {"status": "ok"})
     assert len(pids(notes)) == 2
 
 

@@ -5,7 +5,6 @@ import signal
 import sqlite3
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -34,6 +33,7 @@ from tests.experiments import cancel
 from tests.fakes import flat
 from tests.processes import processes_of_ray
 from tests.supervising import impatient
+from tests.waiting import wait_until
 
 DEADLINE_S = 180
 
@@ -71,13 +71,6 @@ def stored(store: Store, experiment: Any) -> Any:
         return [[flat(step) for step in found[row.id]] for row in rows]
 
 
-def wait(until: Any, do: Any = lambda: time.sleep(0.1)) -> None:
-    deadline = time.monotonic() + DEADLINE_S
-    while not until():
-        assert time.monotonic() < deadline
-        do()
-
-
 def state(store: Store, experiment: Any) -> Any:
     return reading.read_experiment(store, experiment).state
 
@@ -89,16 +82,16 @@ def attempts(store: Store, experiment: Any, repetitions: Any) -> Any:
 def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numbers(store: Store) -> None:
     experiment = submission.submit_experiment(store, spec(3)).id
     supervisor = Supervisor(store, lambda: 3)
-    wait(lambda: len(stored(store, experiment)[0]) > 1, supervisor.step)
+    wait_until(lambda: len(stored(store, experiment)[0]) > 1, meanwhile=supervisor.step)
 
     lifecycle.ask_experiment(store, experiment, Verb.PAUSE)
-    wait(lambda: state(store, experiment) is State.PAUSED, supervisor.step)
-    wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
+    wait_until(lambda: state(store, experiment) is State.PAUSED, meanwhile=supervisor.step)
+    wait_until(lambda: not (supervisor.busy or processes_of_ray("run")), meanwhile=supervisor.step)
     paused = stored(store, experiment)
     for _ in range(3):
         supervisor.step()
     lifecycle.ask_experiment(store, experiment, Verb.RESUME)
-    wait(lambda: state(store, experiment).ended, supervisor.step)
+    wait_until(lambda: state(store, experiment).ended, meanwhile=supervisor.step)
 
     found = stored(store, experiment)
     assert paused != found == expected(3)
@@ -110,29 +103,29 @@ def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sq
     experiment = submission.submit_experiment(sqlite_store, spec(3)).id
     supervisor = Supervisor(sqlite_store, lambda: 3)
     done = lambda: reading.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
-    wait(done, supervisor.step)
+    wait_until(done, meanwhile=supervisor.step)
 
     lifecycle.ask_experiment(sqlite_store, experiment, Verb.STOP)
-    wait(lambda: state(sqlite_store, experiment).ended, supervisor.step)
+    wait_until(lambda: state(sqlite_store, experiment).ended, meanwhile=supervisor.step)
 
     found = stored(sqlite_store, experiment)
     assert state(sqlite_store, experiment) is State.COMPLETED
     assert found != expected(3)
     assert [log[: len(part)] for log, part in zip(expected(3), found, strict=True)] == found
-    wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
+    wait_until(lambda: not (supervisor.busy or processes_of_ray("run")), meanwhile=supervisor.step)
 
 
 def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite_store: Store) -> None:
     large = submission.submit_experiment(sqlite_store, spec(8)).id
     supervisor = Supervisor(sqlite_store, lambda: 4)
-    wait(lambda: len(stored(sqlite_store, large)[0]) > 1, supervisor.step)
+    wait_until(lambda: len(stored(sqlite_store, large)[0]) > 1, meanwhile=supervisor.step)
     small = submission.submit_experiment(sqlite_store, spec(1, controller_evaluations=100)).id
 
-    wait(lambda: state(sqlite_store, small).ended, supervisor.step)
+    wait_until(lambda: state(sqlite_store, small).ended, meanwhile=supervisor.step)
 
     begun = [len(each) > 0 for each in stored(sqlite_store, large)]
     cancel(sqlite_store, large)
-    wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
+    wait_until(lambda: not (supervisor.busy or processes_of_ray("run")), meanwhile=supervisor.step)
     assert not all(begun)
 
 
@@ -143,7 +136,7 @@ def test_two_supervisors_on_one_database_do_nothing_twice(store: Store) -> None:
     with ThreadPoolExecutor(2) as pool:
         ends = [pool.submit(Supervisor(store, lambda: 2).serve, stop) for _ in range(2)]
         try:
-            wait(lambda: all(state(store, each).ended for each in ids))
+            wait_until(lambda: all(state(store, each).ended for each in ids))
         finally:
             stop.set()
 
@@ -162,7 +155,7 @@ def stop_outside_transactions(store: Store, pid: int) -> None:
     with closing(sqlite3.connect(store.file, timeout=DEADLINE_S, isolation_level=None)) as connection:
         connection.execute("BEGIN EXCLUSIVE")
         os.kill(pid, signal.SIGSTOP)
-        wait(lambda: psutil.Process(pid).status() == psutil.STATUS_STOPPED)
+        wait_until(lambda: psutil.Process(pid).status() == psutil.STATUS_STOPPED)
 
 
 @pytest.fixture
@@ -191,14 +184,14 @@ def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(
     impatient(monkeypatch.setattr)
     process, said = other
     experiment = submission.submit_experiment(store, spec(2)).id
-    wait(lambda: len(stored(store, experiment)[0]) > 1)
+    wait_until(lambda: len(stored(store, experiment)[0]) > 1)
 
     stop_outside_transactions(store, process.pid)
     ours = Supervisor(store, lambda: 2)
-    wait(lambda: state(store, experiment).ended, ours.step)
+    wait_until(lambda: state(store, experiment).ended, meanwhile=ours.step)
     ended = stored(store, experiment)
     os.kill(process.pid, signal.SIGCONT)
-    wait(lambda: "no longer holds its lease" in said.read_text())
+    wait_until(lambda: "no longer holds its lease" in said.read_text())
 
     tried = attempts(store, experiment, 2)
     assert ended == stored(store, experiment) == expected(2)

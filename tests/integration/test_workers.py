@@ -5,6 +5,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -43,8 +44,7 @@ from tests.arithmetic import told
 from tests.experiments import cancel
 from tests.fakes import flat, install
 from tests.processes import processes_of_ray
-
-DEADLINE_S = 180
+from tests.waiting import wait_until
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -78,10 +78,8 @@ def long_toy() -> Any:
 
 def run(supervisor: Any, store: Store, experiment: Any, until: Any = lambda: False) -> None:
     """Rounds of the supervisor until the experiment has ended, or something else is so."""
-    deadline = time.monotonic() + DEADLINE_S
-    while not (reading.read_experiment(store, experiment).state.ended or until()):
-        assert time.monotonic() < deadline
-        supervisor.step()
+    ended = lambda: reading.read_experiment(store, experiment).state.ended  # noqa: E731
+    wait_until(lambda: ended() or until(), meanwhile=supervisor.step)
 
 
 def expected(spec: Any) -> Any:
@@ -205,11 +203,11 @@ def test_permits_whose_process_was_killed_permit_again_once_they_are_renewed() -
     ask = asking(handle, key)
     renewed = lambda: handle.renew.remote([key], 1e9)  # noqa: E731
     renewed()
-    until(lambda: _answer(ask) > 0)
+    wait_until(lambda: _answer(ask) > 0)
     handle.__ray_call__.remote(lambda _: os._exit(1))
-    until(lambda: _answer(ask) <= 0)
+    wait_until(lambda: _answer(ask) <= 0)
 
-    until(lambda: renewed() and _answer(ask) > 0)
+    wait_until(lambda: renewed() and _answer(ask) > 0)
     ray.kill(handle)
 
 
@@ -237,16 +235,9 @@ def test_hardware_stops_when_its_experiment_is_cancelled_or_its_supervisor_stand
     if cancelled:
         cancel(sqlite_store, experiment)
         run(supervisor, sqlite_store, other, until=stopped)
-    until(stopped)
+    wait_until(stopped)
     assert moves.measuring_at is not None
     assert {each.state for each in waiting} == {State.QUEUED}
-
-
-def until(true: Any) -> None:
-    deadline = time.monotonic() + DEADLINE_S
-    while not true():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
 
 
 def delivering(left_out: Any, attempts: Any) -> Any:
@@ -315,13 +306,11 @@ def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_tw
     experiment = submission.submit_experiment(sqlite_store, toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 4)
 
-    deadline = time.monotonic() + DEADLINE_S
-    while reading.read_experiment(sqlite_store, experiment).state is not State.COMPLETED:
-        assert time.monotonic() < deadline
-        try:
+    def step() -> None:
+        with suppress(StoreUnavailable):
             supervisor.step()
-        except StoreUnavailable:
-            continue
+
+    wait_until(lambda: reading.read_experiment(sqlite_store, experiment).state is State.COMPLETED, meanwhile=step)
 
     assert len(calls) > 3
     assert stored(sqlite_store, experiment) == expected(toy())
@@ -338,10 +327,7 @@ def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store: Store
     )
 
     cancel(sqlite_store, experiment)
-    deadline = time.monotonic() + DEADLINE_S
-    while processes_of_ray("run"):
-        assert time.monotonic() < deadline
-        supervisor.step()
+    wait_until(lambda: not processes_of_ray("run"), meanwhile=supervisor.step)
 
     assert reading.read_experiment(sqlite_store, experiment).state is State.CANCELLED
     assert reading.read_experiment(sqlite_store, experiment).progress.iterations_done
@@ -411,10 +397,7 @@ def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sq
 
 
 def checked(store: Store, check: Any, supervisor: Any) -> Any:
-    deadline = time.monotonic() + DEADLINE_S
-    while not checks.read(store, check).state.ended:
-        assert time.monotonic() < deadline
-        supervisor.step()
+    wait_until(lambda: checks.read(store, check).state.ended, meanwhile=supervisor.step)
     return checks.read(store, check)
 
 

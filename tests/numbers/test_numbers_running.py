@@ -4,7 +4,6 @@ import lzma
 import os
 import signal
 import sqlite3
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -25,8 +24,7 @@ from gaplab.workers.supervisor import Supervisor
 from tests.numbers.keep import CHECKPOINTS
 from tests.numbers.kept_numbers import HALF_WAY, archive, members, numbers, other_machine
 from tests.processes import processes_of_ray
-
-DEADLINE_S = 400
+from tests.waiting import wait_until
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -42,10 +40,8 @@ def submit(store: Store, found: Any) -> Any:
 
 def run(supervisor: Any, store: Store, ids: Any, until: Any = lambda: False) -> None:
     """Let the supervisor work until all experiments have ended, or the condition holds."""
-    deadline = time.monotonic() + DEADLINE_S
-    while not (all(reading.read_experiment(store, each).state.ended for each in ids) or until()):
-        assert time.monotonic() < deadline
-        supervisor.step()
+    ended = lambda: all(reading.read_experiment(store, each).state.ended for each in ids)  # noqa: E731
+    wait_until(lambda: ended() or until(), meanwhile=supervisor.step)
 
 
 def stored(store: Store, ids: Any) -> Any:

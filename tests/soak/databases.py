@@ -19,6 +19,7 @@ from gaplab.services.store.session import Store
 from tests.postgres import PORT, Installation, answers, url
 from tests.proxy import Proxy
 from tests.soak.stage import Kept, send
+from tests.waiting import wait_until
 
 CLOCK_JUMP = timedelta(hours=1)
 
@@ -204,7 +205,4 @@ class Postgres:
         ]
 
     def _wait(self) -> None:
-        deadline = time.monotonic() + 60
-        while not answers(self.url):
-            assert time.monotonic() < deadline, "Postgres does not start"
-            time.sleep(0.2)
+        wait_until(lambda: answers(self.url), otherwise=lambda: "Postgres does not answer")

@@ -22,6 +22,7 @@ import httpx2
 from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
 from tests.soak import witness
+from tests.waiting import wait_until
 
 ROLLOUT_LIMIT_S = 2
 """In production it is 60 s; a worker without a rollout for 20 times as long counts as hung."""
@@ -134,7 +135,7 @@ class Stage:
         for name, module in (("service", "gaplab"), ("second", "gaplab.workers")):
             log = self._folder / f"{name}.log"
             self._kept.append(Kept([sys.executable, "-m", module, "serve"], log, self._environment))
-        assert until(self.answers, 120), self.logs()
+        wait_until(self.answers, otherwise=self.logs)
 
     def stop(self) -> Any:
         """End all in order; what did not end when asked, and what was left behind, in words."""
