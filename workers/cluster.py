@@ -28,7 +28,7 @@ class Cluster:
     """A Ray that was started or joined.
 
     Attributes:
-        workers: largest number of repetitions at once; None for the number of cores.
+        workers: largest number of repetitions at once; None for two for each core.
         versions: versions that a process must have to run a repetition. Even a Ray on this machine starts processes
             later, and files may be edited meanwhile.
         watch: watch on Ray.

@@ -12,6 +12,7 @@ from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.reruns import RepetitionRerun, RerunRead
 from gaplab.services.archives.reading import CheckedArchive, checked_archive
 from gaplab.services.archives.step_differences import difference
+from gaplab.services.core import robot_library
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.stored_specs import spec_of
@@ -39,6 +40,7 @@ class Recorded:
         number: number of the repetition, from 0.
         spec: stored spec of the experiment.
         log: steps of the repetition.
+        robots: texts of the robot files that the spec needs, for a process that does not know them.
     """
 
     experiment: str
@@ -46,6 +48,7 @@ class Recorded:
     number: int
     spec: Mapping[str, Any]
     log: tuple[Step, ...]
+    robots: tuple[str, ...] = ()
 
 
 def submitted_spec(file: IO[bytes]) -> dict[str, Any]:
@@ -102,12 +105,15 @@ def verify(
 
 
 def rerun(recorded: Recorded) -> RepetitionRerun:
-    """Recompute a repetition, and compare it step by step until one differs."""
-    same, outcome, reason = 0, "same", _obstacle(recorded)
-    if reason is not None:
-        outcome = "not computed"
-    else:
-        try:
+    """Recompute a repetition, and compare it step by step until one differs.
+
+    Any error is the reason why the repetition is not computed, and ends no other one.
+    """
+    same, outcome, reason = 0, "same", None
+    try:
+        if (reason := _obstacle(recorded)) is not None:
+            outcome = "not computed"
+        else:
             for stored, step in zip(recorded.log, _computed(recorded), strict=False):
                 if (found := difference(stored, step)) is not None:
                     kind = type(stored).__name__.lower()
@@ -117,8 +123,8 @@ def rerun(recorded: Recorded) -> RepetitionRerun:
             else:
                 if same < len(recorded.log):
                     outcome, reason = "different", f"it ends here after {same} steps"
-        except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
-            outcome, reason = "not computed", f"{type(error).__name__}: {error}"
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
+        outcome, reason = "not computed", f"{type(error).__name__}: {error}"
     return RepetitionRerun(
         experiment=recorded.experiment,
         name=recorded.name,
@@ -131,12 +137,15 @@ def rerun(recorded: Recorded) -> RepetitionRerun:
 
 
 def _computed(recorded: Recorded) -> Iterator[Step]:
+    robot_library.learn(recorded.robots)
     return repetition(setting(spec_of(recorded.spec), recorded.number))
 
 
 def _obstacle(recorded: Recorded) -> str | None:
     """Return why a repetition cannot be computed here; None if it can."""
     reality = recorded.spec["reality"]
+    if reality.get("kind") == "physical":
+        return "reality is a robot on a bench, and a measurement cannot be repeated"
     if any(value is None for value in reality["parameters"].values()):
         return "the archive hides parameters of reality"
     for name in {recorded.spec["engine"]["name"], reality["engine"]["name"]}:
@@ -153,8 +162,9 @@ def _recorded(session: Session, checked: CheckedArchive, most: int | None) -> It
     for row in experiments.get_experiments(session, list(checked.experiments)):
         repetitions = experiments.repetitions_of(session, row.id)[:most]
         found = logs.logs(session, [each.id for each in repetitions])
+        files = robot_library.needed_by(spec_of(row.spec).robot)
         for each in repetitions:
-            yield Recorded(row.id, row.name, each.number, row.spec, found[each.id])
+            yield Recorded(row.id, row.name, each.number, row.spec, found[each.id], files)
 
 
 def _other_versions(session: Session, checked: CheckedArchive) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -30,6 +31,16 @@ from tests.experiments import run, toy
 from tests.numbers.kept_numbers import FOLDER
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+QUITTER = """
+from gaplab.services.core.robots.toy_function import ToyFunction
+
+
+class Quitter(ToyFunction):
+    name = "quitter"
+
+    def motion(self, genome):
+        raise SystemExit(3)
+"""
 SMALL = {"strategies": ["simulated_fit", "direct"], "robot": "toy_function", "budget": "smoke", "seed": 2**63}
 
 
@@ -169,6 +180,23 @@ def test_what_cannot_be_computed_says_why() -> None:
     reasons = [rerun(Recorded("x", "x", 0, each, ())).reason for each in (hidden, gone)]
 
     assert reasons == ["the archive hides parameters of reality", "the engine 'fluid' is not installed here"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "error"),
+    [({"engine": None}, "TypeError"), ({"robot": {"name": "quitter", "options": {}}}, "SystemExit")],
+)
+def test_an_error_of_one_repetition_is_its_reason_and_ends_no_other(
+    put: Callable[..., Path], changes: dict[str, object], error: str
+) -> None:
+    put(quitter=QUITTER)
+    spec = resolve_experiment(toy())
+    log = tuple(repetition(setting(spec, 0)))
+
+    found = rerun(Recorded("x", "x", 0, spec.model_dump(mode="json") | changes, log))
+
+    assert found.outcome == "not computed"
+    assert str(found.reason).startswith(f"{error}: ")
 
 
 def test_zeros_of_both_signs_differ_and_nan_is_nan() -> None:

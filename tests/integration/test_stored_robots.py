@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from gaplab import migrations
 from gaplab.api.app import create_app
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import export_experiment, import_archive
+from gaplab.services.archives.rerunning import verify
 from gaplab.services.core import robot_library, world_checks
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
@@ -21,11 +23,13 @@ from gaplab.services.core.robots.robot_file import Imported
 from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments import stored_robots, submission
 from gaplab.services.experiments.listing import ListFilter, list_experiments
+from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, RobotRow
 from gaplab.services.store.session import Store
+from tests.experiments import run
 
 JSON = {"Content-Type": "application/json"}
 SPEC: dict[str, Any] = {
@@ -257,6 +261,21 @@ def test_an_archive_has_its_robots_and_brings_them(store: Store, tmp_path: Path)
 
     assert read_robot_file(stored_robots.robot_text(target, "walker")).sha256 == file.sha256
     target.dispose()
+
+
+def test_an_archive_of_a_robot_from_a_file_is_verified_in_processes_that_do_not_know_it(store: Store) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    (claim,) = execution.claim(store, "me", 1)
+    run(store, claim, repetition(setting(claim.spec, claim.number)))
+    with export_experiment(store, made.id).file as exported:
+        archive = BytesIO(exported.read())
+    robot_library._known.clear()
+
+    (found,) = verify(archive, cores=1).repetitions
+
+    assert (found.outcome, found.reason) == ("same", None)
+    assert found.steps == found.stored_steps > 0
 
 
 def test_an_archive_gives_no_name_another_meaning(store: Store, tmp_path: Path) -> None:
