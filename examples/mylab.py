@@ -23,10 +23,10 @@ class Driver:
     def run(self, motion: DriverMotion) -> float:
         """Run a motion once and return the fitness in m/s; raise gaplab.MeasurementFailed if there is none.
 
-        `motion.times_s` has the times at which targets change, `motion.targets_rad` a row of targets for each, one for
-        each name in `motion.actuators`; the run ends at `motion.observe_s[-1]`.
+        `motion.times_s` has the times at which targets change, `motion.targets` a row of targets for each: one for
+        each name in `motion.actuators`, in its unit in `motion.units`. The run ends at `motion.observe_s[-1]`.
         """
-        sent = Motion(frozen(motion.times_s), frozen(motion.targets_rad), frozen(motion.observe_s))
+        sent = Motion(frozen(motion.times_s), frozen(motion.targets), frozen(motion.observe_s))
         path = self.engine.rollouts([self.robot.world], [sent])
         return float(self.robot.fitness(path)[0, 0]) + self.noise.normal(0, 0.005)
 

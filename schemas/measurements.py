@@ -109,7 +109,9 @@ class MeasurementSpec(Frozen):
     failed: Annotated[str, Field(min_length=1, max_length=2_000)] | None = Field(
         default=None, description="why there are no values: the controller counts as tried, and teaches nothing"
     )
-    operator: Label | None = Field(default=None, description="default: who took the request")
+    operator: Label | None = Field(
+        default=None, description='default: who took the request; "unknown" if `take` is not its latest take'
+    )
     note: Annotated[str, Field(max_length=20_000)] | None = None
     attachments: tuple[Hash, ...] = Field(
         default=(), max_length=20, description="hashes of stored attachments: a trace, a photograph"

@@ -89,7 +89,7 @@ class Driver:
             raise MeasurementFailed("it fell off the table")
         worn = given.material.dynamic_friction * (1.0 - given.wear) ** run
         world = replace(self._robot.world, material=replace(given.material, dynamic_friction=worn))
-        targets = np.array(motion.targets_rad) * (1.0 - given.sag * (1.0 - left))
+        targets = np.array(motion.targets) * (1.0 - given.sag * (1.0 - left))
         trajectory = self._engine.rollouts(
             [world], [Motion(frozen(motion.times_s), frozen(targets), frozen(motion.observe_s))]
         )

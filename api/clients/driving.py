@@ -12,7 +12,7 @@ from threading import Event, Thread
 from typing import Any
 
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, refuses_sender
 from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.records import Records
 from gaplab.schemas.measurements import AnswerRead, RequestRead, RequestState
@@ -33,14 +33,16 @@ class DriverMotion:
 
     Attributes:
         actuators: their names.
+        units: unit of the targets of each: rad, rad/s or N·m for a hinge, m, m/s or N for a slide.
         times_s: times at which targets change.
-        targets_rad: a row of targets for each time.
+        targets: a row of targets for each time, with a column for each actuator.
         observe_s: times of observation; the last one ends the run.
     """
 
     actuators: tuple[str, ...]
+    units: tuple[str, ...]
     times_s: tuple[float, ...]
-    targets_rad: tuple[tuple[float, ...], ...]
+    targets: tuple[tuple[float, ...], ...]
     observe_s: tuple[float, ...]
 
 
@@ -62,7 +64,7 @@ class TakenRequest:
         """The motion to run.
 
         Raises:
-            ServiceError: the controller observes while it acts, so it has no motion: run its genome on the robot.
+            ServiceError: the controller observes while it acts, or the robot has no actuators: run the genome.
         """
         return self._driving.motion(self.request)
 
@@ -124,9 +126,8 @@ class Driving:
         self._lease_s, self._operator = lease_s, operator or socket.gethostname()
 
     def tasks(self, experiment: str | None, bench: str | None) -> Iterator[TakenRequest]:
-        """Yield taken requests until the experiment has ended."""
-        for id_, answer, key in self.journal.unsent():
-            self._deliver(id_, answer, key)
+        """Yield taken requests until the experiment has ended; send first what an earlier run left in the journal."""
+        self._send_leftovers()
         while True:
             request = self._next(experiment, bench)
             if request is None:
@@ -150,6 +151,20 @@ class Driving:
         """
         return self._deliver(request.id, answer, self.journal.answer(request.id, answer))
 
+    def _send_leftovers(self) -> None:
+        """Send the answers that an earlier run left in the journal; one that is refused does not stop the others.
+
+        Raises:
+            ServiceError: the service refuses the token of the driver; the answers stay in the journal.
+        """
+        for request, answer, key in self.journal.unsent():
+            try:
+                self._deliver(request, answer, key)
+            except ServiceError as error:
+                if refuses_sender(error):
+                    raise
+                log.error("the answer %s in the journal, to request %s, is refused: %s", answer, request, error)
+
     def _deliver(self, request: str, answer: dict[str, Any], key: str) -> AnswerRead:
         path = f"/requests/{segment(request)}/measurements"
         while True:
@@ -160,7 +175,8 @@ class Driving:
                 time.sleep(PAUSE_S)
             except ServiceError as error:
                 if error.problem.status < 500 and error.problem.status != 429:
-                    self.journal.sent(key)
+                    if not refuses_sender(error):
+                        self.journal.sent(key)
                     raise
                 log.warning("not taken yet: %s", error)
                 time.sleep(PAUSE_S)
@@ -170,20 +186,20 @@ class Driving:
 
     def _next(self, experiment: str | None, bench: str | None) -> RequestRead | None:
         """Take the oldest open request; None if there is none, or others have the bench."""
+        parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": WAIT_S}
+        request = None
         try:
-            parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": WAIT_S}
-            found = self._connection.get(Page[RequestRead], "/requests", **parameters).items
+            for request in self._connection.items(Page[RequestRead], "/requests", **parameters):
+                if request.state is RequestState.OPEN and not request.busy:
+                    with suppress(ServiceError):
+                        return self._take(request)
         except (ServiceUnreachable, ServiceError) as error:
             if isinstance(error, ServiceError) and error.problem.status < 500:
                 raise
             log.warning("no answer: %s", error)
             time.sleep(PAUSE_S)
             return None
-        for request in found:
-            if request.state is RequestState.OPEN and not request.busy:
-                with suppress(ServiceError):
-                    return self._take(request)
-        if found:
+        if request is not None:
             time.sleep(PAUSE_S)
         return None
 
@@ -196,8 +212,9 @@ class Driving:
         found = json.loads(self._connection.get_bytes(f"/requests/{segment(request.id)}/motion", format="json"))
         return DriverMotion(
             actuators=tuple(found["actuators"]),
+            units=tuple(found["units"]),
             times_s=tuple(found["times_s"]),
-            targets_rad=tuple(map(tuple, found["targets_rad"])),
+            targets=tuple(map(tuple, found["targets"])),
             observe_s=tuple(found["observe_s"]),
         )
 

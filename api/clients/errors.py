@@ -21,7 +21,7 @@ class ServiceError(Exception):
 
 
 class ServiceUnreachable(Exception):
-    """No service answers at the address."""
+    """No service answers at the address, or none in time."""
 
 
 class UnknownService(ServiceUnreachable):
@@ -48,6 +48,11 @@ class ExtraMissing(ImportError):
 def is_final(error: Exception) -> bool:
     """Return whether a repeated request would fail the same way."""
     return isinstance(error, ServiceError) and error.problem.status < 500
+
+
+def refuses_sender(error: ServiceError) -> bool:
+    """Return whether the service refused the token, and not what was sent with it."""
+    return error.problem.status in {401, 403}
 
 
 def lines_of(problem: Problem) -> list[str]:

@@ -6,6 +6,7 @@ from anyio.to_thread import run_sync
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
+from gaplab.api.http.attachments import saved_as
 from gaplab.api.http.dependencies import Id, Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.measurements import AttachmentRead
@@ -43,6 +44,5 @@ async def store_attachment(
 def read_attachment(id: Id, store: StoreDep) -> Response:
     """Return a stored file, to be saved: a browser must not run what somebody sent."""
     found, content = attachments.read_attachment(store, id)
-    name = "".join(sign if sign.isalnum() or sign in "._-" else "_" for sign in found.name)
-    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    headers = {"Content-Disposition": saved_as(found.name)}
     return Response(content, media_type="application/octet-stream", headers=headers)

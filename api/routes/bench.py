@@ -44,13 +44,14 @@ _MOTIONS = {"csv": ("text/csv", "csv"), "json": ("application/json", "json"), "r
 _MOTION: Responses = {
     200: {
         "content": {
-            "text/csv": {"schema": {"type": "string"}, "example": "time_s,front_left_knee\n0.0,0.12\n"},
+            "text/csv": {"schema": {"type": "string"}, "example": "time_s,front_left_knee (rad)\n0.0,0.12\n"},
             "application/json": {
                 "schema": {"type": "object"},
                 "example": {
                     "actuators": ["front_left_knee"],
+                    "units": ["rad"],
                     "times_s": [0.0],
-                    "targets_rad": [[0.12]],
+                    "targets": [[0.12]],
                     "observe_s": [0.75],
                 },
             },
@@ -104,7 +105,10 @@ def read_request(id: Id, store: StoreDep) -> RequestRead:
     responses={**_MOTION, **documented(404, 409, 422)},
 )
 def read_motion(id: Id, query: Annotated[MotionQuery, Query()], store: StoreDep) -> Response:
-    """Return the targets of the actuators over time; 409 for a controller that observes the robot while it acts."""
+    """Return the targets of the actuators over time, with the unit of each.
+
+    A controller that observes the robot while it acts, or of a robot without actuators, has none: 409.
+    """
     media_type, ending = _MOTIONS[query.format]
     return attachment(motions.request_motion(store, id, query.format), media_type, f"motion-{id}.{ending}")
 

@@ -27,6 +27,9 @@ from gaplab.services.store.queries.request_states import become
 from gaplab.services.store.session import Session, Store
 from gaplab.services.store.statements import storable
 
+UNKNOWN = "unknown"
+"""Operator of an answer that names none, and whose take is not the latest one."""
+
 
 class AddressedAnswer(MeasurementSpec):
     """An answer with the request that it is of, so that an idempotency key fits this request alone."""
@@ -40,7 +43,8 @@ def answer(
     """Store an answer to a request; it counts if the request is still wanted and nobody else holds it.
 
     An answer that came late counts unless somebody else took or answered the request meanwhile. Then it is kept as a
-    conflict. The answer that counts, sent twice, is stored once.
+    conflict. The answer that counts, sent twice, is stored once, also if parts of it are left out the second time. With
+    another value, reading, note, attachment or operator it is a conflict too.
 
     Args:
         store: the database.
@@ -72,7 +76,7 @@ def _answer(
         msg = f"request {row.id} is wanted no more: its experiment has ended, or a correction closed its branch"
         raise Conflict(msg)
     counted = requests.counted_answer(session, row) if row.state in requests.ANSWERED else None
-    if counted is not None and _says_the_same(counted, spec):
+    if counted is not None and _says_nothing_new(counted, spec):
         return view_answer(counted)
     counts = counted is None and (row.state is not RequestState.TAKEN or spec.take == row.takes)
     given = insert_answer(session, row, spec, AnswerState.COUNTED if counts else AnswerState.CONFLICT, token)
@@ -98,21 +102,17 @@ def _stored(trace: AlignedTrace) -> dict[str, Any]:
 def insert_answer(
     session: Session, row: RequestRow, spec: MeasurementSpec, state: AnswerState, token: str | None
 ) -> AnswerRow:
-    """Store an answer as it was given."""
+    """Store an answer as it was given; without an operator, the holder of its take, if that is the latest one."""
+    parts, holder = _parts(spec), row.taken_by if spec.take == row.takes else None
     given = AnswerRow(
         id=new_id(),
         repetition_id=row.repetition_id,
         request_id=row.id,
         take=spec.take,
         state=state,
-        values=None if spec.values is None else list(spec.values),
-        readings=None if spec.readings is None else [[list(each) for each in table] for table in spec.readings],
-        failed=spec.failed,
-        operator=storable(spec.operator or row.taken_by or "unknown"),
-        note=None if spec.note is None else storable(spec.note),
-        attachments=list(spec.attachments) or None,
         token_id=token,
         at=moment(session),
+        **parts | {"operator": parts["operator"] or holder or UNKNOWN},
     )
     session.add(given)
     session.flush()
@@ -135,8 +135,21 @@ def note_answer(
     note(session, kind, repetition.experiment_id, repetition.number, **body)
 
 
-def _says_the_same(counted: AnswerRow, spec: MeasurementSpec) -> bool:
-    """Return whether an answer that was sent again is the one that counts."""
-    values = None if spec.values is None else list(spec.values)
+def _parts(spec: MeasurementSpec) -> dict[str, Any]:
+    """Return the parts of an answer by column, as they are stored; None for a part that is left out."""
+    return {
+        "values": None if spec.values is None else list(spec.values),
+        "readings": None if spec.readings is None else [[list(each) for each in table] for table in spec.readings],
+        "failed": None if spec.failed is None else storable(spec.failed),
+        "operator": None if spec.operator is None else storable(spec.operator),
+        "note": None if spec.note is None else storable(spec.note),
+        "attachments": list(spec.attachments) or None,
+    }
+
+
+def _says_nothing_new(counted: AnswerRow, spec: MeasurementSpec) -> bool:
+    """Return whether each part of an answer is in the one that counts already, as of an answer that is sent again."""
+    parts = _parts(spec)
+    attached = set(parts.pop("attachments") or ()) <= set(counted.attachments or ())
     same_take = spec.take is None or counted.take == spec.take
-    return same_take and counted.values == values and counted.failed == spec.failed
+    return same_take and attached and all(not part or getattr(counted, name) == part for name, part in parts.items())

@@ -128,6 +128,17 @@ class Answers:
         """Return the cost of the step so far; `budget` is the number of rollouts that it was given."""
         return Cost(self._rollouts, self._failures, budget - self._rollouts)
 
+    def cost_within(self, budget: int, source: str) -> Cost:
+        """Return the same; `source` says whose budget it is.
+
+        Raises:
+            PluginBroken: the step took more rollouts.
+        """
+        cost = self.cost_of(budget)
+        if cost.saved < 0:
+            raise PluginBroken(f"{source} took {cost.rollouts} rollouts; permitted: at most {budget}")
+        return cost
+
     def _fetched(
         self, genomes: Genomes, blocks: list[Parameters], keys: list[list[bytes]], following: Following
     ) -> dict[bytes, FloatArray]:

@@ -25,7 +25,7 @@ class Motion:
 
     Attributes:
         times_s: `(k,)`, ascending from 0: times at which targets change.
-        targets: `(k, a)`, rad for a hinge: targets from each time on.
+        targets: `(k, a)`: targets from each time on, in the unit of what each motor follows: rad for a servo's hinge.
         observe_s: `(t,)`, ascending: times of observation; the last one ends the rollout.
         start_tilt_rad: rotation of the base at time 0, about x and y of the world.
     """

@@ -11,7 +11,7 @@ from playwright.sync_api import Error, expect
 from sqlalchemy import update
 
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
-from gaplab.services.bench import answering, taking
+from gaplab.services.bench import answering, attachments, taking
 from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.experiments.submission import submit_experiment
@@ -213,8 +213,10 @@ def test_what_was_sent_is_corrected_and_voided_after_what_follows_is_said(visit:
 def test_conflicts_are_decided_stuck_requests_opened_and_refusals_shown(visit: Any, api: Any, written: Store) -> None:
     visit.forgive("422", "409")
     experiment, request = asked(written, "yard", reality={"repeats": 1})
-    for value in (0.3, 0.4):
-        answering.answer(written, request.id, MeasurementSpec(values=(value,), operator=f"of {value}"), FREELY)
+    trace = attachments.store_attachment(written, b"seen", "trace.csv", "text/csv").id
+    for value, files in ((0.3, ()), (0.4, (trace,))):
+        answer = MeasurementSpec(values=(value,), operator=f"of {value}", attachments=files)
+        answering.answer(written, request.id, answer, FREELY)
     compute(written)
     (stuck,) = waiting(written, experiment)
     for _ in range(5):
@@ -223,6 +225,7 @@ def test_conflicts_are_decided_stuck_requests_opened_and_refusals_shown(visit: A
 
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
     page.get_by_role("heading", name="Conflicts to decide").wait_for()
+    expect(page.get_by_text("by of 0.4, ")).to_contain_text(", with 1 file")
     axe(page)
     screenshot(page, "bench-conflict")
     page.get_by_role("button", name="This one counts…: 0.4").click()

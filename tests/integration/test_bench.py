@@ -19,6 +19,7 @@ from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, TakeSpec
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives import export_experiment, import_archive
+from gaplab.services.archives.rerunning import verify
 from gaplab.services.bench import answering, attachments, corrections, taking
 from gaplab.services.bench.branches import list_branches
 from gaplab.services.bench.taking import RequestFilter
@@ -413,6 +414,16 @@ def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) 
     for each in (first, second):
         (found,) = log_of(other, each)
         assert all(map(same, found, expected))
+
+
+def test_measurements_of_an_archive_are_not_computed_again_and_it_says_why(sqlite_store: Store) -> None:
+    experiment = submit_experiment(sqlite_store, bench())
+    finish(sqlite_store, lambda _: 0.5)
+
+    found = verify(BytesIO(exported(export_experiment(sqlite_store, experiment.id))), cores=1)
+
+    assert (found.same, found.different, found.not_computed) == (0, 0, 1)
+    assert found.repetitions[0].reason == "reality is a robot on a bench, and a measurement cannot be repeated"
 
 
 def test_a_deleted_experiment_leaves_no_requests(store: Store) -> None:

@@ -1,12 +1,19 @@
 """The commands for a robot on a bench, on a service in a thread."""
 
+import io
 import json
+import sys
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
+from gaplab import Client
+from gaplab.api.clients.progress import log
+from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
+from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
@@ -29,7 +36,7 @@ def test_a_request_is_read_moved_answered_and_corrected(sqlite_store: Store, gap
 
     assert request.id in gaplab("requests").out
     assert f"{request.id} is open" in gaplab("requests", request.id).out
-    assert gaplab("motion", request.id, "--format", "json").out.startswith("{")
+    assert "has no actuators" in gaplab("motion", request.id, "--format", "json").err
     said = gaplab("measured", request.id, "4.4", "--note", "cold", "--json")
     answer = json.loads(said.out)["id"]
     assert "would be done" in gaplab("correct", answer, "0.44", "--reason", "4.4 was 0.44", "--dry-run").out
@@ -83,3 +90,63 @@ def test_what_one_takes_home_is_saved_as_a_zip_or_a_page(sqlite_store: Store, ga
     assert "controller.json" in zipfile.ZipFile(tmp_path / "home.zip").namelist()
     assert "<!doctype html>" in (tmp_path / "home.html").read_text().lower()
     assert "permitted: .zip, .html" in gaplab("takehome", request.experiment, "home.pdf").err
+
+
+def test_an_experiment_that_waits_for_its_robot_is_listed_shown_and_watched(
+    sqlite_store: Store, gaplab: Gaplab, url: str
+) -> None:
+    id_ = asked(sqlite_store, iterations=1).experiment
+    watched = io.StringIO()
+
+    listings = [gaplab("list"), gaplab("list", "--experiments"), gaplab("show", id_)]
+    with Client(url) as client:
+        log.show([Snapshot((RecordProgress(client.experiment(id_)),))], Console(file=watched, width=160))
+
+    assert [said.code for said in listings] == [0, 0, 0]
+    assert all("WAITING" in said.out for said in listings)
+    assert "rollouts" in watched.getvalue()
+    assert "; WAITING" in watched.getvalue()
+    assert "time left" not in watched.getvalue()
+
+
+def test_a_negative_value_is_a_number_and_a_misspelt_option_is_none(sqlite_store: Store, gaplab: Gaplab) -> None:
+    request = asked(sqlite_store, iterations=1, reality=PHYSICAL | {"repeats": 2})
+
+    misspelt = gaplab("measured", request.id, "-0.3", "0.1", "--nte", "cold")
+    answer = json.loads(gaplab("measured", request.id, "-.3", "-1e-3", "--note", "cold", "--json").out)
+    corrected = gaplab("correct", answer["id"], "--reason", "the sign", "-0.4", "0.001")
+    read = gaplab("requests", request.id).out
+
+    assert (misspelt.code, "No such option: --nte" in misspelt.err) == (Exit.USAGE, True)
+    assert (answer["values"], answer["note"]) == ([-0.3, -0.001], "cold")
+    assert corrected.code == 0
+    assert "counted: -0.4, 0.001" in read
+
+
+@pytest.mark.parametrize("command", [("correct", "m1", "0.3"), ("void", "m1"), ("decide", "m1", "this")])
+def test_a_reason_is_asked_for_before_the_service_is(gaplab: Gaplab, command: tuple[str, ...]) -> None:
+    said = gaplab(*command)
+
+    assert (said.code, "Missing option '--reason'" in said.err) == (Exit.USAGE, True)
+
+
+def test_all_requests_are_listed_on_one_line_each(sqlite_store: Store, gaplab: Gaplab) -> None:
+    reality = PHYSICAL | {"bench": "the long table at the window of the second laboratory"}
+    asked(sqlite_store, iterations=1, repetitions=55, reality=reality)
+
+    listed, printed = json.loads(gaplab("requests", "--json").out), gaplab("requests").out
+
+    assert len(listed) == 55
+    assert all(printed.count(request["id"]) == 1 for request in listed)
+    assert printed.count(reality["bench"]) == 55
+
+
+def test_a_recording_that_a_missing_library_reads_is_refused_with_a_sentence(
+    gaplab: Gaplab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mcap.exceptions", None)
+
+    said = gaplab("traces", "r1", str(tmp_path / "x.mcap"))
+
+    assert said.code == Exit.FAILED
+    assert said.err == "gaplab: this needs mcap, which is not installed: pip install 'gaplab[mcap]'\n"

@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from gaplab import Client, ServiceError
+from gaplab.api.clients import driving
 from gaplab.api.clients.journal import Journal
 from gaplab.services.store.session import Store
 from tests.experiments import toy
@@ -62,7 +63,8 @@ def test_a_driver_is_a_loop_of_one_line(client: Client) -> None:
     asked = []
     for request in client.requests(experiment.id):
         asked.append((request.request.iteration, request.request.kind.value))
-        assert request.motion.observe_s == (0.0, 1.0) or request.motion.observe_s
+        with pytest.raises(ServiceError, match="has no actuators"):
+            _ = request.motion
         request.tell(fitness(request))
     assert asked == [(0, "probe"), (1, "sample"), (1, "probe"), (2, "sample"), (2, "probe")]
     assert client.experiment(experiment.id).state == "COMPLETED"
@@ -112,6 +114,64 @@ def test_an_answer_in_the_journal_is_sent_when_the_driver_starts_again(client: C
         assert following.id != request.id
         break
     assert client.bench.request(request.id).state == "measured"
+
+
+@pytest.mark.usefixtures("computing")
+def test_an_answer_in_the_journal_that_is_refused_holds_no_other_back(
+    client: Client, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    ended, running = submitted(client, bench="a"), submitted(client, bench="b")
+    (wanted_no_more,) = client.bench.pending(ended.id, wait_s=60)
+    (wanted,) = client.bench.pending(running.id, wait_s=60)
+    client.cancel(ended.id)
+    with Journal(tmp_path / "journal") as journal:
+        journal.answer(wanted_no_more.id, {"values": [0.25]})
+        journal.answer(wanted.id, {"values": [0.5]})
+
+    following = next(client.requests(running.id, journal=tmp_path / "journal"))
+
+    assert following.id != wanted.id
+    assert client.bench.request(wanted.id).answers[0].values == (0.5,)
+    assert f"the answer {{'values': [0.25]}} in the journal, to request {wanted_no_more.id}, is refused" in caplog.text
+    assert "is wanted no more" in caplog.text
+    with Journal(tmp_path / "journal") as journal:
+        assert journal.unsent() == []
+
+
+def test_a_driver_finds_an_open_request_behind_a_page_of_those_of_a_busy_bench(
+    client: Client, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(driving, "time")  # a pause of the driver is an error here
+    many = client.submit(SPEC | {"repetitions": 52, "reality": REALITY | {"bench": "a"}})
+    compute(store)
+    free = submitted(client, bench="b")
+    compute(store)
+    busy: Any = client.requests(many.id)
+    next(busy)
+
+    found = next(client.requests(operator="other"))
+
+    assert found.request.experiment == free.id
+    assert len(client.bench.pending()) == 53
+    busy.close()
+
+
+@pytest.mark.parametrize("status", [401, 403])
+def test_answers_stay_in_the_journal_while_the_token_is_refused(
+    client: Client, network: InProcess, store: Store, tmp_path: Path, status: int
+) -> None:
+    submitted(client)
+    compute(store)
+    (request,) = client.bench.pending()
+    with Journal(tmp_path / "journal") as journal:
+        journal.answer(request.id, {"values": [0.5]})
+    network.busy, network.status = 1, status
+
+    with pytest.raises(ServiceError):
+        next(client.requests(journal=tmp_path / "journal"))
+
+    with Journal(tmp_path / "journal") as journal:
+        assert [answer for _, answer, _ in journal.unsent()] == [{"values": [0.5]}]
 
 
 @pytest.mark.parametrize(
@@ -176,11 +236,15 @@ def test_a_motion_leaves_in_three_formats(client: Client, store: Store) -> None:
     lines = client.bench.motion(request.id).splitlines()
     plain = json.loads(client.bench.motion(request.id, "json"))
     points = yaml.safe_load(client.bench.motion(request.id, "ros2"))
-    assert lines[0].split(",")[1:] == plain["actuators"] == points["joint_names"]
-    assert [float(number) for number in lines[1].split(",")[1:]] == plain["targets_rad"][0]
+    assert plain["actuators"] == points["joint_names"]
+    assert lines[0].split(",")[1:] == [f"{name} (rad)" for name in plain["actuators"]]
+    assert [float(number) for number in lines[1].split(",")[1:]] == plain["targets"][0]
     times = [each["time_from_start"]["sec"] + each["time_from_start"]["nanosec"] / 1e9 for each in points["points"]]
     assert times == sorted(set(times))
     assert times[-1] == plain["observe_s"][-1] == float(lines[-1].split(",")[0])
+    driven = next(client.requests(experiment.id)).motion
+    assert (list(driven.actuators), list(driven.units)) == (plain["actuators"], plain["units"])
+    assert ([list(row) for row in driven.targets], set(driven.units)) == (plain["targets"], {"rad"})
 
 
 def test_attachments_are_stored_once_and_never_shown_by_a_browser(client: Client, tmp_path: Path) -> None:
@@ -192,6 +256,22 @@ def test_attachments_are_stored_once_and_never_shown_by_a_browser(client: Client
         assert answer.read() == page.read_bytes()
         assert answer.headers["content-type"] == "application/octet-stream"
         assert "attachment" in answer.headers["content-disposition"]
+
+
+@pytest.mark.parametrize(
+    ("name", "plain", "quoted"),
+    [
+        ("测试.csv", "__.csv", "%E6%B5%8B%E8%AF%95.csv"),
+        ("größe 3.csv", "gr__e_3.csv", "gr%C3%B6%C3%9Fe%203.csv"),
+        ('..\\a"\r\nb\u202e', ".._a___b_", ".._a%22__b_"),
+    ],
+)
+def test_an_attachment_keeps_its_name_in_any_script(client: Client, name: str, plain: str, quoted: str) -> None:
+    stored = client.bench._attach(name, name.encode(), "text/csv")
+    with client._connection.stream("GET", f"/attachments/{stored.id}") as answer:
+        assert answer.read() == name.encode()
+        told = answer.headers["content-disposition"]
+    assert told == f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quoted}"
 
 
 def test_a_table_of_samples_is_checked_and_used(client: Client, tmp_path: Path) -> None:

@@ -1,11 +1,13 @@
 // @ts-check
 /** Conflicts: several answers to one request, of which a person lets one count. */
 
-import { byOperator, keyed, whatFollows } from "../../lib/bench/corrections.js";
+import { ageOf } from "../../lib/ages.js";
+import { byOperator, whatFollows } from "../../lib/bench/corrections.js";
 import { answerText, requestWords } from "../../lib/bench/values.js";
 import { openDialog } from "../../lib/dialog.js";
 import { h } from "../../lib/dom.js";
-import { age, readableName } from "../../lib/format.js";
+import { readableName } from "../../lib/format.js";
+import { keyed } from "../../lib/keyed.js";
 
 /**
  * Return the conflicts; nothing if there are none.
@@ -34,11 +36,18 @@ function conflict(request, view) {
     };
     const button = (/** @type {string} */ label, /** @type {"this" | "other"} */ counts) =>
       h("button", { type: "button", class: "quiet small", "aria-label": `${label}: ${answerText(answer, request.unit)}, by ${answer.operator}`, onclick: press(counts) }, label);
-    return h("li", {}, h("strong", {}, answerText(answer, request.unit)), h("span", { class: "note" }, ` by ${answer.operator}, ${age(answer.at)}${answer.note ? `: ${answer.note}` : ""}`),
+    return h("li", {}, h("strong", {}, answerText(answer, request.unit)), h("span", { class: "note" }, ` by ${answer.operator}, `, ageOf(answer.at), `${partsOf(answer)}${answer.note ? `: ${answer.note}` : ""}`),
       answer.state === "counted" ? h("span", {}, "✓ counts now") : h("span", {}, button("This one counts…", "this"), " ", button("Dismiss it…", "other")), error);
   });
   return h("div", {}, h("h3", {}, `${readableName(request.robot)}, ${requestWords(request)}`), h("ul", { class: "rows" }, ...rows));
 }
+
+/**
+ * Return what an answer has beside its values, since answers in conflict may differ in that alone.
+ *
+ * @param {Api.AnswerRead} answer
+ */
+const partsOf = ({ readings, attachments: { length } }) => `${readings ? ", with readings" : ""}${length ? `, with ${length} ${length === 1 ? "file" : "files"}` : ""}`;
 
 /**
  * Ask why, and say first what follows.
