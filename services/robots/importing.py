@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from gaplab.schemas.robots import RobotSource
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
 from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot_file
 from gaplab.services.core.world import Body, Joint, Material, Surfaces, World
-from gaplab.services.robots.bodies import Bodies
+from gaplab.services.robots.bodies import Bodies, joint_name
 from gaplab.services.robots.motors import with_motors, with_swings
 from gaplab.services.robots.notes import Notes
 from gaplab.services.robots.options import ImportOptions
@@ -167,9 +168,7 @@ def _note_losses(source: Source, notes: Notes) -> None:
     if source.is_urdf:
         return
     notes.lose("soft contacts and limits (solref, solimp, margin, condim, priority, cone) are lost: contacts are rigid")
-    springs = [str(model.joint(at).name) for at in range(model.njnt) if model.jnt_stiffness[at]]
-    if springs:
-        notes.lose("springs of joints are lost: {}", *springs)
+    _note_forces(model, notes)
     for field, what in (("nsensor", "sensors"), ("nexclude", "excluded contacts"), ("npair", "pairs of contacts")):
         if count := int(getattr(model, field, 0)):
             notes.lose(f"{count} {what} are lost")
@@ -178,6 +177,22 @@ def _note_losses(source: Source, notes: Notes) -> None:
     for field, what in (("density", "air or water"), ("viscosity", "air or water"), ("wind", "wind")):
         if np.any(getattr(model.opt, field)):
             notes.lose(f"{what} ({field}) is lost")
+
+
+def _note_forces(model: Any, notes: Notes) -> None:  # noqa: ANN401
+    """Note springs, compensation of gravity and coefficients of damping, which a World has not."""
+    bodies = [body_name(model, at) for at in range(model.nbody)]
+    joints = [joint_name(model, at) for at in range(model.njnt)]
+    owners = [joints[joint] for joint in model.dof_jntid]
+    springs = np.logical_or(model.jnt_stiffness, model.jnt_stiffnesspoly.any(axis=1))
+    for line, names, has in (
+        ("springs of joints are lost: {}", joints, springs),
+        ("compensation of gravity (gravcomp) is lost: {}", bodies, model.body_gravcomp),
+        ("compensation of gravity by motors (actuatorgravcomp) is lost: {}", joints, model.jnt_actgravcomp),
+        ("damping is linear; its other coefficients are lost: {}", owners, model.dof_dampingpoly.any(axis=1)),
+    ):
+        if found := list(compress(names, has)):
+            notes.lose(line, *found)
 
 
 def _masses(source: Source, bodies: Bodies) -> Iterator[MassRow]:

@@ -22,10 +22,11 @@ ROUNDING = 1e-6
 
 def hold(base: Any, notes: Notes) -> None:  # noqa: ANN401
     """Give a base that never moves a mass and an inertia, if it has none: no number depends on it."""
-    if base.explicitinertial and (base.mass <= 0 or min(_moments(base)) <= 0):
+    if _is_empty(base):
+        _state(base)
         base.mass = max(base.mass, HELD_KG)
         _change(base, HELD_KG)
-        notes.lose("{} has no mass or no inertia, but never moves: it gets 1 kg m²", base.name)
+        notes.lose("{} has no mass or no inertia, but never moves: it gets 1 kg m²", base.name or "the base")
 
 
 def mend(spec: Any, notes: Notes, moved: set[str], *, allowed: bool) -> None:  # noqa: ANN401
@@ -41,20 +42,19 @@ def mend(spec: Any, notes: Notes, moved: set[str], *, allowed: bool) -> None:  #
         allowed: whether to replace it.
     """
     empty = []
+    is_bounded = min(spec.compiler.boundmass, spec.compiler.boundinertia) > 0  # MuJoCo then gives each body some
     for at, body in enumerate(spec.bodies):
         name = body.name or f"body{at}"
-        if at == 0 or not body.explicitinertial:
-            continue
         moments = _moments(body)
-        if max(moments) > (sum(moments) - max(moments)) * (1 + ROUNDING):
+        if body.explicitinertial and max(moments) > (sum(moments) - max(moments)) * (1 + ROUNDING):
             given = ", ".join(f"{moment:.4g}" for moment in moments)
             mean = float(np.mean(moments))
             _change(body, mean) if allowed else None
             _note(notes, allowed, f"{name}: moments {given} kg m² break the triangle inequality", f"{mean:.4g} each")
-        elif name in moved and not _carried(body) and (body.mass <= 0 or min(moments) <= 0):
-            empty.append((body, name))
+        elif name in moved and not is_bounded and not _carried(body) and _is_empty(body):
+            empty.append((at, body, name))
     if not allowed:
-        for body, name in empty:
+        for _, body, name in empty:
             _note(notes, allowed, f"{name} moves, but has mass {body.mass:.4g} kg and a moment of inertia of 0", "")
         return
     if empty:
@@ -82,25 +82,50 @@ def _change(body: Any, *moments: float) -> None:  # noqa: ANN401
     body.inertia = moments * (1 if len(moments) == 3 else 3)
 
 
+def _is_empty(body: Any) -> bool:  # noqa: ANN401
+    """Return whether a body has no mass or no inertia."""
+    if not body.explicitinertial:
+        return not _has_mass(body)
+    return bool(body.mass <= 0 or min(_moments(body)) <= 0)
+
+
 def _carried(body: Any) -> bool:  # noqa: ANN401
     """Return whether a massless body has its mass from bodies that are fixed to it."""
-    return body.mass <= 0 and any(child.mass > 0 and not child.joints for child in body.bodies)
+    return body.mass <= 0 and any(_has_mass(child) for child in body.bodies if not child.joints)
 
 
-def _fill(spec: Any, empty: list[tuple[Any, str]], notes: Notes) -> None:  # noqa: ANN401
+def _has_mass(body: Any) -> bool:  # noqa: ANN401
+    """Return whether a body has mass: its own, that of its shapes, or that of bodies that are fixed to it."""
+    has_own = body.mass > 0 if body.explicitinertial else any(map(_is_heavy, body.geoms))
+    return has_own or any(_has_mass(child) for child in body.bodies if not child.joints)
+
+
+def _is_heavy(geom: Any) -> bool:  # noqa: ANN401
+    return bool(geom.density > 0 if np.isnan(geom.mass) else geom.mass > 0)
+
+
+def _state(body: Any) -> None:  # noqa: ANN401
+    """Let a body whose mass would be that of its shapes have one of its own, with its centre at the origin."""
+    if not body.explicitinertial:
+        body.explicitinertial, body.ipos = True, [0.0] * 3
+
+
+def _fill(spec: Any, empty: list[tuple[int, Any, str]], notes: Notes) -> None:  # noqa: ANN401
     """Give bodies the inertia of their shapes: a copy of the spec is compiled, in which MuJoCo computes it."""
     copy = spec.copy()
-    for body, _ in empty:
-        twin = copy.bodies[body.id] if not body.name else copy.body(body.name)
-        if twin.geoms:
+    for at, _, _ in empty:
+        twin = copy.bodies[at]
+        if any(map(_is_heavy, twin.geoms)):
             twin.explicitinertial, twin.ipos = False, [np.nan] * 3  # MuJoCo computes what has no centre of mass
         else:
+            _state(twin)
             twin.mass = 1.0
             _change(twin, GYRATION_M**2)
     model = copy.compile()
-    for body, name in empty:
-        found = model.body(name)
+    for at, body, name in empty:
+        found = model.body(at)
         before = body.mass
+        _state(body)
         body.mass = max(before, LEAST_KG)
         moments = found.inertia * body.mass / float(found.mass[0])
         _change(body, *moments.tolist())

@@ -1,6 +1,6 @@
 """Motors of joints: those of an MJCF, or one kind for all joints of a URDF, which has none."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -9,6 +9,7 @@ import numpy as np
 
 from gaplab.services.core.world import Joint, Motor, PDMotor
 from gaplab.services.robots.bodies import joint_name
+from gaplab.services.robots.joint_inertias import joint_inertias
 from gaplab.services.robots.notes import Notes, listed
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.reading import Source, mujoco_library
@@ -25,6 +26,9 @@ SWING_RAD, SWING_M = 0.5, 0.02
 BOUNDLESS_RAD = np.pi
 """Error for which a motor without a limit has torque enough, where the joint has no limits either."""
 
+_OPTIONS = {"servo": ("position_gain",), "position": ("kp", "kd"), "velocity": ("kp", "kd"), "torque": ()}
+"""Options that the kinds of motors use, but for `max_torque`, which all use; kd of `velocity` may be computed of kp."""
+
 FILTERS = {0, 2, 3}
 """MuJoCo's types of actuators' dynamics that a World may do without: none, and filters of the control."""
 
@@ -40,7 +44,8 @@ def with_motors(joints: list[Joint], source: Source, options: ImportOptions, not
     notes.lose(
         f"{'each' if len(chosen) == len(joints) else 'these'} joint gets a motor, as the file has none: {{}}", *chosen
     )
-    inertias = _inertias(source.model)
+    inertias = joint_inertias(source)
+    _refuse_unused(_OPTIONS[kind], kind, options, notes)
     return [_driven(j, kind, inertias[j.name], source, options, notes) if j.name in chosen else j for j in joints]
 
 
@@ -94,15 +99,6 @@ def _needed_torque(model: Any, name: str) -> float:  # noqa: ANN401
     return weight if model.jnt_type[at] == 2 else 0.5 * weight * float(max(reaches, default=0.1))
 
 
-def _inertias(model: Any) -> Mapping[str, float]:  # noqa: ANN401
-    """Return the inertia of each joint at the reference angles if all others are free, kg m² or kg."""
-    return {joint_name(model, int(model.dof_jntid[dof])): 1 / float(model.dof_invweight0[dof]) for dof in _dofs(model)}
-
-
-def _dofs(model: Any) -> list[int]:  # noqa: ANN401
-    return [dof for dof in range(model.nv) if model.jnt_type[model.dof_jntid[dof]] >= 2]
-
-
 def _number(model: Any, name: str) -> int:  # noqa: ANN401
     return next(at for at in range(model.njnt) if joint_name(model, at) == name)
 
@@ -114,7 +110,20 @@ def _of_the_file(joints: list[Joint], source: Source, options: ImportOptions, no
     order = [joint.name for joint in joints if joint.name in found]
     if order != list(found):
         notes.lose("the order of actuators is that of the joints: {}", *order)
+    kinds = sorted({joint.motor.follows for joint in found.values() if isinstance(joint.motor, PDMotor)})
+    used = {option for kind in kinds for option in _OPTIONS[kind] if (kind, option) != ("velocity", "kp")}
+    if kinds:
+        _refuse_unused(used, " or ".join(kinds), options, notes)
     return [found.get(joint.name, joint) for joint in joints]
+
+
+def _refuse_unused(used: Collection[str], kinds: str, options: ImportOptions, notes: Notes) -> None:
+    """Refuse options that would change nothing."""
+    for name, value in options.model_dump(include={"kp", "kd", "position_gain"}, exclude_defaults=True).items():
+        if name not in used:
+            notes.refuse(
+                f"{name}={value:g} has no effect on {kinds} motors: leave it out, or choose others with --motor"
+            )
 
 
 def _motors(
@@ -159,22 +168,37 @@ def _motor(
         return joint
     if dynamics:
         notes.lose("activation dynamics are lost: {}", name)
-    _note_units(model, at, name, gear * gain if kind == "torque" else gear, notes)
+    _note_units(model, at, name, gear * gain if kind == "torque" else 1 / gear, notes)
+    _note_ranges(model, at, name, kind, notes)
+    kp = (options.kp or gear * gear * stiffness) if kind == "position" else 0.0
+    kd = gear * gear * damping if kind == "torque" else options.kd or gear * gear * damping
     limit = options.max_torque or _limit(model, at, joint, gear, gain)
     if limit is None:
-        limit = _unlimited(joint, gear * gear * gain, kind)
-        notes.lose(f"actuator {name} has no largest torque: {limit:.4g} N·m, which is more than it needs")
-    kp = gear * gear * stiffness if kind == "position" else 0.0
-    motor = PDMotor(kind, limit, kp, gear * gear * damping)  # type: ignore[arg-type]
+        limit = _needed_torque(model, joint.name) if kind == "torque" else _unlimited(joint, kp or kd, kind)
+        why = "of the robot's weight" if kind == "torque" else "which is more than it needs"
+        notes.lose(f"actuator {name} has no largest torque: {limit:.4g} {'N' if joint.slides else 'N·m'}, {why}")
+    motor = PDMotor(kind, limit, kp, kd)  # type: ignore[arg-type]
     return replace(joint, motor=motor, swing=limit / 2 if kind == "torque" else joint.swing)
 
 
 def _note_units(model: Any, at: int, name: str, factor: float, notes: Notes) -> None:  # noqa: ANN401
     if factor != 1:
         notes.lose(f"targets are those of the joint, {factor:g} times MuJoCo's control: {{}}", name)
-    for field in ("actuator_damping", "actuator_armature", "actuator_delay"):
-        if np.any(getattr(model, field, np.zeros(model.nu))[at]):
-            notes.lose(f"{field.partition('_')[2]} of actuators is lost: {{}}", name)
+    for field in ("damping", "dampingpoly", "armature", "delay"):
+        if np.any(getattr(model, f"actuator_{field}", np.zeros(model.nu))[at]):
+            notes.lose(f"{field.removesuffix('poly')} of actuators is lost: {{}}", name)
+
+
+def _note_ranges(model: Any, at: int, name: str, kind: str, notes: Notes) -> None:  # noqa: ANN401
+    """Note the limits that a motor lacks: its targets have none, and its torque has the same to both sides."""
+    for field in ("ctrlrange", "forcerange"):
+        lower, upper = (float(value) for value in getattr(model, f"actuator_{field}")[at])
+        if not getattr(model, f"actuator_{field.removesuffix('range')}limited")[at]:
+            continue
+        if field == "ctrlrange" and kind != "torque":
+            notes.lose(f"targets have no limits, where {field} is {lower:g} to {upper:g}: {{}}", name)
+        elif lower != -upper:
+            notes.lose(f"torque has the same limit to both sides, where {field} is {lower:g} to {upper:g}: {{}}", name)
 
 
 def _limit(model: Any, at: int, joint: Joint, gear: float, gain: float) -> float | None:  # noqa: ANN401
@@ -190,8 +214,6 @@ def _limit(model: Any, at: int, joint: Joint, gear: float, gain: float) -> float
 
 
 def _unlimited(joint: Joint, gain: float, kind: str) -> float:
-    if kind == "torque":
-        return abs(gain) * 1000.0
     lower, upper = joint.limits or (-BOUNDLESS_RAD, BOUNDLESS_RAD)
     return abs(gain) * max(upper - lower, 1.0) * (1 if kind == "position" else 20)
 

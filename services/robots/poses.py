@@ -20,7 +20,7 @@ from gaplab.services.robots.reading import Source, mujoco_library
 
 def start_angles(source: Source, options: ImportOptions, notes: Notes) -> FloatArray:
     """Return MuJoCo's `qpos` at the start: of a keyframe, or the reference angles; the user may turn the base."""
-    qpos = _angles_of_the_file(source.model, options, notes)
+    qpos = _angles_of_the_file(source, options, notes)
     if options.turn is not None:
         if source.model.jnt_type[0] != FREE:
             notes.refuse("the base is the scene, which cannot be turned")
@@ -29,19 +29,15 @@ def start_angles(source: Source, options: ImportOptions, notes: Notes) -> FloatA
     return qpos
 
 
-def _angles_of_the_file(model: Any, options: ImportOptions, notes: Notes) -> FloatArray:  # noqa: ANN401
+def _angles_of_the_file(source: Source, options: ImportOptions, notes: Notes) -> FloatArray:
+    keyframes = source.keyframes
     if options.keyframe is not None:
-        names = [str(model.key(at).name) for at in range(model.nkey)]
-        if options.keyframe not in names:
+        names = [each.name for each in keyframes]
+        keyframes = tuple(each for each in keyframes if each.name == options.keyframe)
+        if not keyframes:
             notes.refuse(f"there is no keyframe {options.keyframe!r}; keyframes: {listed(names) or 'none'}")
             notes.check()
-        return np.array(model.key_qpos[names.index(options.keyframe)])
-    if model.nkey:
-        return np.array(model.key_qpos[0])
-    for at in range(model.nnumeric):
-        if model.numeric(at).name == "init_qpos" and model.numeric_size[at] == model.nq:  # as Gymnasium's files have it
-            return np.array(model.numeric(at).data)
-    return np.array(model.qpos0)
+    return keyframes[0].qpos(source.model) if keyframes else np.array(source.model.qpos0)
 
 
 def with_starts(

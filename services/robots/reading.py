@@ -1,7 +1,7 @@
 """A URDF or MJCF as a MuJoCo model whose base is free, so that no mass is welded to the world."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from importlib import import_module
 from importlib.util import find_spec
@@ -10,6 +10,7 @@ from typing import Any
 
 from gaplab.services.core.errors import EngineUnavailable, InvalidRobot
 from gaplab.services.engines.mujoco.logs import unlogged
+from gaplab.services.robots.keyframes import Keyframe, take_keyframes
 from gaplab.services.robots.mending import hold, mend
 from gaplab.services.robots.notes import Notes, listed
 from gaplab.services.robots.options import ImportOptions
@@ -28,6 +29,7 @@ class Source:
         masses_kg: mass of each body as the file says it, before anything was changed.
         speeds: largest speed of each joint that has one.
         fixed: whether the base never moves.
+        keyframes: starts that an MJCF has; the first is the usual one.
     """
 
     model: Any
@@ -36,6 +38,7 @@ class Source:
     masses_kg: Mapping[str, float]
     speeds: Mapping[str, float]
     fixed: bool
+    keyframes: tuple[Keyframe, ...] = ()
 
 
 def mujoco_library() -> Any:  # noqa: ANN401 - MuJoCo has no types
@@ -72,12 +75,13 @@ def _read(mujoco: Any, file: Path, text: str, options: ImportOptions, notes: Not
     if is_urdf:
         urdf = read_urdf(file, text, options, notes)
         spec = mujoco.MjSpec.from_string(urdf.text, assets=urdf.assets or None)
-        masses, speeds, name = urdf.masses_kg, urdf.speeds, urdf.name
+        source = Source(None, is_urdf, urdf.name, urdf.masses_kg, urdf.speeds, fixed=options.fixed)
     else:
         spec = mujoco.MjSpec.from_file(str(file))
-        masses, speeds, name = {}, {}, spec.modelname
+        keyframes = take_keyframes(spec, notes, with_sensors=bool(options.lock))
+        source = Source(None, is_urdf, spec.modelname, {}, {}, options.fixed, keyframes)
         _lock(spec, options, notes)
-    return _compiled(spec, options, notes, Source(None, is_urdf, name, masses, speeds, fixed=options.fixed))
+    return _compiled(spec, options, notes, source)
 
 
 def _compiled(spec: Any, options: ImportOptions, notes: Notes, source: Source) -> Source:  # noqa: ANN401
@@ -89,14 +93,14 @@ def _compiled(spec: Any, options: ImportOptions, notes: Notes, source: Source) -
     if not root.joints:
         fixed = fixed or not source.is_urdf
         root.add_freejoint()
-    if fixed:
+    if fixed and all("FREE" in str(joint.type) for joint in root.joints):  # else the base is the scene
         hold(root, notes)
     moved = {body.name or f"body{at}" for at, body in enumerate(spec.bodies) if body.joints}
     mend(spec, notes, moved, allowed=options.mend)
     notes.check()
     model = spec.compile()
     masses = source.masses_kg or {body_name(model, at): float(model.body_mass[at]) for at in range(1, model.nbody)}
-    return Source(model, source.is_urdf, source.name, masses, source.speeds, fixed)
+    return replace(source, model=model, masses_kg=masses, fixed=fixed)
 
 
 def _root(spec: Any, notes: Notes) -> Any:  # noqa: ANN401

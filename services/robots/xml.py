@@ -11,6 +11,9 @@ Element: TypeAlias = Any  # lxml has no types
 _HEAD = re.compile(r"(\s|<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>\[]*(\[.*?\]\s*)?>)*", re.DOTALL)
 """What may be before the root."""
 
+_ENCODING = re.compile(r"""\A(\s*<\?xml[^>]*?\bencoding\s*=\s*["'])(?!utf-8["'])[^"']*""", re.IGNORECASE)
+"""A declaration of another encoding than UTF-8."""
+
 
 def decoded(content: bytes) -> str:
     """Return a text in UTF-8, or else in Latin-1, which every file is in."""
@@ -32,10 +35,10 @@ class Document:
         text = text.replace("\r\n", "\n")
         found = _HEAD.match(text)
         at = found.end() if found else 0
-        self._head, self.root = text[:at], tree(text[at:])
+        self._head, self.root = _ENCODING.sub(r"\1UTF-8", text[:at], count=1), tree(text[at:])
 
     def text(self, comments: Sequence[str]) -> str:
-        """Return the text, with comments at the start of the root."""
+        """Return the text, to be written in UTF-8, with comments at the start of the root."""
         before = self.root.text or "\n  "
         for comment in reversed(comments):
             node = etree.Comment(f" {comment.replace('--', '—')} ")

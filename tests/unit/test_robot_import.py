@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidRobot
+from gaplab.services.core.motor_law import pd_law, pd_torque
 from gaplab.services.core.robot_files import read_robot_file
 from gaplab.services.core.shapes import Box, Capsule, Hull
 from gaplab.services.core.world import Joint, Motor, PDMotor, World
@@ -314,6 +315,60 @@ def test_a_reference_angle_and_a_joint_beside_the_origin_keep_the_kinematics(tmp
             at = model.body(body.name).id
             assert place + turn.apply(body.center_m) == pytest.approx(data.xipos[at], abs=1e-12)
             assert turn.as_matrix() == pytest.approx(data.xmat[at].reshape(3, 3), abs=1e-12)
+
+
+GEARED = """<mujoco><compiler angle="radian"/><worldbody><body><freejoint/><geom size=".1"/>
+<body><joint name="j"/><geom size=".1" mass="1"/></body></body></worldbody><actuator>{}</actuator></mujoco>"""
+"""A robot with a single hinge; `{}` takes its actuator."""
+
+
+def geared(tmp_path: Path, actuator: str) -> tuple[PDMotor, list[str]]:
+    file = tmp_path / "geared.xml"
+    file.write_text(GEARED.format(actuator))
+    robot = import_robot(file, ImportOptions()).robot
+    motor = robot.world.joints[0].motor
+    assert isinstance(motor, PDMotor)
+    return motor, list(robot.lost)
+
+
+@pytest.mark.parametrize("gear", [3, -0.5])
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        '<position name="p" joint="j" kp="50" kv="2" gear="{}" forcerange="-99 99"/>',
+        '<velocity name="p" joint="j" kv="7" gear="{}" forcerange="-99 99"/>',
+        '<motor name="p" joint="j" gear="{}" forcerange="-99 99"/>',
+        '<general name="p" joint="j" gear="{}" forcerange="-99 99" gainprm="4"/>',
+    ],
+)
+def test_at_the_target_that_the_import_states_a_motor_has_the_torque_of_mujocos_control(
+    tmp_path: Path, actuator: str, gear: float
+) -> None:
+    motor, lost = geared(tmp_path, actuator.format(gear))
+    law = pd_law(motor, inverse_inertia=0.0, step_s=0.0)
+    (factor,) = [float(line.split()[6]) for line in lost if line.startswith("targets are those of the joint, ")]
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "geared.xml"))
+    data = mujoco.MjData(model)
+
+    for control, angle, speed in np.random.default_rng(5).uniform(-1, 1, (5, 3)):
+        data.ctrl[0], data.qpos[-1], data.qvel[-1] = control, angle, speed
+        mujoco.mj_forward(model, data)
+
+        assert pd_torque(factor * control, angle, speed, law) == pytest.approx(data.qfrc_actuator[-1], rel=1e-4)
+
+
+def test_limits_of_controls_and_torques_that_a_motor_has_not_are_said(tmp_path: Path) -> None:
+    _, position = geared(tmp_path, '<position name="p" joint="j" kp="50" gear="3" ctrlrange="-0.2 0.2"/>')
+    _, velocity = geared(tmp_path, '<velocity name="p" joint="j" kv="7" ctrlrange="0 2" forcerange="-1 3"/>')
+    _, one_sided = geared(tmp_path, '<motor name="p" joint="j" ctrlrange="0 1"/>')
+    motor, both_sides = geared(tmp_path, '<motor name="p" joint="j" ctrlrange="-1 1" forcerange="-4 4"/>')
+
+    assert "targets have no limits, where ctrlrange is -0.2 to 0.2: p" in position
+    assert "targets have no limits, where ctrlrange is 0 to 2: p" in velocity
+    assert "torque has the same limit to both sides, where forcerange is -1 to 3: p" in velocity
+    assert "torque has the same limit to both sides, where ctrlrange is 0 to 1: p" in one_sided
+    assert motor.max_torque_nm == 1.0
+    assert "range" not in "".join(both_sides)
 
 
 def test_actuators_that_a_world_has_not_are_refused_by_name(tmp_path: Path) -> None:

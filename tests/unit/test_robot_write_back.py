@@ -1,5 +1,6 @@
 """Tuned values in URDF, MJCF and robot files: written, imported again and compared."""
 
+import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -311,3 +312,17 @@ def test_a_file_whose_rollouts_differ_is_not_written(tmp_path: Path) -> None:
         with pytest.raises(InvalidRobot, match="rollouts differ"):
             write(output)
     assert set(tmp_path.iterdir()) == before
+
+
+def test_a_file_that_declares_another_encoding_declares_the_one_that_it_is_written_in(tmp_path: Path) -> None:
+    text = path_of("quadruped/minitaur.urdf").read_text().replace("motor_front_leftL_joint", "Größe")
+    text = f"<?xml version='1.0' encoding='ISO-8859-1' ?>\n{text[text.index('<robot') :]}"
+    original, output = tmp_path / "latin.urdf", tmp_path / "tuned.urdf"
+    original.write_bytes(text.encode("latin-1"))
+    robot = import_robot(original, ImportOptions()).robot
+
+    write_xml(Tuning(robot, with_joint(robot.world, "Größe", damping=0.25), COMMENTS), original, output, fine)
+
+    joints = [joint.get("name") for joint in ET.parse(output).getroot().iter("joint")]
+    assert "Größe" in joints
+    assert output.read_bytes().startswith(b"<?xml version='1.0' encoding='UTF-8' ?>\n<robot")
