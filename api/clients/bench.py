@@ -16,6 +16,9 @@ from gaplab.schemas.records import Page
 from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.traces import TracesRead
 
+PAGE = 500
+"""Requests for measurements of one list: the most that the service permits."""
+
 
 class Details(TypedDict, total=False):
     """Optional parts of an answer or a correction."""
@@ -69,8 +72,8 @@ class Bench:
         self, experiment: str | None = None, *, bench: str | None = None, wait_s: float = 0.0
     ) -> tuple[RequestRead, ...]:
         """Return the requests that are still wanted, the oldest first; wait for so long if there is none."""
-        parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": wait_s}
-        return self._connection.get(Page[RequestRead], "/requests", **parameters).items
+        parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": wait_s, "limit": PAGE}
+        return tuple(self._connection.items(Page[RequestRead], "/requests", **parameters))
 
     def request(self, id: str) -> RequestRead:
         """Return a request with its answers."""

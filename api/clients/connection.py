@@ -30,6 +30,9 @@ PASSING = {502, 503, 504}
 BUSY = 429
 """Status of a GET whose turn has not come: others compute replays or draw figures. The answer says how long to wait."""
 
+FINAL = (httpx2.ConnectError, httpx2.InvalidURL, httpx2.UnsupportedProtocol)
+"""Errors of a request that a repetition would meet again."""
+
 
 class Request(TypedDict, total=False):
     """Optional parts of a request."""
@@ -64,7 +67,7 @@ class Connection:
         pauses_s: Sequence[float] = PAUSES_S,
     ) -> None:
         self.url = url = Settings.from_environment().url if url is None else url
-        self._pauses_s = pauses_s
+        self._pauses_s, self._timeout_s = pauses_s, timeout_s
         token = os.environ.get("GAPLAB_TOKEN") if token is None else token
         if token and not (token.isascii() and token.isprintable()):
             msg = "the token has characters that no token of this service has; check GAPLAB_TOKEN for line breaks"
@@ -91,9 +94,11 @@ class Connection:
         return self.read(kind, self.get_bytes(path, **parameters))
 
     def get_bytes(self, path: str, /, **parameters: Parameter) -> bytes:
-        """Return the answer to a GET as it is."""
+        """Return the answer to a GET as it is; with `wait_s`, the service may take so much longer."""
         given = {name: value for name, value in parameters.items() if value is not None}
-        return self._repeat("GET", path, params=given)
+        wait_s = given.get("wait_s")
+        timeout_s = self._timeout_s + (wait_s if isinstance(wait_s, int | float) else 0.0)
+        return self._repeat("GET", path, params=given, timeout=timeout_s)
 
     def items(self, page: type[Page[T]], path: str, /, **parameters: Parameter) -> Iterator[T]:
         """Yield every item of a list, page after page."""
@@ -129,6 +134,10 @@ class Connection:
                     answer.read()
                     raise error_of(answer)
                 yield answer
+        except httpx2.ReadTimeout as error:
+            timeout_s = request.get("timeout", self._timeout_s)
+            msg = f"the service at {self.url} has not answered within {timeout_s:g} s"
+            raise ServiceUnreachable(msg) from error
         except (httpx2.RequestError, httpx2.InvalidURL) as error:
             msg = f"no service answers at {self.url} ({type(error).__name__}); start one with `gaplab serve`"
             raise ServiceUnreachable(msg) from error
@@ -145,11 +154,12 @@ class Connection:
         return UnknownService(f"what answers at {self.url} is no gaplab of this version")
 
     def _repeat(self, method: str, path: str, **request: Unpack[Request]) -> bytes:
+        final = (*FINAL, httpx2.ReadTimeout) if method == "GET" else FINAL  # asked again, it is as slow
         for pause_s in self._pauses_s:
             try:
                 return self._send(method, path, **request)
             except ServiceUnreachable as error:
-                if isinstance(error.__cause__, httpx2.ConnectError | httpx2.InvalidURL | httpx2.UnsupportedProtocol):
+                if isinstance(error.__cause__, final):
                     raise
             except ServiceError as error:
                 if method == "GET" and error.problem.status == BUSY and error.retry_after_s is not None:

@@ -1,6 +1,6 @@
 """Studies and experiments, and what the service stores of them."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import httpx2
@@ -11,9 +11,6 @@ from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import AttemptRead, ExperimentRead, Page, RepetitionRead, StudyRead
 from gaplab.schemas.submitted import SpecRead
-
-PAGE = 100
-"""Experiments of one request of `all_experiments`."""
 
 Record: TypeAlias = ExperimentRead | StudyRead
 
@@ -75,10 +72,6 @@ class Records:
     def experiments(self, *, query: str | None = None, **filters: str | int | None) -> Page[ExperimentRead]:
         """Return experiments, newest first; the query and the filters are those of `studies`, and study."""
         return self._connection.get(Page[ExperimentRead], "/experiments", q=query, **filters)
-
-    def all_experiments(self, *, query: str | None = None) -> Iterator[ExperimentRead]:
-        """Yield all experiments that fit a query, newest first."""
-        return self._connection.items(Page[ExperimentRead], "/experiments", limit=PAGE, q=query)
 
     def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:
         """Change the name, the notes or the tags of a study or an experiment, and return it."""

@@ -9,7 +9,7 @@ from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Curve
 from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
-from gaplab.schemas.records import Page, common_count
+from gaplab.schemas.records import Page
 from gaplab.schemas.results import SimulatorRead
 
 PAGE = 5_000
@@ -94,10 +94,6 @@ class Results:
     def diff(self, *ids: str) -> SpecDiff:
         """Return the settings in which studies and experiments differ; of a single study, its experiments."""
         return self._connection.get(SpecDiff, "/differences", **split(map(self._records.find, ids)))
-
-    def common_count(self, experiments: Sequence[str]) -> int:
-        """Return the last number of real-world evaluations that experiments share; 0 without any result."""
-        return common_count([self._records.experiment(id) for id in experiments]) or 0
 
     def misfit(self, id: str) -> MisfitRead:
         """Return how far the tuned simulators of an experiment are from reality and from each other."""

@@ -5,12 +5,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 
 from gaplab.api.clients.errors import ServiceError
+from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import BENCH, AsJson, Url, app, connect
 from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.measured_values import ValuesCommand
 from gaplab.api.commands.tables import table
 from gaplab.schemas.corrections import Consequences
 from gaplab.schemas.measurements import RequestRead
@@ -61,7 +62,7 @@ def requests(
             )
             for each in items
         ]
-        Console().print(table(("request", "experiment", "repetition", "iteration", "repeats", "bench", "state"), rows))
+        console().print(table(("request", "experiment", "repetition", "iteration", "repeats", "bench", "state"), rows))
 
 
 @app.command(rich_help_panel=BENCH)
@@ -76,7 +77,7 @@ def motion(
         typer.echo(client.bench.motion(id, "json" if as_json else form), nl=False)
 
 
-@app.command("measured", rich_help_panel=BENCH)
+@app.command("measured", cls=ValuesCommand, rich_help_panel=BENCH)
 def measured(
     id: RequestId,
     values: Numbers = None,
@@ -114,11 +115,11 @@ def traces(
     print_result(found, f"{_words_of(said)}\n{_STORED.format(found)}", as_json=as_json)
 
 
-@app.command("correct", rich_help_panel=BENCH)
+@app.command("correct", cls=ValuesCommand, rich_help_panel=BENCH)
 def correct(  # noqa: PLR0913, PLR0917 - each is an option of the command
     id: AnswerId,
+    reason: Reason,
     values: Numbers = None,
-    reason: Reason = "",
     failed: Failed = None,
     dry_run: DryRun = False,
     as_json: AsJson = False,
@@ -134,7 +135,7 @@ def correct(  # noqa: PLR0913, PLR0917 - each is an option of the command
 @app.command("void", rich_help_panel=BENCH)
 def void(
     id: AnswerId,
-    reason: Reason = "",
+    reason: Reason,
     dry_run: DryRun = False,
     as_json: AsJson = False,
     url: Url = None,
@@ -149,7 +150,7 @@ def void(
 def decide(
     id: AnswerId,
     counts: Annotated[Literal["this", "other"], typer.Argument(help="which of the two measurements counts")],
-    reason: Reason = "",
+    reason: Reason,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:

@@ -5,7 +5,7 @@ import sys
 import typer
 
 from gaplab.api.clients.confirmation import NotSubmitted
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, lines_of
+from gaplab.api.clients.errors import ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable, lines_of
 
 # the order of the commands in `gaplab --help`, and of its groups
 # isort: off
@@ -27,7 +27,7 @@ def main() -> None:
         _exit([str(error)], Exit.INTERRUPTED)
     except (ServiceError, ServiceUnreachable, CommandError) as error:
         _exit(lines_of(error.problem) if isinstance(error, ServiceError) else [str(error)], code_of(error))
-    except (GaplabError, ValueError) as error:
+    except (ExperimentFailed, ExtraMissing, GaplabError, ValueError) as error:
         _exit([str(error)], Exit.NOT_FOUND if isinstance(error, NotFound) else Exit.FAILED)
     except OSError as error:
         _exit([f"{error.filename}: {error.strerror}" if error.filename else str(error)], Exit.FILE)

@@ -138,12 +138,16 @@ def _ask(record: Record) -> None:
     """Ask a person whether to delete the record.
 
     Raises:
-        CommandError: the answer is not yes.
+        CommandError: the answer is not yes, or none: Ctrl-C or the end of the input.
     """
     experiments = experiments_of(record)
     repetitions = sum(experiment.progress.repetitions for experiment in experiments)
     what = f"{record.name!r} with {repetitions} repetitions"
     if isinstance(record, StudyRead):
         what += f" in {len(experiments)} experiments"
-    if not typer.confirm(f"Delete {what} for good?", err=True):
+    try:
+        confirmed = typer.confirm(f"Delete {what} for good?", err=True)
+    except typer.Abort:
+        confirmed = False
+    if not confirmed:
         raise CommandError("nothing was deleted", Exit.INTERRUPTED)

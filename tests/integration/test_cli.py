@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from gaplab.api.clients import records
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.commands import demo
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
@@ -81,10 +81,7 @@ def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab) -> No
     assert "information? (5)" in listed
 
 
-def test_an_experiment_of_no_study_is_listed_whatever_many_of_studies_are_newer(
-    gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(records, "PAGE", 4)
+def test_an_experiment_of_no_study_is_listed_whatever_many_of_studies_are_newer(gaplab: Gaplab) -> None:
     older, alone = submitted(gaplab), submitted(gaplab)
     studies = [submitted(gaplab, str(EXAMPLES / "toy.json")) for _ in range(2)]
 
@@ -134,6 +131,26 @@ def test_watching_what_fails_says_why_and_ends_with_1(gaplab: Gaplab, sqlite_sto
     assert said.code == Exit.FAILED
     assert "FAILED" in said.out
     assert "the robot fell apart" in said.err
+
+
+def test_a_demo_whose_study_failed_says_why_and_ends_with_1(
+    gaplab: Gaplab, sqlite_store: Store, url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    id = submitted(gaplab)
+    for claim in execution.claim(sqlite_store, "test", limit=10):
+        execution.fail(sqlite_store, claim, Failure("ValueError: the robot fell apart"))
+
+    def wait(*_: object) -> None:
+        with Client(url) as client:
+            client.wait(id, progress=False)
+
+    monkeypatch.setattr(demo, "run", wait)
+    said = gaplab("demo")
+
+    assert (said.code, said.err) == (
+        Exit.FAILED,
+        f"gaplab: smoke ({id}) ended as FAILED; ValueError: the robot fell apart\n",
+    )
 
 
 def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path) -> None:

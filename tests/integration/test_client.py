@@ -6,11 +6,14 @@ import threading
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import httpx2
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
@@ -23,11 +26,18 @@ from gaplab.api.clients.records import experiments_of
 from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind, EventRead
 from gaplab.services import access
+from gaplab.services.core import robot_library
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.robots.robot_file import Imported
+from gaplab.services.core.types import Measured
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Failure
+from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
+from tests.experiments import run, some_log
 
 SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}
+TIMES = ["repetition", "iteration", "kind", "time_s"]
 BOTH = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke", "repetitions": 3}
 
 
@@ -127,6 +137,57 @@ def test_simulators_are_a_frame_with_a_column_for_each_tunable(client: Client, f
     ]
     assert found["squared_error"].isna().any()  # infinite there, null on the wire
     assert set(client.simulators(experiment.id, iteration=0)["iteration"]) == {0}
+
+
+def measured_by(client: Client, store: Store, robot: str) -> tuple[str, Any]:
+    """The id of an experiment whose walk is rated for three seconds, and the 60 readings of its sample."""
+    task = {"name": "walk", "options": {"settling_s": 1.0, "counted_s": 3.0}}
+    spec = {"strategy": "random", "robot": robot, "task": task, "engine": "mujoco", "budget": "smoke", "iterations": 1}
+    id = client.submit(spec | {"repetitions": 1}).id
+    readings = np.where(np.arange(60.0) == 7, np.nan, np.arange(60.0))
+    (claim,) = execution.claim(store, "me", 1)
+    steps = (
+        replace(step, sample=replace(step.sample, readings=frozen(readings))) if isinstance(step, Measured) else step
+        for step in some_log(1)
+    )
+    run(store, claim, steps)
+    return id, readings
+
+
+@pytest.mark.parametrize("robot", ["quadruped", "walker"])
+def test_readings_have_the_sensors_and_times_of_the_spec(
+    client: Client, sqlite_store: Store, tmp_path: Path, robot: str
+) -> None:
+    example = robot_library.robot_file(Imported.example().options.sha256)
+    assert example is not None
+    file = tmp_path / "walker.json"
+    file.write_text(json.dumps(example.content | {"name": "walker"}))
+    client.add_robot(file)
+    id, readings = measured_by(client, sqlite_store, robot)
+
+    found = client.tables.readings(id)
+
+    values = readings.reshape(12, 5) * [0.02, 0.02, 0.005, 0.005, 0.005]
+    assert list(found) == [*TIMES, "roll_rad", "pitch_rad", "height_m", "x_m", "y_m"]
+    assert found["time_s"].tolist() == [1.25 + 0.25 * place for place in range(12)]
+    np.testing.assert_array_equal(found.drop(columns=TIMES).to_numpy(), values)
+    assert set(found["kind"]) == {"sample"}  # the probes have none
+
+
+def test_readings_of_an_unknown_robot_are_refused_and_never_cut(client: Client, sqlite_store: Store) -> None:
+    id, _ = measured_by(client, sqlite_store, "quadruped")
+
+    def now_with(**changes: Any) -> None:
+        with sqlite_store.transaction() as session:
+            row = session.get_one(ExperimentRow, id)
+            row.spec = row.spec | changes
+
+    now_with(task={"name": "walk", "options": {"counted_s": 1.0}})  # as by a plug-in that was edited since
+    with pytest.raises(ValueError, match="zip"):
+        client.tables.readings(id)
+    now_with(task={"name": "gone", "options": {}})
+    with pytest.raises(LookupError, match=f"the sensors of {id} are unknown: its robot or task is not installed"):
+        client.tables.readings(id)
 
 
 def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(
@@ -426,6 +487,25 @@ def test_a_read_waits_for_its_turn_and_a_submission_is_refused(client: Client, n
 
     assert refused.value.retry_after_s == 0.0
     assert len(network.asked) == 4
+
+
+def test_a_slow_answer_is_told_apart_from_no_service_and_a_get_is_not_sent_again() -> None:
+    timeouts = []
+
+    def slow(request: httpx2.Request) -> httpx2.Response:
+        timeouts.append((request.method, request.extensions["timeout"]["read"]))
+        raise httpx2.ReadTimeout("slow", request=request)
+
+    network = httpx2.MockTransport(slow)
+    with Client("http://gaplab.example", transport=network, pauses_s=(0.0,), timeout_s=7) as client:
+        with pytest.raises(ServiceUnreachable, match=r"the service at \S+ has not answered within 7 s$"):
+            client.catalogue()
+        with pytest.raises(ServiceUnreachable, match="not answered within 67 s"):
+            client.bench.pending(wait_s=60.0)
+        with pytest.raises(ServiceUnreachable, match="not answered within 7 s"):
+            client.submit(SMALL)
+
+    assert timeouts == [("GET", 7), ("GET", 67), ("POST", 7), ("POST", 7)]
 
 
 def test_what_cannot_be_unpacked_is_no_answer() -> None:

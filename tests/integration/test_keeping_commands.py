@@ -70,7 +70,7 @@ def test_the_client_does_the_same(url: str, sqlite_store: Store) -> None:
             client.delete("nobody")
 
 
-@pytest.mark.parametrize(("answer", "code"), [("n\n", 130), ("y\n", 0)])
+@pytest.mark.parametrize(("answer", "code"), [("n\n", 130), ("", 130), ("y\n", 0)])
 def test_deletion_asks_in_a_terminal(
     gaplab: Gaplab, sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, answer: str, code: int
 ) -> None:

@@ -9,6 +9,7 @@ from rich.markup import escape
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
 from gaplab.api.clients.progress.text import counts, percent, state_text
 from gaplab.api.clients.records import Record
+from gaplab.schemas.lifecycle import State
 
 LINE_EVERY_S = 10.0
 
@@ -35,5 +36,5 @@ def show(snapshots: Iterable[Snapshot], console: Console) -> Record:
 def _line(row: RecordProgress) -> str:
     progress, state = row.record.progress, row.record.state
     left = f"{row.time_left} left" if row.time_left else "time left not known yet"
-    rest = state_text(row.record) if state.ended else left
+    rest = left if state is State.RUNNING else state_text(row.record)
     return f"{row.record.name}: {percent(progress)}, {counts(progress)}; {rest}"

@@ -18,6 +18,7 @@ COLORS = {
     State.COMPLETED: "green",
     State.FAILED: "bold red",
     State.CANCELLED: "yellow",
+    State.WAITING: "yellow",
 }
 
 
