@@ -1,15 +1,19 @@
-import { FakeStorage } from "./fakes.js";
+import { FakeNode, FakeStorage } from "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { browserStore } from "../../api/dashboard/lib/bench/browser_store.js";
 import { backoffMs, isMine, nextRequest } from "../../api/dashboard/lib/bench/choosing.js";
 import { expectations } from "../../api/dashboard/lib/bench/expectations.js";
-import { isTemporary, newKey, outbox } from "../../api/dashboard/lib/bench/outbox.js";
+import { isTemporary, outbox } from "../../api/dashboard/lib/bench/outbox.js";
+import { keyed, newKey } from "../../api/dashboard/lib/keyed.js";
 import { answerText, requestWords, typedNumber, typedValues, withOtherSign } from "../../api/dashboard/lib/bench/values.js";
 
-const { summaryOf } = await import("../../api/dashboard/views/bench/sent.js");
+globalThis.localStorage = new FakeStorage();
+const { sentList, summaryOf } = await import("../../api/dashboard/views/bench/sent.js");
+const { answers: sentAnswers } = await import("../../api/dashboard/lib/bench/sender.js");
+const { withChosen } = await import("../../api/dashboard/views/bench.js");
 const { stateText } = await import("../../api/dashboard/views/bench/others.js");
-const { correctionOf } = await import("../../api/dashboard/lib/bench/corrections.js");
+const { correctionOf, undoButtons } = await import("../../api/dashboard/lib/bench/corrections.js");
 
 const ANSWER = { request: "r1", words: "sample of iteration 1", body: { values: [0.5] } };
 
@@ -119,9 +123,11 @@ test("answers and requests are words", () => {
 });
 
 test("a correction has values or a reason, and names every value that is none", () => {
-  assert.deepEqual(correctionOf({ value_1: "0,5", value_2: "0.6", failed: " " }, 2), { values: [0.5, 0.6] });
-  assert.deepEqual(correctionOf({ value_1: "", failed: " it fell " }, 1), { failed: "it fell" });
-  assert.throws(() => correctionOf({ value_1: "a", value_2: "", failed: "" }, 2), { message: "Repeat 1: “a” is not a number, such as 0.41. Repeat 2: a number is missing." });
+  assert.deepEqual(correctionOf({ value_1: "0,5", value_2: "0.6", failed: " " }, ["0.4", "0.6"]), { values: [0.5, 0.6] });
+  assert.deepEqual(correctionOf({ value_1: "", failed: " it fell " }, [""]), { failed: "it fell" });
+  assert.deepEqual(correctionOf({ value_1: "0.4", failed: "it fell" }, ["0.4"]), { failed: "it fell" });
+  assert.throws(() => correctionOf({ value_1: "0.5", failed: "it fell" }, [""]), { message: "A measurement has values, or a reason why it failed. Clear one of them." });
+  assert.throws(() => correctionOf({ value_1: "a", value_2: "", failed: "" }, ["", ""]), { message: "Repeat 1: “a” is not a number, such as 0.41. Repeat 2: a number is missing." });
 });
 
 test("the next request is the one held here, else the chosen, else the oldest that is free", () => {
@@ -158,4 +164,67 @@ test("requests say who has them, or why nobody may take them", () => {
   const at = (state, more = {}) => stateText({ state, taken_by: null, unanswered: 0, busy: false, ...more });
   assert.deepEqual([at("open"), at("open", { busy: true }), at("taken", { taken_by: "Bo" }), at("stuck", { unanswered: 5 })],
     ["○ open", "○ open, its bench is busy", "▶ taken by Bo", "✕ stuck: taken 5 times without an answer"]);
+});
+
+/** Let the service answer every request so, and return the requests. */
+function answering(answer) {
+  const requests = [];
+  globalThis.fetch = (path, { headers = {}, body } = {}) => {
+    requests.push({ path, key: headers["Idempotency-Key"], body });
+    return Promise.resolve(new Response(JSON.stringify(answer(path)), { status: answer(path).status ?? 200 }));
+  };
+  return requests;
+}
+
+/** Press a button, and return the dialog that opens. */
+async function dialogOf(button) {
+  let dialog;
+  document.body = { append: (element) => { dialog = element; } };
+  FakeNode.prototype.showModal = () => {};
+  button.click();
+  while (!dialog) await new Promise((resume) => { setTimeout(resume); });
+  return dialog;
+}
+
+test("the dialog that corrects a failure begins empty, and says why it failed", async () => {
+  answering(() => ({ words: "nothing follows" }));
+  const buttons = undoButtons({ answer: { id: "m1", values: null, failed: "it fell" }, repeats: 2, unit: "m/s", words: "sample" }, new AbortController().signal, () => {});
+  const dialog = await dialogOf(buttons.querySelector("button"));
+  assert.deepEqual(dialog.querySelectorAll("input").map(({ value }) => value), ["", "", "", ""]);
+  assert.match(dialog.textContent, /now: it fell/);
+});
+
+test("a failed answer is corrected with as many values as were asked for", async () => {
+  answering(() => ({ words: "nothing follows" }));
+  const { key } = sentAnswers.add({ request: "r1", words: "sample", repeats: 3, body: { failed: "it fell" } });
+  const [entry] = sentAnswers.list();
+  browserStore("answer").write(key, { ...entry, state: "sent", answer: { id: "m1", state: "counted", values: null, failed: "it fell" } });
+  const list = sentList({ signal: new AbortController().signal, refresh: () => {} });
+  list.update();
+  const correct = list.element.querySelectorAll("button").find((button) => button.textContent === "Correct…");
+  const dialog = await dialogOf(correct);
+  assert.deepEqual(dialog.querySelectorAll("input").map(({ attributes }) => attributes.name), ["value_1", "value_2", "value_3", "failed", "reason"]);
+});
+
+test("the same body is posted under the same key, also with a seed of 64 bits", async () => {
+  const requests = answering(() => ({}));
+  const send = keyed("/studies");
+  await send({ seed: 18446744073709551615n });
+  await send({ seed: 18446744073709551615n });
+  await send({ seed: 18446744073709551614n });
+  const [first, second, third] = requests.map(({ key }) => key);
+  assert.equal(first, second);
+  assert.notEqual(second, third);
+  assert.equal(requests[0].body, '{"seed":18446744073709551615}');
+});
+
+test("a chosen request beyond the first page is loaded, as long as it is wanted", async () => {
+  const states = { "requests/last": { id: "last", state: "open" }, "requests/done": { id: "done", state: "measured" }, "requests/gone": { status: 404 } };
+  const requests = answering((path) => states[path]);
+  const full = Array.from({ length: 100 }, (_, index) => ({ id: `r${index}`, state: "open" }));
+  const { signal } = new AbortController();
+  const lastOf = async (chosen, page = full) => (await withChosen(page, chosen, signal)).at(-1).id;
+  assert.deepEqual(await Promise.all(["last", "done", "gone", "r5", null].map((chosen) => lastOf(chosen))), ["last", "r99", "r99", "r99", "r99"]);
+  assert.equal(await lastOf("last", full.slice(0, 3)), "r2");
+  assert.equal(requests.length, 3);
 });

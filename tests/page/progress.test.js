@@ -17,8 +17,8 @@ test("failed repetitions are named, where there are any", () => {
 test("only what runs has a time left, which is an interval or not known yet", () => {
   const at = (state, left) => ({ state, progress: { time_left: left, seconds_left: 1 } });
   const minutes = { low_s: 130, high_s: 230 };
-  assert.deepEqual([timeLeft(at("RUNNING", minutes)), timeLeft(at("STOPPING", null)), timeLeft(at("PAUSED", minutes))], ["2 to 4 min", "not known yet", ""]);
-  assert.deepEqual([timeLeftFact(at("RUNNING", minutes)), timeLeftFact(at("RUNNING", null)), timeLeftFact(at("QUEUED", minutes))], ["2 to 4 min", "not known yet", "–"]);
+  assert.deepEqual([timeLeft(at("RUNNING", minutes)), timeLeft(at("RUNNING", null)), timeLeft(at("PAUSING", minutes)), timeLeft(at("PAUSED", minutes))], ["2 to 4 min", "not known yet", "", ""]);
+  assert.deepEqual([timeLeftFact(at("RUNNING", minutes)), timeLeftFact(at("RUNNING", null)), timeLeftFact(at("PAUSING", minutes))], ["2 to 4 min", "not known yet", "–"]);
   assert.deepEqual([durationRange({ low_s: 5, high_s: 40 }), durationRange({ low_s: 28_800, high_s: 45_000 })], ["less than 1 min", "8 to 13 h"]);
 });
 

@@ -59,3 +59,25 @@ export function refill(element, key, make) {
   element.dataset.key = key;
   element.replaceChildren(...contents([make()]));
 }
+
+/**
+ * Replace the content of an element as `refill` does. The focus stays, on what has the same label or text, and what the reader
+ * unfolded stays unfolded, by the ids in the data of `details`.
+ *
+ * @param {HTMLElement} element
+ * @param {string} key
+ * @param {() => Page.Child} make
+ */
+export function refillInPlace(element, key, make) {
+  const { activeElement } = document;
+  const unfolded = [...element.querySelectorAll("details")].filter(({ open }) => open).map(({ dataset }) => dataset.id);
+  const focused = activeElement && element.contains(activeElement) ? labelOf(activeElement) : null;
+  refill(element, key, make);
+  for (const details of element.querySelectorAll("details")) details.open ||= Boolean(details.dataset.id) && unfolded.includes(details.dataset.id);
+  if (focused === null || element.contains(document.activeElement)) return;
+  const focusable = /** @type {HTMLElement[]} */ ([...element.querySelectorAll("a, button, input, select, summary, [tabindex]")]);
+  focusable.find((other) => labelOf(other) === focused)?.focus();
+}
+
+/** @param {Element} element */
+const labelOf = (element) => element.getAttribute("aria-label") ?? element.textContent;

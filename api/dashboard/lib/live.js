@@ -78,13 +78,44 @@ export function follow(query, refresh, signal) {
 }
 
 /**
- * Reload a page at regular intervals until its signal: times pass without events too.
+ * Return functions that load a page again, and that take an answer to a change of it. Of two answers the one that was asked for later
+ * stays, whichever comes first: an older one has an older state and an older tag.
+ *
+ * @param {() => Promise<Page.Tagged<any>>} load
+ * @param {(tagged: Page.Tagged<any>) => void} show
+ * @returns {Pick<Page.Editable, "take" | "reload">}
+ */
+export function latestAnswers(load, show) {
+  let asked = 0;
+  let shown = 0;
+  const showUnlessOlder = (/** @type {number} */ number, /** @type {Page.Tagged<any>} */ tagged) => {
+    if (number < shown) return;
+    shown = number;
+    show(tagged);
+  };
+  return {
+    take: (tagged) => showUnlessOlder(++asked, tagged),
+    async reload() {
+      const number = ++asked;
+      showUnlessOlder(number, await load());
+    },
+  };
+}
+
+/**
+ * Bring a page up to date at regular intervals until its signal: times pass without events too. A page that nobody sees is left as it
+ * is, and of what has ended only the ages change.
  *
  * @param {Page.Editable} page
  * @param {number} intervalMs
  */
 export function reloadEvery(page, intervalMs) {
-  const timer = setInterval(() => page.reload().catch(() => {}), intervalMs);
+  const again = () => {
+    if (document.hidden) return;
+    if (page.hasEnded()) page.update();
+    else page.reload().catch(() => {});
+  };
+  const timer = setInterval(again, intervalMs);
   page.signal.addEventListener("abort", () => clearInterval(timer));
 }
 

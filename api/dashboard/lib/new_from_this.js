@@ -1,7 +1,7 @@
 // @ts-check
 /** The button that opens the form filled with the spec of a study or an experiment. */
 
-import { get } from "./api.js";
+import { getTagged } from "./api.js";
 import { h } from "./dom.js";
 import { stringify } from "./json.js";
 
@@ -15,7 +15,7 @@ export function newFromThis(path) {
   const press = async () => {
     status.textContent = "";
     try {
-      const { spec, remarks } = await get(`${path}/spec`);
+      const { spec, remarks } = (await getTagged(`${path}/spec`)).value;  // the seed keeps all its digits
       if (spec) location.hash = `#/new?${new URLSearchParams({ spec: stringify(spec), ...(remarks.length ? { note: remarks.join("; ") } : {}) })}`;
       else status.textContent = ` ${remarks.join("; ")}`;
     } catch (error) {

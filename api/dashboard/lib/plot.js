@@ -92,6 +92,9 @@ export function plot(element, kind, signal) {
     } catch (error) {
       if (signal.aborted || request !== requests) return true;
       if (isDrawn && drawnQuery === key) return false;
+      answer = null;  // nothing draws the former figure again
+      caption.textContent = "";
+      numbers.replaceChildren();
       replaceDrawing(failed(error, () => draw(query), "h3"));
       return true;
     }

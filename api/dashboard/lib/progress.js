@@ -4,8 +4,6 @@
 import { h, setText } from "./dom.js";
 import { count, durationRange, percent } from "./format.js";
 
-const WORKING = ["RUNNING", "PAUSING", "STOPPING"];
-
 /**
  * Return the share that is done, between 0 and 1; a saved rollout is done.
  *
@@ -57,12 +55,12 @@ export function progressBar(label) {
 }
 
 /**
- * Return the time left; nothing unless the experiment or study is running.
+ * Return the time left; nothing unless the experiment or study is running, and neither pausing nor stopping.
  *
  * @param {{ state: Api.State, progress: Api.Progress }} item
  */
 export function timeLeft({ state, progress }) {
-  if (!WORKING.includes(state)) return "";
+  if (state !== "RUNNING") return "";
   return progress.time_left ? durationRange(progress.time_left) : "not known yet";
 }
 
@@ -71,7 +69,4 @@ export function timeLeft({ state, progress }) {
  *
  * @param {{ state: Api.State, progress: Api.Progress }} item
  */
-export function timeLeftFact({ state, progress }) {
-  if (state !== "RUNNING") return "–";
-  return progress.time_left ? durationRange(progress.time_left) : "not known yet";
-}
+export const timeLeftFact = (item) => timeLeft(item) || "–";

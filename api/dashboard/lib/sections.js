@@ -16,6 +16,7 @@ const RETRY_MS = 1000;
  * @property {boolean} isInSight
  * @property {boolean} isBusy
  * @property {boolean} isFilled
+ * @property {number} runs how often it was loaded
  */
 
 /**
@@ -25,6 +26,9 @@ const RETRY_MS = 1000;
  * all if there are no events; sections out of sight wait until they come into sight. No section is loaded twice at a time, and each
  * rests four times as long as its loading took. A section is loaded again if `load()` failed after an earlier success, and after a
  * second if the service still computes what it shows.
+ *
+ * `add` returns a function that loads the section at once, after a choice of the reader. What was being loaded is then out of date:
+ * `load()` must drop it.
  *
  * @param {AbortSignal} signal
  * @returns {Page.Sections}
@@ -44,20 +48,24 @@ export function sections(signal) {
   /** @param {Section} section */
   async function load(section) {
     if (!section.isStale || !section.isInSight || section.isBusy || signal.aborted) return;
-    Object.assign(section, { isBusy: true, isStale: false });
+    const run = section.runs + 1;
+    Object.assign(section, { isBusy: true, isStale: false, runs: run });
     const start = performance.now();
     let isPending = false;
     try {
       const loaded = await section.load();
+      if (run !== section.runs) return;
       isPending = loaded === "pending";
       section.isStale ||= isPending || loaded === "failed";
       section.isFilled = true;
     } catch (error) {
+      if (run !== section.runs) return;
       section.isStale ||= section.isFilled;
       if (!signal.aborted && !section.isFilled) section.element.replaceChildren(failed(error, () => reload(section), "h3"));
     }
     const restMs = isPending ? 0 : REST_FACTOR * (performance.now() - start);  // the service limits the time that a pending answer takes
     if (section.isFilled) await rest(Math.max(restMs, section.isStale ? RETRY_MS : 0), signal);
+    if (run !== section.runs) return;
     section.isBusy = false;
     load(section);
   }
@@ -71,9 +79,14 @@ export function sections(signal) {
   return {
     add(element, kinds, loadSection) {
       if (!element.hasChildNodes()) element.append(loading());
-      const flags = { isStale: true, isInSight: false, isBusy: false, isFilled: false };
-      all.set(element, { element, kinds: new Set(kinds), load: loadSection, ...flags });
+      const flags = { isStale: true, isInSight: false, isBusy: false, isFilled: false, runs: 0 };
+      const section = { element, kinds: new Set(kinds), load: loadSection, ...flags };
+      all.set(element, section);
       observer.observe(element);
+      return () => {
+        section.isBusy = false;
+        reload(section);
+      };
     },
     reload(events) {
       for (const section of all.values()) {

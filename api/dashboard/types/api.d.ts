@@ -278,6 +278,7 @@ declare namespace Api {
     level: boolean;
     state: State;
     spec: Record<string, any>;
+    sensors: SensorsRead | null;
     priority: number;
     max_parallel: number | null;
     progress: Progress;
@@ -673,6 +674,12 @@ declare namespace Api {
     seed: number;
     points: number;
     evaluations: number;
+  }
+  interface SensorsRead {
+    names: Array<string>;
+    units: Array<string>;
+    noises: Array<number>;
+    times_s: Array<number>;
   }
   interface SettingRead {
     pointer: string;

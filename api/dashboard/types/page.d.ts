@@ -41,7 +41,7 @@ declare namespace Page {
   type Loaded = "failed" | "pending" | void;
 
   interface Sections {
-    add(element: HTMLElement, kinds: string[], load: () => Promise<Loaded>): void;
+    add(element: HTMLElement, kinds: string[], load: () => Promise<Loaded>): () => void;
     reload(events: ServerEvent[]): void;
   }
 
@@ -51,6 +51,8 @@ declare namespace Page {
     tag: string | null;
     take(tagged: Tagged<any>): void;
     reload(): Promise<void>;
+    update(): void;
+    hasEnded(): boolean;
   }
 
   interface ExperimentPage extends Editable {
@@ -66,6 +68,7 @@ declare namespace Page {
     id: string;
     study: Api.StudyRead;
     unit(experiment: Api.ExperimentRead | undefined): string;
+    sections: Sections;
   }
 
   /** What the parts of the view of a bench share. */
@@ -101,12 +104,13 @@ declare namespace Page {
     choice: Comparison;
     cache: ReturnType<typeof import("../views/compare/cache.js").experimentCache>;
     signal: AbortSignal;
+    sections: Sections;
     change(changes: Partial<Comparison>): Promise<void>;
   }
 
   interface ComparePart {
     element: HTMLElement;
-    update(events: unknown[]): void;
+    update(): void;
   }
 
   /** The first and the last number of real-world evaluations. */

@@ -1,9 +1,10 @@
 // @ts-check
 /** The bench: what an operator measures next, beside the robot, on a phone whose network comes and goes. */
 
+import { keepAges } from "../lib/ages.js";
 import { get } from "../lib/api.js";
 import { answers, onAnswers, sendWaiting } from "../lib/bench/sender.js";
-import { nextRequest } from "../lib/bench/choosing.js";
+import { isWanted, nextRequest } from "../lib/bench/choosing.js";
 import { h, refill, setText } from "../lib/dom.js";
 import { failed } from "../lib/placeholders.js";
 import { conflictList } from "./bench/conflicts.js";
@@ -14,6 +15,7 @@ import { sentList } from "./bench/sent.js";
 import { Take } from "./bench/take.js";
 
 const MOST = 100;
+const NOT_FOUND = 404;
 const LOST = [401, 403, 404];  // the view cannot go on
 
 /**
@@ -69,11 +71,12 @@ export async function show(root, parameters, signal) {
       get("/requests", { ...shown, wait_s: waitS }, patience),
       get("/requests", { ...shown, pending: false, conflicts: true }, patience),
     ]);
-    Object.assign(view, { requests: waiting.items, conflicts: undecided.items });
+    const requests = await withChosen(waiting.items, view.chosen, patience);
     if (signal.aborted) return 0;
+    Object.assign(view, { requests, conflicts: undecided.items });
     await view.take.resume(view.requests);
     draw();
-    return waiting.items.length;
+    return requests.length;
   };
   const told = (/** @type {any} */ error) => {
     if (signal.aborted) return;
@@ -84,12 +87,32 @@ export async function show(root, parameters, signal) {
 
   const title = query.experiment ? "Bench of an experiment" : query.bench ? `Bench “${query.bench}”` : "Bench";
   root.replaceChildren(h("h1", {}, title), places.benches, connection, places.next, sent.element, places.conflicts, places.others);
+  keepAges(root, signal);
   onAnswers(draw, signal);
   draw();
   const polling = keepPolling(ask, told, signal, (error) => {
     if (LOST.includes(error.status)) root.replaceChildren(failed(error, () => dispatchEvent(new HashChangeEvent("hashchange"))));
     return LOST.includes(error.status);
   });
+}
+
+/**
+ * Return the requests with the one that the reader chose, if it still waits: it may be beyond the first page.
+ *
+ * @param {Api.RequestRead[]} requests
+ * @param {string | null} chosen
+ * @param {AbortSignal} signal
+ */
+export async function withChosen(requests, chosen, signal) {
+  if (!chosen || requests.length < MOST || requests.some(({ id }) => id === chosen)) return requests;
+  try {
+    /** @type {Api.RequestRead} */
+    const request = await get(`/requests/${chosen}`, {}, signal);
+    return isWanted(request) ? [...requests, request] : requests;
+  } catch (error) {
+    if (error.status === NOT_FOUND) return requests;
+    throw error;
+  }
 }
 
 /**

@@ -5,6 +5,7 @@ import { copyButton } from "../lib/copy.js";
 import { h } from "../lib/dom.js";
 import { follow } from "../lib/live.js";
 import { empty } from "../lib/placeholders.js";
+import { sections } from "../lib/sections.js";
 import { ENDED } from "../lib/state_badge.js";
 import { addressOf, comparisonOf } from "./compare/address.js";
 import { experimentCache } from "./compare/cache.js";
@@ -15,8 +16,9 @@ import { figure } from "./compare/figure.js";
 import { remarks } from "./compare/remarks.js";
 import { settings } from "./compare/settings.js";
 import { significance } from "./compare/significance.js";
+import { CURVE_KINDS } from "./experiment/event_words.js";
 
-const KINDS = ["transferred", "probed", "repetition_completed", "started", "paused", "completed", "failed", "cancelled", "extended"];
+const KINDS = [...CURVE_KINDS, "started", "waiting", "pausing", "paused", "resumed", "stopping", "retried"];
 
 /**
  * Fill `root` with the comparison that the address asks for, until `signal`.
@@ -30,7 +32,7 @@ export async function show(root, parameters, signal) {
   const { studies, ...choice } = comparisonOf(parameters);
   /** @type {Page.CompareView} */
   const view = {
-    choice, cache, signal,
+    choice, cache, signal, sections: sections(signal),
     async change(changes) {
       view.choice = { ...view.choice, ...changes };
       history.pushState(null, "", addressOf(view.choice));
@@ -42,11 +44,11 @@ export async function show(root, parameters, signal) {
   const [search, chosen, warnings, ...others] = parts.map(({ element }) => element);
   const results = h("div", { class: "results" }, ...others);
   const nothing = empty("Choose experiments above: one, two, or all of a study. The address then holds the comparison, to be shared.");
-  const update = (/** @type {unknown[]} */ events = []) => {
+  const update = () => {
     const { experiments } = view.choice;
     results.hidden = !cache.known(experiments).length;
     nothing.hidden = experiments.length > 0;
-    for (const part of parts) part.update(events);
+    for (const part of parts) part.update();
   };
   await loadChoice(view, studies);
   root.replaceChildren(h("div", { class: "titled" }, h("h1", {}, "Compare"), copyButton("Copy the link", () => location.href)),
@@ -60,7 +62,8 @@ export async function show(root, parameters, signal) {
     const changed = new Set(ours.map(({ data }) => data.experiment));
     const isOpen = (/** @type {string} */ id) => !ENDED.includes(/** @type {Api.State} */ (cache.get(id)?.state));
     await cache.reload(view.choice.experiments.filter((id) => changed.has(id) || isOpen(id)));
-    update([...ours, null]);
+    view.sections.reload(ours);
+    update();
   };
   follow({ kind: KINDS }, refresh, signal);
 }

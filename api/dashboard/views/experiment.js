@@ -1,10 +1,12 @@
 // @ts-check
 /** An experiment, live: its progress, its results, and the actions on it. */
 
+import { keepAges } from "../lib/ages.js";
 import { get, getTagged } from "../lib/api.js";
 import { h } from "../lib/dom.js";
-import { follow, reloadEvery } from "../lib/live.js";
+import { follow, latestAnswers, reloadEvery } from "../lib/live.js";
 import { sections } from "../lib/sections.js";
+import { ENDED } from "../lib/state_badge.js";
 import { tabs } from "../lib/tabs.js";
 import { showBenchLink } from "../lib/bench/link.js";
 import { isFunction, isPhysical, unitsOf } from "../lib/robots.js";
@@ -35,11 +37,12 @@ export async function show(root, parameters, signal) {
   /** @type {Page.ExperimentPage} */
   const page = {
     id, signal, latest, experiment: loaded.value, tag: loaded.tag, isFunction: isFunction(catalogue, loaded.value), unit: unitsOf(catalogue), sections: sections(signal),
-    take({ value, tag }) {
+    update: () => top.update(),
+    hasEnded: () => ENDED.includes(page.experiment.state),
+    ...latestAnswers(() => getTagged(`/experiments/${id}`, signal), ({ value, tag }) => {
       Object.assign(page, { experiment: value, tag });
-      top.update();
-    },
-    reload: async () => page.take(await getTagged(`/experiments/${id}`, signal)),
+      page.update();
+    }),
   };
   const top = head(page);
   if (isPhysical(page.experiment)) showBenchLink();
@@ -50,6 +53,7 @@ export async function show(root, parameters, signal) {
     ...otherFigures(page),
     tabs("Details", panels(page), parameters.get("tab"), rememberTab),
   );
+  keepAges(root, signal);
   keepUp(page);
 }
 

@@ -60,7 +60,7 @@ export async function show(root, parameters, signal) {
 }
 
 /** The table, with as many rows as the reader asked for. */
-class List {
+export class List {
   /**
    * @param {AbortSignal} signal
    * @param {(experiment: Api.ExperimentRead | undefined) => string} unit
@@ -74,9 +74,11 @@ class List {
     this.unfolded = new Set();
     /** @type {import("./list/sources.js").Source[]} */
     this.sources = sourcesOf(filters);
+    this.wanted = this.sources;  // what is loaded next
+    /** @type {Promise<unknown>} */
+    this.turn = Promise.resolve();
     /** @type {HTMLElement | null} */
     this.error = null;
-    this.requests = 0;
     const body = h("tbody");
     this.fill = keyedRows(body, (/** @type {Row} */ { value, isNested }) => `${value.id} ${isNested ?? ""}`, (row) => this.makeRow(row));
     this.table = h("table", { class: "list" }, h("caption", { class: "away" }, "Studies and experiments"), h("thead", {}, h("tr", {}, ...headCells())), body);
@@ -105,36 +107,50 @@ class List {
    * @param {Filters} filters
    */
   async change(filters) {
-    Object.assign(this, { filters });
-    const loaded = this.refresh(sourcesOf(filters));
-    const { requests } = this;
+    this.filters = filters;
+    this.wanted = sourcesOf(filters);
+    this.turn = Promise.resolve();  // nobody waits any more for what the former filters asked for
     try {
-      await loaded;
+      await this.refresh();
     } catch (error) {
-      if (requests !== this.requests || this.signal.aborted) return;
-      if (error.errors?.[0]?.pointer === "q") {  // half a query: the former list stays until it is whole
-        setText(this.mistake, error.errors[0].message);
-        return;
-      }
-      this.sources = sourcesOf(filters);
-      this.fail(error, () => this.change(filters));
+      if (filters !== this.filters || this.signal.aborted) return;
+      this.sources = this.wanted;
+      this.fail(error, () => this.change({ ...filters }));
     }
   }
 
+  /** Load the list again, as long as it is. */
+  refresh() {
+    return this.inTurn(async (isReplaced) => {
+      const { wanted } = this;
+      const limit = (/** @type {{ items: Item[] }} */ { items }) => Math.min(MOST, Math.max(AT_FIRST, items.length));
+      try {
+        const sources = await Promise.all(wanted.map((source) => refreshed(source, limit(source), this.signal)));
+        if (isReplaced()) return;
+        if (wanted !== this.sources) setText(this.mistake, "");
+        if (wanted !== this.sources || !this.shown().items.length) this.error = null;
+        this.sources = sources;
+      } catch (error) {
+        if (isReplaced()) return;
+        if (error.errors?.[0]?.pointer !== "q") throw error;
+        setText(this.mistake, error.errors[0].message);  // half a query: the former list stays until it is whole
+      }
+      this.wanted = this.sources;
+      this.draw();
+    });
+  }
+
   /**
-   * Load the list again, as long as it is.
+   * Load after what is being loaded: a longer and a newer list would undo each other. Other filters leave it out.
    *
-   * @param {import("./list/sources.js").Source[] | null} [others] the sources of another list
+   * @param {(isReplaced: () => boolean) => Promise<void>} load
    */
-  async refresh(others = null) {
-    const request = ++this.requests;
-    const limit = (/** @type {{ items: Item[] }} */ { items }) => Math.min(MOST, Math.max(AT_FIRST, items.length));
-    const sources = await Promise.all((others ?? this.sources).map((source) => refreshed(source, limit(source), this.signal)));
-    if (request !== this.requests || this.signal.aborted) return;
-    if (others || !this.shown().items.length) this.error = null;
-    if (others) setText(this.mistake, "");
-    this.sources = sources;
-    this.draw();
+  inTurn(load) {
+    const { filters } = this;
+    const isReplaced = () => filters !== this.filters || this.signal.aborted;
+    const loaded = this.turn.catch(() => {}).then(() => (isReplaced() ? undefined : load(isReplaced)));
+    this.turn = loaded;
+    return loaded;
   }
 
   /** Return the items so far, and the sources whose next part must be loaded for more. */
@@ -144,20 +160,20 @@ class List {
 
   /** Load the next part of the list; an error stands below it. */
   async lengthen() {
-    const { filters } = this;
-    const { ending } = this.shown();
     this.more.disabled = true;
-    this.error = null;
-    try {
-      const longer = await Promise.all(ending.map((source) => lengthened(source, AT_FIRST * 2, this.signal)));
-      if (filters !== this.filters) return;  // another list has taken its place
-      this.sources = this.sources.map((source) => longer.find(({ path }) => path === source.path) ?? source);
-      this.draw();
-    } catch (error) {
-      if (filters === this.filters && !this.signal.aborted) this.fail(error, () => this.lengthen());
-    } finally {
-      this.more.disabled = false;
-    }
+    await this.inTurn(async (isReplaced) => {
+      this.error = null;
+      try {
+        const longer = await Promise.all(this.shown().ending.map((source) => lengthened(source, AT_FIRST * 2, this.signal)));
+        if (isReplaced()) return;
+        this.sources = this.sources.map((source) => longer.find(({ path }) => path === source.path) ?? source);
+        this.wanted = this.sources;
+        this.draw();
+      } catch (error) {
+        if (!isReplaced()) this.fail(error, () => this.lengthen());
+      }
+    });
+    this.more.disabled = false;
   }
 
   /**
@@ -183,7 +199,7 @@ class List {
     this.fill(rows);
     this.table.hidden = !rows.length;
     this.more.hidden = !ending.length;
-    const note = this.error ?? (rows.length ? null : this.nothing());
+    const note = this.error ?? (rows.length || this.mistake.textContent ? null : this.nothing());
     if (!note || note !== this.note.firstChild) this.note.replaceChildren(...(note ? [note] : []));
   }
 

@@ -3,7 +3,7 @@
 
 import { get, post } from "../lib/api.js";
 import { h } from "../lib/dom.js";
-import { stringify } from "../lib/json.js";
+import { keyed } from "../lib/keyed.js";
 import { draftOf, followRobot, specOf } from "./new/draft.js";
 import { ErrorPlaces } from "./new/fields.js";
 import { budgetPart, simulationPart, strategiesPart, studyPart, tunablesPart } from "./new/form_parts.js";
@@ -54,7 +54,7 @@ export class Form {
     this.timer = undefined;
     this.requests = 0;
     this.isRefused = false;
-    this.idempotency = { key: "", spec: "" };
+    this.send = keyed("/studies");
     this.panel = panel();
     this.parts = h("div", { class: "parts" });
     this.element = h("form", { class: "new", novalidate: true, onsubmit: (event) => { this.submit(event); } }, this.parts, this.panel.element);
@@ -138,7 +138,7 @@ export class Form {
     const spec = specOf(this.draft);
     this.panel.setBusy(true);
     try {
-      const study = await post("/studies", spec, { "Idempotency-Key": this.idempotencyKey(stringify(spec)) });
+      const study = await this.send(spec);
       location.hash = `#/studies/${study.id}`;
     } catch (error) {
       if (this.signal.aborted) return;
@@ -147,16 +147,5 @@ export class Form {
       /** @type {HTMLElement | null} */ (this.parts.querySelector("[aria-invalid]"))?.focus();
       this.panel.setBusy(false);
     }
-  }
-
-  /**
-   * Return the same key for the same spec: a second press, after an answer was lost, submits nothing twice.
-   *
-   * @param {string} spec
-   */
-  idempotencyKey(spec) {
-    const random = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (part) => part.toString(16)).join("-");
-    if (this.idempotency.spec !== spec) this.idempotency = { key: random(), spec };
-    return this.idempotency.key;
   }
 }

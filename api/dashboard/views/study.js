@@ -5,15 +5,17 @@ import { get, getTagged } from "../lib/api.js";
 import { curveOptions } from "../lib/curve_options.js";
 import { h } from "../lib/dom.js";
 import { figureDownloads } from "../lib/downloads.js";
-import { follow, reloadEvery } from "../lib/live.js";
+import { follow, latestAnswers, reloadEvery } from "../lib/live.js";
 import { plot } from "../lib/plot.js";
 import { unitsOf } from "../lib/robots.js";
+import { sections } from "../lib/sections.js";
+import { ENDED } from "../lib/state_badge.js";
+import { CURVE_KINDS } from "./experiment/event_words.js";
 import { experiments } from "./study/experiments.js";
 import { head } from "./study/head.js";
 import { snippets } from "./study/snippets.js";
 
 const RELOAD_MS = 15_000;
-const CURVE_KINDS = new Set(["probed", "completed", "failed", "cancelled", "extended", "imported"]);
 
 /**
  * Fill `root` with the study that the parameters name, until `signal`.
@@ -28,20 +30,22 @@ export async function show(root, parameters, signal) {
   const [loaded, catalogue] = await Promise.all([getTagged(`/studies/${id}`, signal), get("/catalogue", {}, signal)]);
   /** @type {Page.StudyPage} */
   const page = {
-    id, signal, study: loaded.value, tag: loaded.tag, unit: unitsOf(catalogue),
-    take({ value, tag }) {
-      Object.assign(page, { study: value, tag });
+    id, signal, study: loaded.value, tag: loaded.tag, unit: unitsOf(catalogue), sections: sections(signal),
+    update() {
       top.update();
       table.update();
     },
-    reload: async () => page.take(await getTagged(`/studies/${id}`, signal)),
+    hasEnded: () => page.study.experiments.every(({ state }) => ENDED.includes(state)),
+    ...latestAnswers(() => getTagged(`/studies/${id}`, signal), ({ value, tag }) => {
+      Object.assign(page, { study: value, tag });
+      page.update();
+    }),
   };
   const top = head(page);
   const table = experiments(page);
-  const figure = curves(page);
-  root.replaceChildren(top.element, figure.element, table.element, snippets(page));
+  root.replaceChildren(top.element, curves(page), table.element, snippets(page));
   follow({ study: id, after: latest }, async (events) => {
-    if (!events.length || events.some(({ kind }) => CURVE_KINDS.has(kind))) figure.update();
+    page.sections.reload(events);
     await page.reload();
   }, signal);
   reloadEvery(page, RELOAD_MS);
@@ -51,18 +55,15 @@ export async function show(root, parameters, signal) {
  * Return the figure of the curves with its options, as in the paper's Fig. 4.
  *
  * @param {Page.StudyPage} page
- * @returns {Page.Updatable}
  */
-function curves({ id, signal }) {
+function curves({ id, signal, sections: parts }) {
   const place = h("div");
   const draw = plot(place, "curves", signal);
   const options = curveOptions();
-  const update = () => { draw({ study: id, ...options.query() }); };
-  options.element.addEventListener("change", update);
-  update();
+  const load = async () => (await draw({ study: id, ...options.query() }) ? undefined : "failed");
+  options.element.addEventListener("change", parts.add(place, CURVE_KINDS, load));
   const csv = /** @type {const} */ (["CSV", `/studies/${id}/curves`, { format: "csv" }, `gaplab-${id}-curves.csv`]);
-  const element = h("section", { class: "card", "aria-labelledby": "curves-title" },
+  return h("section", { class: "card", "aria-labelledby": "curves-title" },
     h("div", { class: "titled" }, h("h2", { id: "curves-title" }, "Curves"), options.element), place,
     figureDownloads("curves", { study: id }, `gaplab-${id}-curves`, [...csv]));
-  return { element, update };
 }

@@ -4,6 +4,13 @@
 /** @typedef {{ request: string, take: number, operator: string }} Holding the take that this browser holds */
 
 /**
+ * Return whether a request still asks for a measurement.
+ *
+ * @param {Pick<Api.RequestRead, "state">} request
+ */
+export const isWanted = ({ state }) => ["open", "taken", "stuck"].includes(state);
+
+/**
  * Return whether this browser holds a request.
  *
  * @param {Api.RequestRead} request

@@ -4,8 +4,8 @@
 import { post, Problem } from "../api.js";
 import { openDialog } from "../dialog.js";
 import { h } from "../dom.js";
+import { keyed } from "../keyed.js";
 import { browserStore } from "./browser_store.js";
-import { newKey } from "./outbox.js";
 import { answerText, typedValues } from "./values.js";
 
 /**
@@ -54,32 +54,38 @@ async function correct({ answer, repeats, unit, words }, signal, done) {
   const path = `/measurements/${answer.id}/corrections`;
   const now = answer.values ? { values: answer.values } : { failed: answer.failed };
   const follows = await whatFollows(path, now);
-  const fields = Array.from({ length: repeats }, (_, index) => ({
+  const before = Array.from({ length: repeats }, (_, index) => String(answer.values?.[index] ?? ""));
+  const fields = before.map((value, index) => ({
     name: `value_${index + 1}`, label: repeats > 1 ? `Repeat ${index + 1}${unit && ` (${unit})`}` : `Value${unit && ` (${unit})`}`,
-    value: answer.values?.[index] ?? "", inputmode: "decimal", autocomplete: "off",
+    value, inputmode: "decimal", autocomplete: "off",
   }));
+  const why = { name: "failed", label: "Or why it failed", value: "", hint: answer.failed ? `now: ${answer.failed}` : "", maxlength: 2000, autocomplete: "off" };
   const send = keyed(path);
   openDialog({
     title: "Correct this measurement",
     text: `${capital(words)}: ${answerText(answer, unit)}. If it is corrected: ${follows}.${answer.readings ? " Its readings are dropped." : ""}`,
-    fields: [...fields, { name: "failed", label: "Or why it failed", value: answer.failed ?? "", maxlength: 2000, autocomplete: "off" }, REASON],
+    fields: [...fields, why, REASON],
     action: "Correct it",
     act: async (given) => {
-      await send({ ...correctionOf(given, repeats), ...(unit && !given.failed.trim() ? { unit } : {}), reason: given.reason, ...byOperator() });
+      await send({ ...correctionOf(given, before), ...(unit && !given.failed.trim() ? { unit } : {}), reason: given.reason, ...byOperator() });
       done();
     },
   }, signal);
 }
 
 /**
- * Return the body of a correction from the fields of its dialog.
+ * Return the body of a correction from the fields of its dialog: values, or a reason.
  *
  * @param {Record<string, string>} given
- * @param {number} repeats
+ * @param {string[]} before the values that the fields had at first, one for each repeat
  */
-export function correctionOf(given, repeats) {
-  if (given.failed.trim()) return { failed: given.failed.trim() };
-  const { values, mistakes } = typedValues(Array.from({ length: repeats }, (_, index) => given[`value_${index + 1}`]));
+export function correctionOf(given, before) {
+  const texts = before.map((_, index) => given[`value_${index + 1}`]);
+  const failed = given.failed.trim();
+  const isTyped = texts.some((text, index) => text.trim() && text !== before[index]);
+  if (failed && isTyped) throw new Problem({ title: "Values and a reason", detail: "A measurement has values, or a reason why it failed. Clear one of them." });
+  if (failed) return { failed };
+  const { values, mistakes } = typedValues(texts);
   const told = mistakes.flatMap((mistake, index) => (mistake ? [`Repeat ${index + 1}: ${mistake}.`] : []));
   if (told.length) throw new Problem({ title: "Not all values are numbers", detail: told.join(" ") });
   return { values };
@@ -115,20 +121,6 @@ async function voidIt({ answer, unit, words }, signal, done) {
  * @returns {Promise<string>}
  */
 export const whatFollows = async (path, body) => (await post(`${path}?dry_run=true`, { ...body, reason: "dry run" })).words;
-
-/**
- * Return a function that posts, under the same key for the same body: a second press after a lost answer does nothing twice.
- *
- * @param {string} path
- */
-export function keyed(path) {
-  let last = { text: "", key: "" };
-  return (/** @type {unknown} */ body) => {
-    const text = JSON.stringify(body);
-    if (last.text !== text) last = { text, key: newKey() };
-    return post(path, body, { "Idempotency-Key": last.key });
-  };
-}
 
 /** Return the part of a body that says who did it. */
 export const byOperator = () => (operatorName() ? { operator: operatorName() } : {});

@@ -1,6 +1,7 @@
 // @ts-check
 /** Answers of this browser: each is kept until the service has acknowledged it, and is sent under one idempotency key. */
 
+import { newKey } from "../keyed.js";
 import { browserStore } from "./browser_store.js";
 
 const SENT_KEPT = 10;  // the latest answers can be undone
@@ -10,6 +11,7 @@ const SENT_KEPT = 10;  // the latest answers can be undone
  * @property {string} key idempotency key
  * @property {string} request id
  * @property {string} words which measurement it is
+ * @property {number} [repeats] that the request asks for; answers of an earlier version of the page lack it
  * @property {Record<string, any>} body
  * @property {number} made when it was given, in milliseconds
  * @property {"waiting" | "sent" | "refused"} state
@@ -17,7 +19,7 @@ const SENT_KEPT = 10;  // the latest answers can be undone
  * @property {Api.AnswerRead} [answer] what the service stored
  */
 
-/** @typedef {{ list: () => Entry[], add: (entry: Pick<Entry, "request" | "words" | "body">) => Entry, flush: () => Promise<boolean>, forget: (key: string) => void }} Outbox */
+/** @typedef {{ list: () => Entry[], add: (entry: Pick<Entry, "request" | "words" | "repeats" | "body">) => Entry, flush: () => Promise<boolean>, forget: (key: string) => void }} Outbox */
 
 /**
  * Return whether an error leaves open whether the service has the answer, or will take it later.
@@ -25,9 +27,6 @@ const SENT_KEPT = 10;  // the latest answers can be undone
  * @param {{ status?: number }} error
  */
 export const isTemporary = ({ status = 0 }) => status < 400 || status >= 500 || [401, 403, 408, 425, 429].includes(status);
-
-/** Return a new idempotency key; `crypto.randomUUID` exists on loopback and HTTPS only. */
-export const newKey = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (part) => part.toString(16).padStart(8, "0")).join("");
 
 /**
  * Return the answers that a store keeps. Each is an item of its own, so that two tabs overwrite nothing of each other.

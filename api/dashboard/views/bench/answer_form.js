@@ -59,7 +59,7 @@ function make(request, view) {
     const take = holding && isMine(now, holding) ? { take: holding.take, operator: holding.operator } : {};
     const by = operatorName() ? { operator: operatorName() } : {};
     answers.add({
-      request: id, words: `${readableName(request.robot)}, ${requestWords(request)}`,
+      request: id, words: `${readableName(request.robot)}, ${requestWords(request)}`, repeats,
       body: { ...by, ...take, ...answer, ...(unit ? { unit } : {}), ...(note.value.trim() ? { note: note.value.trim() } : {}),
         ...(files.kept().length ? { attachments: files.kept().map((file) => file.id) } : {}) },
     });

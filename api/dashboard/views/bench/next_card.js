@@ -1,6 +1,7 @@
 // @ts-check
 /** What to do next, in large type: the request, what is expected of it, its motion, who has it, and the form for its answer. */
 
+import { ageOf } from "../../lib/ages.js";
 import { post, queryString } from "../../lib/api.js";
 import { operatorName } from "../../lib/bench/corrections.js";
 import { browserStore } from "../../lib/bench/browser_store.js";
@@ -9,7 +10,7 @@ import { expectations } from "../../lib/bench/expectations.js";
 import { copyButton } from "../../lib/copy.js";
 import { h } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
-import { age, count, readableName } from "../../lib/format.js";
+import { count, readableName } from "../../lib/format.js";
 import { empty } from "../../lib/placeholders.js";
 import { answerForm } from "./answer_form.js";
 
@@ -40,7 +41,7 @@ export function nextCard(request, view) {
     h("p", { class: "kicker" }, bench === robot ? "Measure next" : `Measure next on ${bench}`),
     h("h2", { id: "next-title", tabindex: "-1" }, `${readableName(robot)}: ${request.kind} of iteration ${request.iteration}`),
     h("p", { class: "large" }, `Repetition ${request.repetition} · `, h("strong", {}, values)),
-    h("p", { class: "note" }, h("a", { href: `#/experiments/${experiment}` }, name), ` · asked ${age(request.created_at)}`),
+    h("p", { class: "note" }, h("a", { href: `#/experiments/${experiment}` }, name), " · asked ", ageOf(request.created_at)),
     safety(request), files(request, view), holder(request, view));
 }
 

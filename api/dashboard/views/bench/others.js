@@ -1,9 +1,10 @@
 // @ts-check
 /** The other requests that wait. */
 
+import { ageOf } from "../../lib/ages.js";
 import { requestWords } from "../../lib/bench/values.js";
 import { h } from "../../lib/dom.js";
-import { age, readableName } from "../../lib/format.js";
+import { readableName } from "../../lib/format.js";
 
 /**
  * Return the list; nothing if there are none.
@@ -24,7 +25,7 @@ export function otherList(requests, view) {
 function row(request, view) {
   const { id, robot, bench, experiment, experiment_name: name } = request;
   const words = `${readableName(robot)}${bench === robot ? "" : ` (${bench})`}, ${requestWords(request)}`;
-  return h("li", { class: request.state }, h("strong", {}, words), h("span", { class: "note" }, h("a", { href: `#/experiments/${experiment}` }, name), ` · asked ${age(request.created_at)}`),
+  return h("li", { class: request.state }, h("strong", {}, words), h("span", { class: "note" }, h("a", { href: `#/experiments/${experiment}` }, name), " · asked ", ageOf(request.created_at)),
     h("span", {}, stateText(request), " ", h("button", { type: "button", class: "quiet small", "aria-label": `Show ${words}`, onclick: () => view.choose(id) }, "Show")));
 }
 

@@ -74,7 +74,8 @@ function row(entry, view) {
         forget();
         view.refresh();
       };
-      const undo = stored.state === "counted" ? undoButtons({ answer: stored, repeats: stored.values?.length ?? body.values?.length ?? 1, unit, words }, view.signal, done) : null;
+      const repeats = entry.repeats ?? stored.values?.length ?? 1;
+      const undo = stored.state === "counted" ? undoButtons({ answer: stored, repeats, unit, words }, view.signal, done) : null;
       return [h("span", {}, `✓ ${STORED[stored.state]}`), undo];
     },
   };

@@ -4,7 +4,7 @@
 import { post } from "../../lib/api.js";
 import { browserStore } from "../../lib/bench/browser_store.js";
 import { isMine } from "../../lib/bench/choosing.js";
-import { newKey } from "../../lib/bench/outbox.js";
+import { newKey } from "../../lib/keyed.js";
 
 const LEASE_S = 1800;  // a phone in a pocket shows no sign of life
 const HEARTBEAT_MS = 300_000;

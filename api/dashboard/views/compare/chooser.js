@@ -67,6 +67,7 @@ export function chooser(view) {
     }
   };
   const showSoon = () => {
+    close();  // Enter would choose from the matches of the former text
     clearTimeout(timer);
     timer = setTimeout(showMatches, PAUSE_MS);
   };
@@ -77,7 +78,7 @@ export function chooser(view) {
     if (event.key in steps) {
       event.preventDefault();
       if (options.hidden) showMatches();
-      else activate((active + steps[event.key] + length) % length);
+      else activate((Math.max(active, event.key === "ArrowUp" ? 0 : -1) + steps[event.key] + length) % length);
     }
     if (event.key === "Enter" && !options.hidden) /** @type {HTMLElement | undefined} */ (options.children[Math.max(active, 0)])?.click();
   };

@@ -4,6 +4,7 @@
 import { h } from "../../lib/dom.js";
 import { figureDownloads } from "../../lib/downloads.js";
 import { plot } from "../../lib/plot.js";
+import { CURVE_KINDS } from "../experiment/event_words.js";
 import { figureQuery } from "./address.js";
 
 /**
@@ -17,16 +18,20 @@ export function figure(view) {
   const downloads = h("div");
   const draw = plot(place, "curves", view.signal);
   let lastKey = "";
-  const update = (/** @type {unknown[]} */ events) => {
-    const query = figureQuery({ ...view.choice, experiments: view.cache.known(view.choice.experiments) });
+  const queryNow = () => figureQuery({ ...view.choice, experiments: view.cache.known(view.choice.experiments) });
+  const load = async () => {
+    const query = queryNow();
+    return !query.experiment.length || await draw(query) ? undefined : "failed";
+  };
+  const loadNow = view.sections.add(place, CURVE_KINDS, load);
+  const update = () => {
+    const query = queryNow();
     const key = JSON.stringify(query);
-    if (!query.experiment.length || (key === lastKey && !events.length)) return;
-    if (key !== lastKey) {
-      downloads.replaceChildren(figureDownloads("curves", query, "gaplab-curves",
-        ["CSV", "/curves", { experiment: query.experiment, format: "csv" }, "gaplab-curves.csv"]));
-    }
+    if (key === lastKey || !query.experiment.length) return;
     lastKey = key;
-    draw(query);
+    downloads.replaceChildren(figureDownloads("curves", query, "gaplab-curves",
+      ["CSV", "/curves", { experiment: query.experiment, format: "csv" }, "gaplab-curves.csv"]));
+    loadNow();
   };
   return { element: h("section", { class: "card", "aria-label": "Curves" }, place, downloads), update };
 }

@@ -2,11 +2,13 @@
 /** Every pair with every test, and where along the curve it differs. */
 
 import { h } from "../../lib/dom.js";
+import { loading } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
 import { TESTS } from "./address.js";
 import { isSeveral, letter, rangeText } from "./ranges.js";
 import { bothProbabilities, estimated, interval, probability, signed, verdict } from "./verdict.js";
 
+const EVERY = "Every pair, at every range, by every test";
 const UNPAIRED = /** @type {const} */ (["student", "welch", "mann_whitney"]);
 const PAIRED = /** @type {const} */ (["paired_t", "wilcoxon"]);
 
@@ -34,8 +36,15 @@ export function pairsTable({ choice: { test, experiments }, cache }, results, op
     `${pair.n_first}, ${pair.n_second}`, ...(hasMargin ? [pair.equivalence?.words ?? "–"] : []),
     ...tests.map((name) => bothProbabilities(pair[name])), pair.streams,
   ]);
-  return h("details", { open, class: "pairs every" }, h("summary", {}, "Every pair, at every range, by every test"), table("Pairs", columns, rows));
+  return h("details", { open, class: "pairs every" }, h("summary", {}, EVERY), table("Pairs", columns, rows));
 }
+
+/**
+ * Return the table of the pairs while it is folded and not loaded.
+ *
+ * @param {() => void} unfolded
+ */
+export const foldedPairs = (unfolded) => h("details", { class: "pairs every", ontoggle: unfolded }, h("summary", {}, EVERY), loading());
 
 /**
  * Return the paper's pooled tests over a range; nothing at a single number.

@@ -2,13 +2,14 @@
 /** Which pairs differ, and at which numbers of real-world evaluations. */
 
 import { get } from "../../lib/api.js";
-import { h } from "../../lib/dom.js";
-import { failed, loading } from "../../lib/placeholders.js";
+import { h, refill, refillInPlace } from "../../lib/dom.js";
+import { failed } from "../../lib/placeholders.js";
+import { CURVE_KINDS } from "../experiment/event_words.js";
 import { TESTS, wholeNumber } from "./address.js";
 import { exports } from "./exports.js";
 import { marginField } from "./margin.js";
 import { matrix } from "./matrix.js";
-import { pairsTable, pooledTable } from "./pairs.js";
+import { foldedPairs, pairsTable, pooledTable } from "./pairs.js";
 import { commonCount, isSeveral, rangesOf, rangeText } from "./ranges.js";
 import { summaries } from "./summaries.js";
 
@@ -38,31 +39,61 @@ export function significance(view) {
     h("div", { class: "titled" }, h("h2", { id: "differ" }, "Which differ"), h("p", { class: "options" }, h("label", {}, "Test ", test))),
     h("div", { class: "controls" }, buttons, h("label", {}, "from ", from), h("label", {}, "to ", to), margin.element), place, h("p", { class: "note" }, NOTE));
   let lastKey = "";
+  let shownKey = "";
   let requests = 0;
-  const update = (/** @type {unknown[]} */ events) => {
-    const ids = view.cache.known(view.choice.experiments);
+  const load = async () => {
+    const request = ++requests;
+    const key = keyOf(view);
+    const isCurrent = () => request === requests && !view.signal.aborted;
+    try {
+      await fill(place, view, isCurrent, () => loadNow());
+      if (isCurrent()) shownKey = key;
+    } catch (error) {
+      if (!isCurrent()) return undefined;
+      if (shownKey === key) return "failed";
+      shownKey = "";
+      refill(place, `failed ${request}`, () => failed(error, loadNow, "h3"));
+    }
+    return undefined;
+  };
+  const loadNow = view.sections.add(place, CURVE_KINDS, load);
+  const update = () => {
+    const { ids, range, ranges } = askedRanges(view);
     element.hidden = ids.length < 2;
     if (element.hidden) return;
-    const experiments = ids.flatMap((id) => view.cache.get(id) ?? []);
-    const shared = commonCount(experiments);
-    const ranges = rangesOf(shared);
-    const last = view.choice.to ?? shared;
-    /** @type {Page.Range} */
-    const range = [view.choice.from ?? last, last];
     test.value = view.choice.test;
     if (document.activeElement !== from) from.value = String(range[0]);
     if (document.activeElement !== to) to.value = String(range[1]);
-    buttons.replaceChildren(...ranges.map((each) => rangeButton(each, range, view)));
-    margin.update([]);
-    const { test: byTest, margin: width, margin_of_direct: share } = view.choice;
-    const key = JSON.stringify([ids, range, byTest, width, share]);
-    const isNew = key !== lastKey;
-    if (!isNew && !events.length) return;
+    refillInPlace(buttons, JSON.stringify([ranges, range]), () => ranges.map((each) => rangeButton(each, range, view)));
+    margin.update();
+    const key = keyOf(view);
+    if (key === lastKey) return;
     lastKey = key;
-    const request = ++requests;
-    fill(place, view, { ids, range, ranges, isNew, isCurrent: () => request === requests && !view.signal.aborted });
+    loadNow();
   };
   return { element, update };
+}
+
+/**
+ * Return a key of what the reader chose; the ranges that are offered grow without a choice.
+ *
+ * @param {Page.CompareView} view
+ */
+function keyOf({ cache, choice: { experiments, from, to, test, margin, margin_of_direct: share } }) {
+  return JSON.stringify([cache.known(experiments), from, to, test, margin, share]);
+}
+
+/**
+ * Return the chosen experiments that exist, the range that is asked for, and the ranges that are offered.
+ *
+ * @param {Page.CompareView} view
+ * @returns {{ ids: string[], range: Page.Range, ranges: Page.Range[] }}
+ */
+function askedRanges({ cache, choice }) {
+  const ids = cache.known(choice.experiments);
+  const shared = commonCount(ids.flatMap((id) => cache.get(id) ?? []));
+  const last = choice.to ?? shared;
+  return { ids, range: [choice.from ?? last, last], ranges: rangesOf(shared) };
 }
 
 /**
@@ -79,44 +110,34 @@ function rangeButton(range, chosen, view) {
 }
 
 /**
- * @typedef {object} Request
- * @property {string[]} ids
- * @property {Page.Range} range
- * @property {Page.Range[]} ranges that are offered
- * @property {boolean} isNew whether it asks for something else than the request before
- * @property {() => boolean} isCurrent whether no later request has replaced it
- */
-
-/**
- * Load the tests and show them; if that fails, what is shown for the same request stays.
+ * Load the tests and show them. The other ranges are loaded only while the table that shows them is unfolded.
  *
  * @param {HTMLElement} place
  * @param {Page.CompareView} view
- * @param {Request} request
+ * @param {() => boolean} isCurrent whether no later request has replaced it
+ * @param {() => void} unfolded called when the table of every range is unfolded
  */
-async function fill(place, view, request) {
-  const { ids, range, ranges: offered, isNew, isCurrent } = request;
+async function fill(place, view, isCurrent, unfolded) {
+  const { ids, range, ranges } = askedRanges(view);
+  if (ids.length < 2) return;
   if (ids.length > MOST) {
-    place.replaceChildren(h("p", {}, `Pairs are tested for up to ${MOST} experiments; these are ${ids.length}.`));
+    refill(place, String(ids.length), () => h("p", {}, `Pairs are tested for up to ${MOST} experiments; these are ${ids.length}.`));
     return;
   }
-  if (isNew && !place.hasChildNodes()) place.replaceChildren(loading());
-  const { margin, margin_of_direct: share } = view.choice;
-  const others = offered.filter((each) => rangeText(each) !== rangeText(range));
+  const { margin, margin_of_direct: share, test } = view.choice;
+  const isOpen = (/** @type {string} */ name) => place.querySelector(`details.${name}`)?.hasAttribute("open") ?? false;
+  const hasOthers = isOpen("every");
+  const others = hasOthers ? ranges.filter((each) => rangeText(each) !== rangeText(range)) : [];
   const asked = { experiment: ids, from: range[0], to: range[1], margin, margin_of_direct: share };
   const queries = [...others.map(([from, to]) => ({ experiment: ids, from, to, intervals: false })), asked];
-  try {
-    const answers = await Promise.all(queries.map((query) => get("/comparisons", query, view.signal)));
-    if (!isCurrent()) return;
-    const results = [...others, range].map((each, index) => ({ range: each, pairs: answers[index] }));
-    const pairs = answers[answers.length - 1];
-    const isOpen = (/** @type {string} */ name) => place.querySelector(`details.${name}`)?.hasAttribute("open") ?? false;
-    place.replaceChildren(...cautions(view, pairs), ...matrix(view, ids, results[results.length - 1]), exports(asked), summaries(view, pairs, isOpen("each")),
-      pairsTable(view, results, isOpen("every")), ...[pooledTable(view, pairs, isOpen("pooled"))].flatMap((found) => found ?? []));
-  } catch (error) {
-    const stays = !isNew && place.querySelector("table");
-    if (isCurrent() && !stays) place.replaceChildren(failed(error, () => fill(place, view, request), "h3"));
-  }
+  const answers = await Promise.all(queries.map((query) => get("/comparisons", query, view.signal)));
+  if (!isCurrent()) return;
+  const results = [...others, range].map((each, index) => ({ range: each, pairs: answers[index] }));
+  const pairs = answers[answers.length - 1];
+  const names = [...view.cache.namesOf(view.choice.experiments)];
+  refillInPlace(place, JSON.stringify([answers, range, others, hasOthers, test, names]), () => [
+    cautions(view, pairs), matrix(view, ids, results[results.length - 1]), exports(asked), summaries(view, pairs, isOpen("each")),
+    hasOthers ? pairsTable(view, results, isOpen("every")) : foldedPairs(unfolded), pooledTable(view, pairs, isOpen("pooled"))]);
 }
 
 /**

@@ -1,16 +1,15 @@
 // @ts-check
 /** The events of an experiment, the newest first, as they happen. */
 
+import { ageOf } from "../../lib/ages.js";
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
-import { age } from "../../lib/format.js";
 import { eventText, KINDS } from "./event_words.js";
 
 const BATCH = 60;  // events that are shown at first, and more on demand
 const MOST = 600;  // a page that is open for days stays light
 const PAGE_SIZE = 1000;  // the service's limit
 const WINDOW = 400;  // event numbers that are searched at once; they count the events of all experiments
-const RETIME_MS = 30_000;
 
 /** @typedef {(query: Page.Query) => Promise<Api.EventPage>} Load */
 
@@ -56,8 +55,6 @@ export function eventList(page) {
     }
     await showLater();
   });
-  const timer = setInterval(() => retime(list), RETIME_MS);
-  page.signal.addEventListener("abort", () => clearInterval(timer));
   return h("section", { class: "card happening", "aria-labelledby": "events-title" }, h("h2", { id: "events-title" }, "Events"), body);
 }
 
@@ -93,11 +90,5 @@ export function pastEvents(load, latest) {
 
 /** @param {Api.EventRead} event */
 function entry(event) {
-  const time = h("time", { datetime: event.at, title: new Date(event.at).toLocaleString() }, age(event.at));
-  return h("li", { class: event.kind, dataset: { number: event.number } }, h("span", {}, eventText(event)), " ", time);
-}
-
-/** @param {HTMLElement} list */
-function retime(list) {
-  for (const time of list.querySelectorAll("time")) time.textContent = age(time.dateTime);
+  return h("li", { class: event.kind, dataset: { number: event.number } }, h("span", {}, eventText(event)), " ", ageOf(event.at));
 }

@@ -6,9 +6,7 @@ import { curveOptions } from "../../lib/curve_options.js";
 import { h } from "../../lib/dom.js";
 import { figureDownloads } from "../../lib/downloads.js";
 import { plot } from "../../lib/plot.js";
-import { REWRITES } from "./event_words.js";
-
-const ENDS = ["completed", "failed", "cancelled", "stopped", "extended", ...REWRITES];
+import { CURVE_KINDS, FIGURE_KINDS } from "./event_words.js";
 
 /**
  * @typedef {object} Figure
@@ -19,14 +17,14 @@ const ENDS = ["completed", "failed", "cancelled", "stopped", "extended", ...REWR
  */
 
 /** @type {Figure} */
-const CURVE = { kind: "curves", title: "Fitness in reality", events: ["transferred", "probed", "repetition_completed", ...ENDS] };
+const CURVE = { kind: "curves", title: "Fitness in reality", events: CURVE_KINDS };
 
 /** @type {Figure[]} */
 const OTHERS = [
-  { kind: "predictions", title: "Simulation against reality", events: ["measured", "tuned", ...ENDS], isPending: arePredictionsPending },
-  { kind: "squared-error", title: "Error of the best simulator", events: ["tuned", ...ENDS] },
-  { kind: "simulators", title: "Tuned simulators", events: ["tuned", ...ENDS] },
-  { kind: "coordinates", title: "Simulators in parallel coordinates", events: ["tuned", "probed", ...ENDS] },
+  { kind: "predictions", title: "Simulation against reality", events: ["measured", "tuned", ...FIGURE_KINDS], isPending: arePredictionsPending },
+  { kind: "squared-error", title: "Error of the best simulator", events: ["tuned", ...FIGURE_KINDS] },
+  { kind: "simulators", title: "Tuned simulators", events: ["tuned", ...FIGURE_KINDS] },
+  { kind: "coordinates", title: "Simulators in parallel coordinates", events: ["tuned", "probed", ...FIGURE_KINDS] },
 ];
 
 /**
@@ -64,8 +62,8 @@ function card(page, { kind, title, events, isPending }, options = null, ...files
     if (!isCurrent) return "failed";
     return wasPending ? "pending" : undefined;
   };
-  options?.element.addEventListener("change", draw);
-  page.sections.add(place, events, draw);
+  const drawNow = page.sections.add(place, events, draw);
+  options?.element.addEventListener("change", drawNow);
   return h("section", { class: `card figure-${kind}`, "aria-labelledby": `title-${kind}` },
     h("div", { class: "titled" }, h("h2", { id: `title-${kind}` }, title), options?.element), place, downloads);
 }

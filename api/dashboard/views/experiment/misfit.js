@@ -3,6 +3,7 @@
 
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
+import { downloadLink } from "../../lib/downloads.js";
 import { readableName } from "../../lib/format.js";
 import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
@@ -33,7 +34,7 @@ export function misfit(page) {
     place.replaceChildren(...identified(verdicts), h("h3", {}, "Misfit"),
       h("ul", { class: "misfit-remarks" }, ...remarks.map((remark) => h("li", {}, remark))),
       table("Misfit by iteration", columns, points.map((point) => row(point, Boolean(share)))), h("p", { class: "note" }, NOTE,
-        " ", h("a", { href: `/experiments/${page.id}/misfit?format=csv`, download: "" }, "CSV")));
+        " ", downloadLink("CSV", `/experiments/${page.id}/misfit`, { format: "csv" }, `gaplab-${page.id}-misfit.csv`)));
   });
   return [place];
 }

@@ -2,7 +2,7 @@
 /** A list that is shown page by page, with its filters above and the way to its other pages below. */
 
 import { get } from "../../lib/api.js";
-import { h, refill } from "../../lib/dom.js";
+import { h, refillInPlace } from "../../lib/dom.js";
 
 /**
  * Return the filters, the place of the list, and the buttons that turn its pages.
@@ -29,19 +29,10 @@ export function pagedList(page, { path, filters, query, size, kinds, render }) {
     const loaded = await get(path, { limit: size, cursor: cursors.at(-1), ...query() }, page.signal);
     if (request !== requests) return;  // a later request has replaced this one
     next = loaded.next;
-    show(loaded.items);
+    refillInPlace(place, JSON.stringify([loaded.items, query()]), () => render(loaded.items));
     back.disabled = cursors.length < 2;
     forward.disabled = !next;
     status.textContent = `Page ${cursors.length}`;
-  };
-  /** @param {any[]} items what the reader unfolded stays unfolded, and the focus stays */
-  const show = (items) => {
-    const unfolded = [...place.querySelectorAll("details")].filter(({ open }) => open).map(({ dataset }) => dataset.id);
-    const focused = place.contains(document.activeElement) ? document.activeElement?.getAttribute("aria-label") : null;
-    refill(place, JSON.stringify([items, query()]), () => render(items));
-    for (const details of place.querySelectorAll("details")) details.open ||= Boolean(details.dataset.id) && unfolded.includes(details.dataset.id);
-    const again = [...place.querySelectorAll("[aria-label]")].find((element) => focused && element.getAttribute("aria-label") === focused);
-    if (again instanceof HTMLElement) again.focus();
   };
   const showError = (/** @type {Error} */ error) => { status.textContent = error.message; };
   const turnTo = async (/** @type {(string | null)[]} */ newCursors) => {
