@@ -1,9 +1,12 @@
 """The columns of a comparison as a table: one row for each pair, for CSV and frames."""
 
+from collections.abc import Sequence
+
 from gaplab.schemas.comparisons import Comparison
 
 UNPAIRED = ("student", "welch", "mann_whitney")
-TESTS = (*UNPAIRED, "paired_t", "wilcoxon", "brown_forsythe")
+PAIRED = ("paired_t", "wilcoxon")
+TESTS = (*UNPAIRED, *PAIRED, "brown_forsythe")
 _OF_A_TEST = ("statistic", "degrees_of_freedom", "p", "p_holm")
 _OF_AN_ESTIMATE = ("value", "lower", "upper")
 
@@ -32,6 +35,12 @@ TEXTS = frozenset(
     {"first", "first_name", "second", "second_name", "trusted_test", "equivalence_test", "equivalence_verdict"}
 )
 NUMBERS = tuple(name for name in COLUMNS if name not in TEXTS | {"shared_streams"})
+
+
+def shown_tests(pairs: Sequence[Comparison]) -> tuple[str, ...]:
+    """Return the tests to show of these pairs: paired ones only if two experiments share their random streams."""
+    shared = any(pair.shared_streams for pair in pairs)
+    return tuple(test for test in TESTS if shared or test not in PAIRED)
 
 
 def row(pair: Comparison) -> tuple[object, ...]:

@@ -12,6 +12,7 @@ from gaplab.schemas.base import Frozen, Id, Moment, Name, Statistic
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.results import MeasurementKind as MeasurementKind
 from gaplab.schemas.results import SampleRead as SampleRead
+from gaplab.schemas.results import SensorsRead as SensorsRead
 from gaplab.schemas.results import SimulatorRead as SimulatorRead
 
 T = TypeVar("T")
@@ -110,6 +111,11 @@ class ExperimentRead(Frozen):
     state: State
     spec: dict[str, Any] = Field(
         examples=[{"strategy": {"name": "simulated_fit"}, "iterations": 10, "repetitions": 40}]
+    )
+    sensors: SensorsRead | None = Field(
+        default=None,
+        description="sensors of its robot, which the readings of its samples come from; null in lists, in studies, in "
+        "answers to changes, and if the robot is not installed",
     )
     priority: int = Field(default=0, description="the highest priority is computed first")
     max_parallel: int | None = Field(default=None, description="largest number of repetitions at once; null: no limit")

@@ -38,6 +38,17 @@ class SampleRead(Frozen):
     measured_at: Moment
 
 
+class SensorsRead(Frozen):
+    """The sensors of a robot, and the times at which all of them are read; it may have none."""
+
+    names: tuple[str, ...] = Field(examples=[("roll", "height")])
+    units: tuple[str, ...] = Field(examples=[("rad", "m")])
+    noises: tuple[float, ...] = Field(
+        description="standard deviation of each sensor's noise, in its unit", examples=[(0.02, 0.005)]
+    )
+    times_s: tuple[float, ...] = Field(description="seconds from the start of a rollout", examples=[(0.75, 1.0)])
+
+
 class SimulatorRead(Frozen):
     """A tuned simulator; rank 0 is the best of its iteration."""
 
@@ -51,7 +62,8 @@ class SimulatorRead(Frozen):
     )
     error: Statistic = Field(
         default=None,
-        description="root mean square error per sample, in the unit of fitness; null without samples too",
+        description="error per sample, in the unit of the discrepancy; by default the root mean square difference in "
+        "fitness; null without samples too",
     )
     intervals: dict[str, tuple[float, float]] | None = Field(
         default=None,

@@ -51,7 +51,7 @@ class Settings(_Environment):
         ray_address: address of an existing cluster; None starts Ray on this machine. `GAPLAB_RAY_ADDRESS`.
         workers: cores of gaplab's own Ray, or repetitions at once on a cluster; None is all cores. `GAPLAB_WORKERS`.
         lease_s: seconds of silence after which a supervisor's work goes to others. `GAPLAB_LEASE_S`; 30.
-        rollout_limit_s: seconds that a rollout may take, unless hardware measures. `GAPLAB_ROLLOUT_LIMIT_S`; 60.
+        rollout_limit_s: seconds for each of 100 rollouts, unless hardware measures. `GAPLAB_ROLLOUT_LIMIT_S`; 60.
         step_limit_s: seconds of work that a step may take. `GAPLAB_STEP_LIMIT_S`; a week.
         host: host that the API binds. `GAPLAB_HOST`; loopback.
         port: port that the API binds. `GAPLAB_PORT`; 8000.

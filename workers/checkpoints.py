@@ -174,9 +174,10 @@ class StepRecorder:
 
     def _measured(self, setting: Setting, genome: Genome) -> Outcome:
         self._measuring, self._progressed = True, perf_counter()
-        if isinstance(setting.reality, PermittedReality):
-            self._emit(self.pulse())  # it waits for a permit, which is given once the beginning is stored
         try:
+            if isinstance(setting.reality, PermittedReality):
+                self._emit(self.pulse())  # it waits for a permit, which is given once the beginning is stored
+                return setting.reality(genome, len(self._log))
             return setting.reality(genome)
         finally:
             self._measuring = False

@@ -10,8 +10,8 @@ from ray.exceptions import RayError
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, Genomes, Outcomes, Parameters
-from gaplab.services.core.loop import Setting
-from gaplab.services.specs.assembly import setting
+from gaplab.services.core.ports import Sense, Simulate
+from gaplab.services.specs.assembly import simulated
 from gaplab.workers.nodes import Versions, check_here
 
 CHECK_S = 1.0
@@ -31,26 +31,26 @@ Handle: TypeAlias = Any
 class Helper:
     """A process that simulates on request.
 
-    Ray places it where a core is idle and still counts that core as idle, so the next repetition can take it.
+    Ray places it where a core is idle and still counts that core as idle, so the next repetition can take it. It has no
+    permit, and no hardware.
     """
 
     def __init__(self, spec: str, expected: Versions) -> None:
         check_here(expected)
-        self._setting = _setting(spec)
+        self._simulate, self._sense = _simulated(spec)
 
     def part(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed."""
-        return self._setting.simulate(genomes, parameters)
+        return self._simulate(genomes, parameters)
 
     def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
         """Return fitness and readings `(n, m, 1 + q)` of genomes `(n, g)` in simulators `(m, p)`."""
-        assert self._setting.sense is not None
-        return self._setting.sense(genomes, parameters)
+        return self._sense(genomes, parameters)
 
 
 @cache
-def _setting(spec: str) -> Setting:
-    return setting(ResolvedSpec.model_validate_json(spec), 0)
+def _simulated(spec: str) -> tuple[Simulate, Sense]:
+    return simulated(ResolvedSpec.model_validate_json(spec))
 
 
 class Helpers:

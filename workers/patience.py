@@ -2,10 +2,7 @@
 
 from dataclasses import dataclass
 
-from gaplab.schemas.resolved import ResolvedSpec
-
-LEAST_ROLLOUTS = 20
-"""Rollouts of a call at least, since the time of one is unknown at first."""
+from gaplab.services.core.answers import BLOCK
 
 CHECK_ROLLOUTS = 60
 """A sensitivity check may take as long as this many of the longest rollouts."""
@@ -23,11 +20,13 @@ class Patience:
     rollout_s: float = 60.0
     step_s: float = 604_800.0
 
-    def idle_s(self, spec: ResolvedSpec) -> float:
-        """Return the seconds that may pass before the next call of the simulators ends: it may have many rollouts."""
-        simulators = spec.strategy.options.get("simulators")
-        ensemble = simulators if isinstance(simulators, int) else 1
-        return self.rollout_s * max(LEAST_ROLLOUTS, ensemble, spec.iterations)
+    @property
+    def idle_s(self) -> float:
+        """Return the seconds that may pass before the next call of the simulators ends.
+
+        A call has one controller while the duration of a rollout is unknown, in up to `BLOCK` simulators.
+        """
+        return self.rollout_s * BLOCK
 
     @property
     def check_s(self) -> float:

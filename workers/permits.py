@@ -24,8 +24,8 @@ POLL_S = 0.25
 ANSWER_S = 0.5
 """Seconds that an answer may take; a process that stands still gives none, and the permit must expire all the same."""
 
-Key: TypeAlias = tuple[int, int]
-"""A repetition's id, and the epoch of its lease."""
+Key: TypeAlias = tuple[int, int, int]
+"""A repetition's id, the epoch of its lease, and the place in its log of the step whose measurement is permitted."""
 
 Handle: TypeAlias = Any
 """A handle of a Permits actor, which Ray does not type."""
@@ -45,11 +45,11 @@ class Permits:
         self._until: dict[Key, float] = {}
 
     def renew(self, keys: Sequence[Key], until: float) -> None:
-        """Permit these repetitions, and no others, to move hardware until a time of the monotonic clock."""
+        """Permit these measurements, and no others, to move hardware until a time of the monotonic clock."""
         self._until = dict.fromkeys(keys, until)
 
     def left(self, key: Key) -> float:
-        """Return the seconds for which the repetition may still move hardware; 0 or less if it may not."""
+        """Return the seconds for which the measurement may still move hardware; 0 or less if it may not."""
         return self._until.get(key, 0.0) - monotonic()
 
 
@@ -59,12 +59,12 @@ def permits_here() -> Handle:
     return Permits.options(scheduling_strategy=here).remote()  # type: ignore[attr-defined]  # Ray adds it
 
 
-def asking(permits: Handle, key: Key) -> Callable[[], float]:
-    """Return a function that asks for the seconds that are left of a permit.
+def asking(permits: Handle, id_: int, epoch: int) -> Callable[[int], float]:
+    """Return a function that asks for the seconds that are left of a permit, given the place of the step in the log.
 
     It raises GetTimeoutError if there is no answer in time, and another RayError if the permits' process died.
     """
-    return lambda: float(ray.get(permits.left.remote(key), timeout=ANSWER_S))
+    return lambda step: float(ray.get(permits.left.remote((id_, epoch, step)), timeout=ANSWER_S))
 
 
 class PermittedReality:
@@ -73,7 +73,7 @@ class PermittedReality:
     Args:
         reality: the hardware.
         stop: stops the hardware at once; called from another thread.
-        left: returns the seconds until the permit expires, or raises as `asking` says.
+        left: returns the seconds until the permit of a step expires, or raises as `asking` says.
         end: ends this process.
     """
 
@@ -81,33 +81,38 @@ class PermittedReality:
         self,
         reality: Reality,
         stop: Callable[[], None],
-        left: Callable[[], float],
+        left: Callable[[int], float],
         end: Callable[[], None] = lambda: os._exit(1),
     ) -> None:
         self._reality, self._stop, self._left, self._end = reality, stop, left, end
 
-    def __call__(self, genome: Genome) -> Outcome:
-        """Return the outcome of the genome `(g,)` in reality, once it is permitted to ask."""
-        while (until := self._expiry(0.0)) <= monotonic():
+    def __call__(self, genome: Genome, step: int = 0) -> Outcome:
+        """Return the outcome of the genome `(g,)` in reality, once it is permitted to ask.
+
+        Args:
+            genome: what to measure.
+            step: place in the log of the step that it is measured for.
+        """
+        while (until := self._expiry(step, 0.0)) <= monotonic():
             sleep(POLL_S)
         answered = Event()
-        Thread(target=self._watch, args=(answered, until), name="permit", daemon=True).start()
+        Thread(target=self._watch, args=(answered, step, until), name="permit", daemon=True).start()
         try:
             return self._reality(genome)
         finally:
             answered.set()
 
-    def _expiry(self, known: float) -> float:
+    def _expiry(self, step: int, known: float) -> float:
         """Return when the permit expires; the last known time, if the permits' process does not answer or has died."""
         asked = monotonic()
         with suppress(RayError):
-            return asked + self._left()
+            return asked + self._left(step)
         return known
 
-    def _watch(self, answered: Event, until: float) -> None:
+    def _watch(self, answered: Event, step: int, until: float) -> None:
         while not answered.wait(POLL_S):
-            until = self._expiry(until)
-            if monotonic() > until:
+            until = self._expiry(step, until)
+            if monotonic() > until and not answered.is_set():  # an answer ends its permit
                 with suppress(Exception):
                     self._stop()
                 self._end()

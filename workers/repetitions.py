@@ -203,10 +203,10 @@ class Repetitions:
             self._permit()
 
     def _permit(self, but: Collection[Run] = ()) -> None:
-        """Permit the runs whose measurement is noted to move hardware, for a part of the lease since its renewal."""
+        """Permit the measurements that are noted to move hardware, for a part of the lease since its renewal."""
         if self._permits is not None:
-            noted = (run for run in self.runs if run.permits is not None and run.measuring is not None)
-            keys = [(run.claim.id, run.claim.epoch) for run in noted if run not in but]
+            able = (run for run in self.runs if run.permits is not None and run not in but)
+            keys = [(run.claim.id, run.claim.epoch, run.measuring) for run in able if run.measuring is not None]
             self._permits.renew.remote(keys, self._renewed + SHARE * self._lease_s)
 
     def _stop(self, runs: Collection[Run]) -> None:

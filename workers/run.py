@@ -8,7 +8,8 @@ from ray import ObjectRefGenerator
 from ray.exceptions import RayError, RayTaskError
 
 from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
-from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, Requested
+from gaplab.services.core.types import Measured, Probed
+from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, Requested, TimedStep
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import Handle
 from gaplab.workers.task import Batch, told
@@ -29,7 +30,7 @@ class Run:
         failed: reason of a failure: an error of its code, or a limit of time.
         pulse: the last sign of life, if no delivery has followed it.
         heard_at: time of the last delivery or sign of life.
-        measuring: the place in the log of the step whose measurement the database knows of.
+        measuring: the place in the log of the step whose measurement the database knows of; None once it has ended.
         refused: reason why its process did not begin it.
         lost: reason why another worker must continue: the worker is gone, or the log refused a delivery.
     """
@@ -74,6 +75,8 @@ class Run:
                 self.failed = item
             else:
                 self.received.append(item)
+                if isinstance(item, TimedStep) and isinstance(item.step, Measured | Probed):
+                    self.measuring = None
                 self.asks = self.asks or isinstance(item, Requested)
 
     def cancel(self) -> None:
@@ -94,7 +97,7 @@ class Run:
         by_hardware = pulse is not None and pulse.measuring and self.permits is not None
         if not self.begun or by_hardware:
             return None
-        idle_s, permitted_s = since_s + (pulse.idle_s if pulse else 0.0), patience.idle_s(self.claim.spec)
+        idle_s, permitted_s = since_s + (pulse.idle_s if pulse else 0.0), patience.idle_s
         if idle_s > permitted_s:
             asked = "reality did not answer" if pulse and pulse.measuring else "no rollout ended"
             return f"{asked} for {idle_s:.0f} s; GAPLAB_ROLLOUT_LIMIT_S is {patience.rollout_s:g} s for each rollout"

@@ -71,8 +71,7 @@ def _prepared(claim: Claim, expected: Versions, permits: Handle | None) -> Setti
 def _permitted(reality: Reality, claim: Claim, permits: Handle) -> PermittedReality:
     ref = claim.spec.reality.engine
     assert ref is not None, "permits are for hardware behind an engine"
-    key, engine = (claim.id, claim.epoch), engine_of(ref)
-    return PermittedReality(reality, engine.stop, asking(permits, key))
+    return PermittedReality(reality, engine_of(ref).stop, asking(permits, claim.id, claim.epoch))
 
 
 def failure_of(error: BaseException) -> Failure:

@@ -8,9 +8,8 @@ from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.frames import frame, pandas_library
 from gaplab.api.clients.results import Results
 from gaplab.schemas.curves import CurvePoint
-from gaplab.schemas.plugin import Catalogue
 from gaplab.schemas.predictions import Prediction, Predictions
-from gaplab.schemas.records import ExperimentRead, MeasurementKind, Page, SampleRead, SimulatorRead
+from gaplab.schemas.records import ExperimentRead, MeasurementKind, Page, SampleRead, SensorsRead, SimulatorRead
 
 if TYPE_CHECKING:
     import pandas
@@ -72,24 +71,27 @@ class Tables:
             id: id of the experiment.
             repetition: only this repetition.
             kind: only "sample" (learned from) or "probe" (only recorded).
+
+        Raises:
+            LookupError: the robot or its task is not installed in the service, so the sensors are unknown.
         """
-        robot = self._connection.get(ExperimentRead, f"/experiments/{segment(id)}").spec["robot"]["name"]
-        details = next(
-            each.details for each in self._connection.get(Catalogue, "/catalogue").robots if each.name == robot
-        )
-        sensors, times_s = details.get("sensors", []), details.get("reading_times_s", [])
-        names = [f"{sensor['name']}_{sensor['unit']}" for sensor in sensors]
+        sensors = self._connection.get(ExperimentRead, f"/experiments/{segment(id)}").sensors
+        if sensors is None:
+            raise LookupError(f"the sensors of {id} are unknown: its robot or task is not installed in the service")
+        names = [f"{name}_{unit}" for name, unit in zip(sensors.names, sensors.units, strict=True)]
         rows = [
             (sample.repetition, sample.iteration, str(sample.kind), time_s, *values)
             for sample in self._samples(id, repetition, kind)
-            for time_s, *values in _values(sample.readings or (), times_s, [sensor["noise"] for sensor in sensors])
+            if sample.readings is not None
+            for time_s, *values in _values(sample.readings, sensors)
         ]
         return frame(rows, ("repetition", "iteration", "kind", "time_s", *names), ("time_s", *names))
 
     def simulators(self, id: str, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
         """Return the tuned simulators of an experiment, with a column for each tunable; rank 0 is an iteration's best.
 
-        `squared_error` is a sum over samples and grows with them; `error` is the root mean square per sample.
+        `squared_error` is a sum over samples and grows with them; `error` is per sample, in the unit of the
+        discrepancy; by default the root mean square.
 
         Args:
             id: id of the experiment.
@@ -132,12 +134,11 @@ class Tables:
         return list(self._connection.items(Page[SampleRead], path, limit=PAGE, repetition=repetition, kind=wanted))
 
 
-def _values(
-    readings: Sequence[float | None], times_s: Sequence[float], noises: Sequence[float]
-) -> Iterator[tuple[float | None, ...]]:
+def _values(readings: Sequence[float | None], sensors: SensorsRead) -> Iterator[tuple[float | None, ...]]:
     """Yield each time of one evaluation with the values of all sensors, in their units."""
-    for start, time_s in zip(range(0, len(readings), len(noises) or 1), times_s, strict=False):
-        of_time = zip(readings[start : start + len(noises)], noises, strict=True)
+    size = len(sensors.noises)
+    for start, time_s in zip(range(0, len(readings), size or 1), sensors.times_s, strict=True):
+        of_time = zip(readings[start : start + size], sensors.noises, strict=True)
         yield time_s, *(None if reading is None else reading * noise for reading, noise in of_time)
 
 

@@ -1,16 +1,22 @@
 """The tables of a comparison, each narrow enough for a terminal."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.markup import escape
 from rich.table import Table
 
 from gaplab.api.commands.tables import table
+from gaplab.schemas.comparison_columns import UNPAIRED, shown_tests
 from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
 
-UNPAIRED = {"student": "p Student", "welch": "p Welch", "mann_whitney": "p Mann-Whitney"}
-PAIRED = {"paired_t": "p paired t", "wilcoxon": "p Wilcoxon"}
-SPREAD = {"brown_forsythe": "p of the spread"}
+NAMES = {
+    "student": "p Student",
+    "welch": "p Welch",
+    "mann_whitney": "p Mann-Whitney",
+    "paired_t": "p paired t",
+    "wilcoxon": "p Wilcoxon",
+    "brown_forsythe": "p of the spread",
+}
 
 
 def comparisons(pairs: Sequence[Comparison]) -> list[Table | str]:
@@ -27,8 +33,7 @@ def _tables(pairs: Sequence[Comparison]) -> Iterator[Table | str]:
     yield "Differences with 90 % intervals, Cohen's d, and the probability that a repetition of the first is fitter"
     yield table(("first", "second", "n", "difference", "d", "P(first > second)"), map(_sizes, pairs))
     yield "p, and in brackets p with Holm's correction over all pairs"
-    shared = any(pair.shared_streams for pair in pairs)
-    yield _tests(pairs, pairs, UNPAIRED | (PAIRED if shared else {}) | SPREAD)
+    yield _tests(pairs, pairs, shown_tests(pairs))
     yield from dict.fromkeys(f"! {_names(pair)}: {escape(pair.caution)}\n" for pair in pairs if pair.caution)
     pooled = [pair.pooled for pair in pairs if pair.pooled]
     if pooled:
@@ -54,12 +59,12 @@ def _sizes(pair: Comparison) -> tuple[str, ...]:
     return escape(pair.first_name), escape(pair.second_name), f"{pair.n_first}, {pair.n_second}", *numbers
 
 
-def _tests(pairs: Sequence[Comparison], tested: Sequence[Groups], names: Mapping[str, str]) -> Table:
+def _tests(pairs: Sequence[Comparison], tested: Sequence[Groups], names: Sequence[str]) -> Table:
     rows = [
         (escape(pair.first_name), escape(pair.second_name), *(_p(getattr(tests, name)) for name in names))
         for pair, tests in zip(pairs, tested, strict=True)
     ]
-    return table(("first", "second", *names.values()), rows)
+    return table(("first", "second", *(NAMES[test] for test in names)), rows)
 
 
 def _names(pair: Comparison) -> str:

@@ -109,8 +109,7 @@ class EventFeed:
     async def _read(self) -> None:
         while not self._closed:
             try:
-                if not await self._read_once():
-                    return
+                await self._read_once()
                 await asyncio.sleep(self._every_s)
             except StoreUnavailable as error:
                 log.warning("event streams wait for the database: %s", error)
@@ -122,8 +121,8 @@ class EventFeed:
             log.error("event streams end: their reader failed", exc_info=error)
             self._wake()
 
-    async def _read_once(self) -> bool:
-        """Read what is new, and return whether the database is still the same; else the streams end."""
+    async def _read_once(self) -> None:
+        """Read what is new, and wake the streams; if the database has fewer events than before, they end."""
         if self._head is None:
             self._head = await run_sync(lambda: events.latest(self._store))
             self._wake()
@@ -139,7 +138,6 @@ class EventFeed:
             self._recent.extend(page.items)
             self._head = page.items[-1].number
             self._wake()
-        return True
 
     def _wake(self) -> None:
         """Wake all waiting streams once."""

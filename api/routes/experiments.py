@@ -23,6 +23,7 @@ from gaplab.schemas.records import (
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import editing, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
+from gaplab.services.experiments.views import with_sensors
 from gaplab.services.results.misfit import misfit, misfit_csv
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
@@ -128,7 +129,7 @@ def read_experiment(
     id: Id, store: StoreDep, caller: CallerDep, request: Request, query: Annotated[Revealing, Query()]
 ) -> Response:
     """Return an experiment with its resolved spec; reality's parameters are null until it has ended."""
-    experiment = reading.read_experiment(store, id, reveal=query.permitted(caller))
+    experiment = with_sensors(reading.read_experiment(store, id, reveal=query.permitted(caller)))
     return conditional.tagged(request, experiment, experiment.edits)
 
 

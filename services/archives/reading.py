@@ -30,6 +30,7 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.states import settle
 from gaplab.services.settings import Limits
 from gaplab.services.specs.hardware import hardware_of
+from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note
@@ -76,7 +77,7 @@ def import_archive(store: Store, file: IO[bytes], *, most_rows: int | None = Non
         raise Conflict(f"{AT_ONCE} archives are being imported already; try again when they are done")
     try:
         with store.reading() as session:
-            now = archives.database_time(session)
+            now = moment(session)
         with checked_archive(file, now, most_rows=most_rows) as checked:
             return store.write(_copy, checked)
     finally:

@@ -8,7 +8,7 @@ from io import SEEK_END, BufferedIOBase, BytesIO
 from shutil import copyfileobj
 from tempfile import TemporaryFile
 from typing import IO, Literal
-from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
+from zipfile import ZipFile
 
 from pydantic import TypeAdapter
 
@@ -18,16 +18,12 @@ from gaplab.services.archives.columns import EXPORTED, ONLY_IF_USED, columns_of
 from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, Row, member_of, write
 from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
+from gaplab.services.results.zip_entries import entry_of
 from gaplab.services.specs.shortening import experiment_spec, study_spec
 from gaplab.services.store.models import REVISION, ExperimentRow
 from gaplab.services.store.queries import archives, experiments
 from gaplab.services.store.session import Session, Store
 from gaplab.services.store.stored_specs import without_truth
-
-_MOMENT = (1980, 1, 1, 0, 0, 0)
-"""Date of every member, the earliest of the zip format, so that the same content gives the same bytes."""
-
-_FILE = 0o644 << 16
 
 
 @dataclass(frozen=True)
@@ -89,7 +85,7 @@ def _export(
             manifest = Manifest(
                 format=FORMAT, gaplab=version("gaplab"), revision=REVISION, kind=kind, id=id_, members=members
             )
-            archive.writestr(_info(MANIFEST), manifest.model_dump_json(indent=2))
+            archive.writestr(entry_of(MANIFEST), manifest.model_dump_json(indent=2))
         size = file.tell()
         file.seek(0)
     except BaseException:
@@ -121,14 +117,6 @@ def _add(archive: ZipFile, name: str, content: BufferedIOBase, rows: int) -> Mem
     content.seek(0)
     digest = file_digest(content, "sha256").hexdigest()
     content.seek(0)
-    with archive.open(_info(name), "w", force_zip64=True) as target:
+    with archive.open(entry_of(name), "w", force_zip64=True) as target:
         copyfileobj(content, target)
     return Member(sha256=digest, bytes=size, rows=rows)
-
-
-def _info(name: str) -> ZipInfo:
-    """Return the entry of a member in the zip; Parquet is compressed already."""
-    info = ZipInfo(name, _MOMENT)
-    info.compress_type = ZIP_STORED if name.endswith(".parquet") else ZIP_DEFLATED
-    info.external_attr = _FILE
-    return info

@@ -7,6 +7,7 @@ from sqlalchemy import delete, func, insert, select, update
 
 from gaplab.schemas.corrections import BranchRead
 from gaplab.schemas.lifecycle import Ending, State
+from gaplab.services.core.arrays import known
 from gaplab.services.core.types import Cost, Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.running.leases import Change
 from gaplab.services.running.repetition_leases import RepetitionLeases
@@ -22,7 +23,7 @@ from gaplab.services.store.models import (
 from gaplab.services.store.queries import checkpoints, request_states
 from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.queries.logs import logs
-from gaplab.services.store.queries.step_rows import finite, position, vector
+from gaplab.services.store.queries.step_rows import position, vector
 from gaplab.services.store.session import Session, snapshot
 
 _LEASES = RepetitionLeases()
@@ -94,17 +95,17 @@ def plain(step: Step) -> dict[str, Any]:
             found["genome"] = vector(step.genome)
         case Measured():
             sample = step.sample
-            found |= {"genome": vector(sample.genome), "fitness": finite(sample.fitness)}
+            found |= {"genome": vector(sample.genome), "fitness": known(sample.fitness)}
             found["repeats"] = vector(sample.repeats)
         case Tuned():
             found["simulators"] = [
-                {"parameters": vector(each.parameters), "squared_error": finite(each.squared_error)}
+                {"parameters": vector(each.parameters), "squared_error": known(each.squared_error)}
                 for each in step.simulators
             ]
         case Transferred():
-            found |= {"genome": vector(step.genome), "simulated_fitness": finite(step.fitness)}
+            found |= {"genome": vector(step.genome), "simulated_fitness": known(step.fitness)}
         case Probed():
-            found |= {"fitness": finite(step.fitness), "recorded_fitness": finite(step.recorded)}
+            found |= {"fitness": known(step.fitness), "recorded_fitness": known(step.recorded)}
             found["repeats"] = vector(step.repeats)
     return found
 

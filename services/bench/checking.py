@@ -7,6 +7,8 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.measured_values import readings_violations, unit_violations
 from gaplab.services.core.robot_library import label_of
+from gaplab.services.core.stored_specs import discrepancy_of
+from gaplab.services.specs.measured import lack_violations
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.queries import attachments
 from gaplab.services.store.session import Session
@@ -20,6 +22,9 @@ def check_values(
 ) -> None:
     """Refuse values of another unit or number than the experiment asks for, and readings of another shape.
 
+    If the experiment tunes on readings, values without any that it compares are refused too. An answer about a probe
+    is no exception, since it also counts for a later sample of the same controller.
+
     Raises:
         InvalidSpec: with every violation.
     """
@@ -27,6 +32,9 @@ def check_values(
     violations = list(_violations(spec, values, unit, robot.unit))
     if readings is not None:
         violations += readings_violations(readings, None if values is None else len(values), robot.sensors)
+    if values is not None and not violations:
+        discrepancy = discrepancy_of(spec.model_dump(include={"discrepancy"}))
+        violations += lack_violations(discrepancy, robot.sensors, values, readings)
     if violations:
         raise InvalidSpec(violations)
 

@@ -7,6 +7,7 @@ from gaplab.schemas.measurements import RequestState
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.bench import branches
 from gaplab.services.bench.consequences import places_of
+from gaplab.services.core.arrays import known
 from gaplab.services.core.history import History
 from gaplab.services.core.probes import recorded_fitness
 from gaplab.services.core.stored_specs import spec_of
@@ -27,7 +28,7 @@ from gaplab.services.store.queries import requests
 from gaplab.services.store.queries.experiments import repetitions_of
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.queries.request_states import become
-from gaplab.services.store.queries.step_rows import finite, measurement_columns
+from gaplab.services.store.queries.step_rows import measurement_columns
 from gaplab.services.store.session import Session
 
 
@@ -66,7 +67,7 @@ def _rewrite_records(session: Session, repetition: RepetitionRow) -> None:
     (log,) = logs(session, [repetition.id]).values()
     for step in log:
         if isinstance(step, Probed):
-            recorded = finite(recorded_fitness(step.fitness, history.samples))
+            recorded = known(recorded_fitness(step.fitness, history.samples))
             of_it = (row.repetition_id == repetition.id) & (row.number == step.iteration)
             session.execute(update(row).where(of_it).values(recorded_fitness=recorded))
         history = history.after(step)

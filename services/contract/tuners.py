@@ -56,14 +56,16 @@ def samples() -> tuple[Sample, ...]:
     return tuple(Sample(genome, float(row[0]), row[1:]) for genome, row in zip(genomes, measured, strict=True))
 
 
-def tuned(plugin: Plugin, physics: Physics, ensemble: int = 1, seed: int = 0) -> Sequence[Simulator]:
+def tuned(
+    plugin: Plugin, physics: Physics, ensemble: int = 1, seed: int = 0, evaluations: int = EVALUATIONS
+) -> Sequence[Simulator]:
     """Return the simulators that a tuner finds."""
     answers = Answers(physics.fitness, sense=physics.sense)
     misfit = Misfit(answers, samples(), Readings(), TIMES_S if Readings.senses else NO_READINGS)
     optimizer = SteadyState().diverse(ensemble) if ensemble > 1 else SteadyState()
     rng = np.random.default_rng(seed)
     previous = tuple(Simulator(row) for row in SPACE.draw(ensemble, rng))
-    return plugin().tune(TuningTask(misfit, SPACE, optimizer, ensemble, EVALUATIONS, previous), rng)
+    return plugin().tune(TuningTask(misfit, SPACE, optimizer, ensemble, evaluations, previous), rng)
 
 
 def finds_the_simulator(plugin: Plugin) -> None:
@@ -92,13 +94,14 @@ def states_the_discrepancy_of_each(plugin: Plugin) -> None:
 
 
 def keeps_to_its_budget(plugin: Plugin) -> None:
-    """Evaluates no more simulators than it may, within the bounds."""
-    physics = Physics()
-    tuned(plugin, physics, 7)
-    permitted = EVALUATIONS * len(samples())
-    assert physics.rollouts <= permitted, f"it takes {physics.rollouts} rollouts; permitted: {permitted}"
-    asked = np.vstack(physics.asked)
-    assert np.all((SPACE.lower <= asked) & (asked <= SPACE.upper)), "it asks for simulators outside the bounds"
+    """Evaluates no more simulators than it may, within the bounds, also with the smallest budget that it permits."""
+    for evaluations in (plugin().least_evaluations(SteadyState(), 7), EVALUATIONS):
+        physics = Physics()
+        tuned(plugin, physics, 7, evaluations=evaluations)
+        permitted = evaluations * len(samples())
+        assert physics.rollouts <= permitted, f"it takes {physics.rollouts} rollouts; permitted: {permitted}"
+        asked = np.vstack(physics.asked)
+        assert np.all((SPACE.lower <= asked) & (asked <= SPACE.upper)), "it asks for simulators outside the bounds"
 
 
 def divides_its_evaluations(plugin: Plugin) -> None:

@@ -1,5 +1,6 @@
 """Array types by shape; every number in the core is a float64."""
 
+from math import isfinite
 from typing import TypeAlias
 
 import numpy as np
@@ -32,6 +33,11 @@ def frozen(values: object) -> FloatArray:
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
+
+
+def known(value: float) -> float | None:
+    """Return the value, or None if it is not finite."""
+    return float(value) if isfinite(value) else None
 
 
 NO_READINGS: Readings = frozen([])

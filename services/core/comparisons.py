@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from gaplab.schemas.comparison_columns import TESTS, UNPAIRED
 from gaplab.schemas.comparisons import (
     Comparison,
     Groups,
@@ -23,8 +24,7 @@ from gaplab.schemas.comparisons import (
     Summary,
     Trusted,
 )
-from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import known
+from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.equivalence import difference_interval, equivalent
 from gaplab.services.core.intervals import improvement, summary
 from gaplab.services.core.statistics import (
@@ -43,8 +43,6 @@ POOLED = (
     "pooled as in the paper: the values of one repetition at several numbers of evaluations are not independent, so "
     "each p is too small; trust the tests with one value for each repetition"
 )
-UNPAIRED = ("student", "welch", "mann_whitney")
-TESTS = (*UNPAIRED, "paired_t", "wilcoxon", "brown_forsythe")
 
 G = TypeVar("G", bound=Groups)
 

@@ -1,13 +1,12 @@
 """Curves: points computed from the recorded fitness of many repetitions."""
 
 from functools import lru_cache
-from math import isfinite
 
 import numpy as np
 from scipy import special
 
 from gaplab.schemas.curves import CurvePoint
-from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.arrays import FloatArray, known
 
 CONFIDENCE = 0.95
 
@@ -46,7 +45,7 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
         sd=sd,
         lower=lower,
         upper=upper,
-        values=tuple(float(value) if np.isfinite(value) else None for value in values),
+        values=tuple(map(known, values)),
     )
 
 
@@ -98,11 +97,6 @@ def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | Non
 def equal(values: FloatArray) -> bool:
     """Return whether all values `(n,)` are equal."""
     return bool(np.all(values == values[:1]))
-
-
-def known(value: float) -> float | None:
-    """Return the value, or None if it is not finite."""
-    return float(value) if isfinite(value) else None
 
 
 @lru_cache(maxsize=1024)

@@ -10,8 +10,7 @@ import numpy as np
 import scipy
 
 from gaplab.schemas.comparisons import Comparison, Equivalence, EquivalenceVerdict, Trusted
-from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import known
+from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.statistics import both, constant_difference, finite, holm, moved, varies
 
 CONFIDENCE = 0.9

@@ -23,7 +23,7 @@ PARTLY = 0.6
 """Largest remaining uncertainty of a tunable that is partly identified. One in ten draws of five spreads less."""
 
 FALLING = 0.8
-"""Share of its value at half the samples below which uncertainty still falls."""
+"""Share of its value at half the samples, or fewer, below which uncertainty still falls."""
 
 OVERFITTED = 2.0
 """Error on held-out samples, over that on the samples tuned on, from which simulators are overfitted."""
@@ -42,18 +42,22 @@ class Means:
     intervals: Sequence[str] = ()
 
 
-def verdicts(points: Sequence[MisfitPoint], means: Means) -> tuple[TunableVerdict, ...]:
+def verdicts(points: Sequence[MisfitPoint], samples: Sequence[float], means: Means) -> tuple[TunableVerdict, ...]:
     """Return the verdict on each tunable at the latest iteration; none before the first sample.
 
     Args:
         points: misfit of each iteration, from 0.
+        samples: number of samples that each was tuned on, with those from before the experiment; a mean over
+            repetitions.
         means: what the experiment has not used.
     """
-    tuned = [each for each in points if each.error.n]
+    tuned = [(point.tunables, count) for point, count in zip(points, samples, strict=True) if point.error.n]
     if not tuned:
         return ()
-    earlier = tuned[(len(tuned) - 1) // 2].tunables
-    return tuple(_verdict(now, then, len(tuned), means) for now, then in zip(tuned[-1].tunables, earlier, strict=True))
+    latest, most = tuned[-1]
+    earlier = [tunables for tunables, count in tuned if 2 * count <= most]
+    halves = earlier[-1] if earlier else [None] * len(latest)
+    return tuple(_verdict(now, then, most, means) for now, then in zip(latest, halves, strict=True))
 
 
 def overfitting(point: MisfitPoint, unit: str) -> str:
@@ -71,7 +75,9 @@ def remaining(found: TunableDistribution) -> float | None:
     return max((each for each in (spread, found.interval, found.posterior) if each is not None), default=None)
 
 
-def _verdict(now: TunableDistribution, then: TunableDistribution, samples: int, means: Means) -> TunableVerdict:
+def _verdict(
+    now: TunableDistribution, then: TunableDistribution | None, samples: float, means: Means
+) -> TunableVerdict:
     left = remaining(now)
     verdict = _judged(left)
     return TunableVerdict(
@@ -101,9 +107,16 @@ def _sentence(now: TunableDistribution, verdict: Identification, left: float | N
     return f"{now.name}: {verdict.value}; {value}, with {100 * left:.0f} % of the uncertainty before any sample"
 
 
-def _helps(now: TunableDistribution, then: TunableDistribution, samples: int, means: Means) -> Iterator[str]:
-    """Yield what would help, what costs least first."""
-    left, before = remaining(now), remaining(then)
+def _helps(now: TunableDistribution, then: TunableDistribution | None, samples: float, means: Means) -> Iterator[str]:
+    """Yield what would help, what costs least first.
+
+    Args:
+        now: the tunable at the latest iteration.
+        then: the same on at most half of the samples; None if there is no such iteration.
+        samples: number of samples.
+        means: what the experiment has not used.
+    """
+    left, before = remaining(now), None if then is None else remaining(then)
     if left is None:
         yield f"at least {FEWEST} repetitions"
     if means.readings:

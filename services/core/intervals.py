@@ -13,8 +13,8 @@ import numpy as np
 import scipy
 
 from gaplab.schemas.comparisons import Estimate, Summary
-from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import CONFIDENCE, curve_point, known
+from gaplab.services.core.arrays import FloatArray, known
+from gaplab.services.core.curves import CONFIDENCE, curve_point
 from gaplab.services.core.statistics import both, constant, finite
 from gaplab.services.core.streams import stream
 

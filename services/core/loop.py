@@ -225,7 +225,7 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
         setting.parameters.check(simulator.parameters, source)
     if tests:
         found = tested(found, Misfit(answers, tests, setting.discrepancy, setting.reading_times_s))
-    return Tuned(iteration, found, answers.cost_of(budget))
+    return Tuned(iteration, found, answers.cost_within(budget, source))
 
 
 def _transfer(setting: Setting, history: History, iteration: int, answers: Answers) -> Transferred:

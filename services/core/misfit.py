@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gaplab.schemas.misfit import Distribution, MisfitPoint, TunableDistribution
-from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import known
+from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.space import Space

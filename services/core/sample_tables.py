@@ -6,16 +6,16 @@ brackets, as in `value [m/s]`. An empty value means that a line has fewer repeat
 column, means that the sensor failed. Cells are separated by commas, semicolons or tabs.
 """
 
-import csv
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from math import isclose, isfinite
 
 from gaplab.schemas.measurements import MOST_VALUES, KnownSample
 from gaplab.schemas.samples import CellError, SamplesRead
+from gaplab.services.core.csv_tables import CsvRow, lines_of, rows_of
 from gaplab.services.core.errors import Violation
 from gaplab.services.core.measured_values import sample_violations
 from gaplab.services.core.robots.base import Robot
@@ -51,6 +51,30 @@ class SampleColumn:
     sensor: int = 0
 
 
+class FirstErrors:
+    """Collects errors, and counts those after `MOST_ERRORS`.
+
+    Attributes:
+        first: the first errors.
+        count: number of all errors.
+    """
+
+    def __init__(self) -> None:
+        self.first: list[CellError] = []
+        self.count = 0
+
+    def append(self, error: CellError) -> None:
+        """Add an error."""
+        self.count += 1
+        if len(self.first) < MOST_ERRORS:
+            self.first.append(error)
+
+    def extend(self, errors: Iterable[CellError]) -> None:
+        """Add errors."""
+        for error in errors:
+            self.append(error)
+
+
 def read_samples(text: str, robot: Robot) -> SamplesRead:
     """Return the samples of a table, or everything that is wrong with it.
 
@@ -58,30 +82,24 @@ def read_samples(text: str, robot: Robot) -> SamplesRead:
         text: content of the file.
         robot: the robot that was measured.
     """
-    lines = text.removeprefix("\ufeff").splitlines()
-    first = next((line for line in lines if line.strip()), "")
-    rows = csv.reader(lines, delimiter=max(",;\t", key=first.count), skipinitialspace=True)
-    filled = ((rows.line_num, [cell.strip() for cell in row]) for row in rows if any(cell.strip() for cell in row))
-    samples, errors = list[KnownSample](), list[CellError]()
-    try:
-        line, headings = next(filled, (1, []))
-        columns = list(_columns(line, headings, robot, errors))
-        complete = not errors
-        for line, cells in filled:
-            numbers = _numbers(line, cells, columns, errors)
-            samples += _sample(line, numbers, columns, robot, errors) if numbers and complete else ()
-    except csv.Error as error:
-        errors.append(CellError(line=rows.line_num, message=f"the line is no CSV: {error}"))
-    if not errors and not 1 <= len(samples) <= MOST_SAMPLES:
+    rows = rows_of(lines_of(text))
+    samples, errors = list[KnownSample](), FirstErrors()
+    line, headings, broken = next(rows, CsvRow(1, []))
+    columns = [] if broken else list(_columns(line, headings, robot, errors))
+    complete = not errors.count
+    for line, cells, broken in rows:
+        numbers = {} if broken else _numbers(line, cells, columns, errors)
+        samples += _sample(line, numbers, columns, robot, errors) if numbers and complete else ()
+    if broken:
+        errors.append(CellError(line=line, message=broken))
+    if not errors.count and not 1 <= len(samples) <= MOST_SAMPLES:
         permitted = f"1 to {MOST_SAMPLES:,} lines below the header"
         errors.append(CellError(line=line, message=f"the table has {len(samples):,} samples", permitted=permitted))
-    told = tuple(errors[:MOST_ERRORS])
-    return SamplesRead(samples=() if errors else tuple(samples), errors=told, more=len(errors) - len(told))
+    told = tuple(errors.first)
+    return SamplesRead(samples=() if told else tuple(samples), errors=told, more=errors.count - len(told))
 
 
-def _columns(
-    line: int, headings: Sequence[str], robot: Robot, errors: list[CellError]
-) -> Iterator[SampleColumn | None]:
+def _columns(line: int, headings: Sequence[str], robot: Robot, errors: FirstErrors) -> Iterator[SampleColumn | None]:
     """Yield what each column holds, None if it is unknown; add what is wrong with the header to the errors."""
     found = []
     for heading in headings:
@@ -133,14 +151,14 @@ def _absent(columns: Sequence[SampleColumn], robot: Robot) -> Iterator[str]:
 
 
 def _numbers(
-    line: int, cells: Sequence[str], columns: Sequence[SampleColumn | None], errors: list[CellError]
+    line: int, cells: Sequence[str], columns: Sequence[SampleColumn | None], errors: FirstErrors
 ) -> dict[SampleColumn, float]:
     """Return the numbers of a line, none if it has an error; add what is wrong with its cells to the errors."""
     if len(cells) != len(columns):
         message = f"the line has {len(cells)} cells, and the header {len(columns)}"
         errors.append(CellError(line=line, message=message, permitted=f"exactly {len(columns)} cells"))
         return {}
-    before, numbers = len(errors), dict[SampleColumn, float]()
+    before, numbers = errors.count, dict[SampleColumn, float]()
     for column, cell in zip(columns, cells, strict=True):
         if column is None:
             continue
@@ -152,7 +170,7 @@ def _numbers(
             numbers[column] = float(cell)
         elif column.kind == "gene" or (column.kind == "value" and column.place == 0):
             errors.append(CellError(line=line, column=column.name, value="", message=f"{column.name} is empty"))
-    return numbers if len(errors) == before else {}
+    return numbers if errors.count == before else {}
 
 
 def _sample(
@@ -160,14 +178,14 @@ def _sample(
     numbers: Mapping[SampleColumn, float],
     columns: Sequence[SampleColumn | None],
     robot: Robot,
-    errors: list[CellError],
+    errors: FirstErrors,
 ) -> tuple[KnownSample, ...]:
     """Return the sample of a line, or none; add what is wrong with it to the errors."""
     if gaps := list(_gaps(line, numbers)):
-        errors += gaps
+        errors.extend(gaps)
         return ()
     sample = _assembled(numbers, any(column and column.kind == "reading" for column in columns), robot)
-    errors += [_told_by_line(line, violation) for violation in sample_violations(sample, robot)]
+    errors.extend(_told_by_line(line, violation) for violation in sample_violations(sample, robot))
     return (sample,)
 
 

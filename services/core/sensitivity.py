@@ -17,12 +17,12 @@ individual conditional expectation (Goldstein et al. 2015). The verdicts are gap
 """
 
 from dataclasses import dataclass
-from math import inf, isfinite, isnan
+from math import inf, isnan
 
 import numpy as np
 
 from gaplab.schemas.sensitivity import Sensitivity, Verdict
-from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, known
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Simulate
 from gaplab.services.core.search import maximise
@@ -144,13 +144,13 @@ def sensitivity(name: str, values: FloatArray, fitness: Fitnesses, spread: float
     relative = _relative(effect, spread)
     return Sensitivity(
         name=name,
-        effect=_known(effect),
-        relative_effect=_known(relative),
-        roughness=_known(roughness),
+        effect=known(effect),
+        relative_effect=known(relative),
+        roughness=known(roughness),
         failures=int(np.isnan(fitness).sum()),
         verdict=verdict(relative, roughness),
         values=tuple(values.tolist()),
-        fitness=tuple(tuple(map(_known, row)) for row in fitness.tolist()),
+        fitness=tuple(tuple(map(known, row)) for row in fitness.tolist()),
     )
 
 
@@ -206,7 +206,3 @@ def _relative(effect: float, spread: float) -> float:
     if effect == 0:
         return 0.0
     return effect / spread if spread != 0 else inf
-
-
-def _known(value: float) -> float | None:
-    return float(value) if isfinite(value) else None

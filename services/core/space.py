@@ -60,7 +60,11 @@ class Space:
 
     def draw(self, count: int, rng: Generator) -> Genomes:
         """Return vectors `(count, g)`, drawn uniformly from the box."""
-        return self.lower + self.extent * rng.random((count, self.size))
+        return self.at(rng.random((count, self.size)))
+
+    def at(self, shares: FloatArray) -> FloatArray:
+        """Return the vectors at shares of the extents `(..., g)`, from 0 to 1; none is above a bound by rounding."""
+        return np.minimum(self.lower + self.extent * shares, self.upper)
 
     def check(self, vector: object, source: str) -> FloatArray:
         """Return the vector `(g,)`, which a plug-in returned.
@@ -90,8 +94,7 @@ class Space:
     def contain(self, vectors: FloatArray) -> FloatArray:
         """Return the vectors moved into the box: periodic coordinates wrap, the others clip."""
         wrapped = self.lower + np.mod(vectors - self.lower, self.extent)
-        clipped = np.minimum(np.maximum(vectors, self.lower), self.upper)
-        return np.where(self.periodic, wrapped, clipped)
+        return np.minimum(np.maximum(np.where(self.periodic, wrapped, vectors), self.lower), self.upper)
 
 
 def _brief(value: object) -> str:

@@ -11,8 +11,7 @@ import numpy as np
 import scipy
 
 from gaplab.schemas.comparisons import Test
-from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import known
+from gaplab.services.core.arrays import FloatArray, known
 
 ROUNDING = 1e-12
 """Variation, relative to the largest value, that counts as rounding."""

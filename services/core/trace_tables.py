@@ -1,12 +1,12 @@
 """Traces in CSV: a line for each moment, with the pose of the base."""
 
-import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import isfinite
 
 import numpy as np
 
 from gaplab.services.core.arrays import frozen
+from gaplab.services.core.csv_tables import CsvRow, first_of, lines_of, rows_of
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.traces import Trace
 
@@ -33,27 +33,41 @@ def read_trace(text: str, pointer: str) -> Trace:
     Raises:
         InvalidSpec: with every error, each with its line and column.
     """
-    lines = text.removeprefix("\ufeff").splitlines()
+    lines = lines_of(text)
     if len(lines) > MOST_LINES:
         message = f"the trace has {len(lines):,} lines"
         raise InvalidSpec([Violation(pointer, f"{len(lines):,} lines", message, f"at most {MOST_LINES:,}")])
-    first = next((line for line in lines if line.strip()), "")
-    rows = csv.reader(lines, delimiter=max(",;\t", key=first.count), skipinitialspace=True)
-    filled = ((rows.line_num, [cell.strip() for cell in row]) for row in rows if any(cell.strip() for cell in row))
-    line, headings = next(filled, (1, []))
-    names = [heading.partition("[")[0].strip() for heading in headings]
+    rows = rows_of(lines)
+    header = next(rows, CsvRow(1, []))
+    names = [heading.partition("[")[0].strip() for heading in header.cells]
     if missing := [name for name in COLUMNS if names.count(name) != 1]:
-        message = f"line {line}: the trace needs one column each of {', '.join(missing)}"
-        raise InvalidSpec([Violation(pointer, first[:200], message, ", ".join(COLUMNS))])
-    places, errors, numbers = [names.index(name) for name in COLUMNS], list[str](), list[list[float]]()
-    for line, cells in filled:
-        found = list(_numbers(line, cells, places, errors))
-        numbers += [found] if len(found) == len(COLUMNS) else ()
+        message = header.error or f"the trace needs one column each of {', '.join(missing)}"
+        found = first_of(lines)[:200]
+        raise InvalidSpec([Violation(pointer, found, f"line {header.line}: {message}", ", ".join(COLUMNS))])
+    numbers, errors = _table(rows, [names.index(name) for name in COLUMNS])
     errors += [] if errors else _nonsense(numbers)
     if errors:
         raise InvalidSpec([Violation(pointer, None, message) for message in errors[:MOST_ERRORS]])
     table = np.array(numbers)
     return Trace(frozen(table[:, 0]), frozen(table[:, 1:4]), frozen(table[:, 4:]))
+
+
+def _table(rows: Iterable[CsvRow], places: Sequence[int]) -> tuple[list[list[float]], list[str]]:
+    """Return the numbers of all poses, and what is wrong; nothing is read after `MOST_ERRORS`.
+
+    Args:
+        rows: the rows below the header.
+        places: place of each of `COLUMNS`.
+    """
+    numbers, errors = list[list[float]](), list[str]()
+    for line, cells, error in rows:
+        if error:
+            errors.append(f"line {line}: {error}")
+        elif len(found := list(_numbers(line, cells, places, errors))) == len(COLUMNS):
+            numbers.append(found)
+        if len(errors) >= MOST_ERRORS:
+            break
+    return numbers, errors
 
 
 def _numbers(line: int, cells: Sequence[str], places: Sequence[int], errors: list[str]) -> Iterator[float]:

@@ -39,12 +39,6 @@ def squared_errors(fitnesses: Fitnesses, measured: FloatArray) -> FloatArray:
     return summed((fitnesses - measured[:, None]) ** 2)
 
 
-def simulator_fitness(squared_error: FloatArray) -> FloatArray:
-    """Return f(sim) = 1 / Σe²; infinite at a perfect fit. Source: paper, section 2."""
-    with np.errstate(divide="ignore"):
-        return 1.0 / squared_error
-
-
 class Misfit:
     """Minus the discrepancy of simulators from all samples; its sum stops once it is certain to be below a threshold.
 

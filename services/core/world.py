@@ -242,7 +242,3 @@ class World:
     @cached_property
     def _as_built(self) -> "World":
         return replace(self.kind, origin=None, edits=frozenset())
-
-    def material_of(self, body: Body) -> Material:
-        """Return the material of a body's contacts."""
-        return dict(self.surfaces).get(body.surface, self.material)

@@ -130,11 +130,12 @@ def watch(
     agenda: Agenda = MotionAgenda(motion, world) if isinstance(motion, Motion) else _loop_agenda(motion, scene)
     observed = steps_at(motion.observe_s, world.time_step_s)
     poses: dict[int, FloatArray] = {}
-    moments = [step for step in sorted({0, *agenda.moments, *observed}) if step <= observed[-1]]
+    seen = set(observed)
+    moments = [step for step in sorted({0, *agenda.moments, *seen}) if step <= observed[-1]]
     for now, then in pairwise([*moments, moments[-1]]):
         for actuator, target in agenda.commands(now):
             scene.command(actuator, target)
-        if now in observed:
+        if now in seen:
             poses[now] = look()
         advance(then - now)
     return np.array([poses[step] for step in observed])

@@ -8,7 +8,7 @@ was deleted.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import delete, select
+from sqlalchemy import delete, or_, select
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.keeping import DeletionRead
@@ -74,6 +74,7 @@ def delete_experiment(session: Session, experiment_id: str, by: Deleter) -> Dele
         Forbidden: others have submitted it.
         Conflict: it has not ended, still holds hardware, or is the only one of its study.
     """
+    _lock(session, experiment_id)
     if before := _deleted(session, experiment_id):
         return before
     experiment = get_experiment(session, experiment_id)
@@ -93,6 +94,7 @@ def delete_study(session: Session, study_id: str, by: Deleter) -> DeletionRead:
         Forbidden: others have submitted an experiment of it.
         Conflict: an experiment of it has not ended, or still holds hardware.
     """
+    _lock(session, study_id)
     if before := _deleted(session, study_id):
         return before
     study = get_study(session, study_id)
@@ -102,6 +104,17 @@ def delete_study(session: Session, study_id: str, by: Deleter) -> DeletionRead:
         _bury(session, experiment, study_id, by)
     session.execute(delete(StudyRow).where(StudyRow.id == study_id), execution_options=_SQL)
     return _bury(session, study, None, by)
+
+
+def _lock(session: Session, id_: str) -> None:
+    """Lock the experiments of a study, or an experiment with all others of its study.
+
+    What is read later in the transaction counts no experiment that another transaction deletes at the same time.
+    """
+    row, named = ExperimentRow, storable(id_)
+    study = select(row.study_id).where(row.id == named).scalar_subquery()
+    which = or_(row.id == named, row.study_id == named, row.study_id == study)
+    lock(session, session.scalars(select(row.id).where(which)).all())
 
 
 def _deleted(session: Session, id_: str) -> DeletionRead | None:

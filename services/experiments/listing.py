@@ -5,11 +5,11 @@ state or name changes between two pages, both pages or neither may have it.
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from hashlib import sha256
-from typing import Any, TypeVar
+from typing import Any
 
 from sqlalchemy import Select, String, select, tuple_, type_coerce
 
@@ -25,12 +25,10 @@ from gaplab.services.experiments.query.conditions import (
     study_is,
 )
 from gaplab.services.experiments.views import view_experiments, view_studies
-from gaplab.services.store.cursor import Column, decode, encode
+from gaplab.services.store.cursor import Column, decode, encode, next_cursor
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.session import Session, snapshot
 from gaplab.services.store.statements import storable
-
-R = TypeVar("R", ExperimentRow, StudyRow)
 
 Key = tuple[str | int | datetime, ...]
 
@@ -61,6 +59,11 @@ class ListFilter:
     def digest(self) -> str:
         """Return a text that identifies the list, for its cursors."""
         return sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:12]
+
+    def cursor_after(self, row: ExperimentRow | StudyRow) -> str:
+        """Return the cursor of the page that follows the row in this list."""
+        orders = EXPERIMENT_ORDERS if isinstance(row, ExperimentRow) else STUDY_ORDERS
+        return encode(*orders[self.sort.removeprefix("-")].key(row), bound_to=self.digest())
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,7 @@ def list_experiments(
         InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
     """
     rows = _page_of_experiments(session, wanted, limit=limit + 1, cursor=cursor)
-    return Page(items=view_experiments(session, rows[:limit]), next=_next(rows, limit, wanted))
+    return Page(items=view_experiments(session, rows[:limit]), next=next_cursor(rows, limit, wanted.cursor_after))
 
 
 @snapshot
@@ -115,12 +118,7 @@ def list_studies(
         InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
     """
     rows = _page_of_studies(session, wanted, limit=limit + 1, cursor=cursor)
-    return Page(items=view_studies(session, rows[:limit]), next=_next(rows, limit, wanted))
-
-
-def _next(rows: Sequence[R], limit: int, wanted: ListFilter) -> str | None:
-    """Return the cursor of the next page; `rows` has one row more than the page if a next page exists."""
-    return _cursor_after(rows[limit - 1], wanted) if len(rows) > limit else None
+    return Page(items=view_studies(session, rows[:limit]), next=next_cursor(rows, limit, wanted.cursor_after))
 
 
 def _page_of_experiments(
@@ -148,12 +146,6 @@ def _page_of_studies(session: Session, wanted: ListFilter, *, limit: int, cursor
     if wanted.state is not None:
         query = query.where(study_is(wanted.state))
     return tuple(session.scalars(_cut(query, wanted, STUDY_ORDERS, limit, cursor)))
-
-
-def _cursor_after(row: ExperimentRow | StudyRow, wanted: ListFilter) -> str:
-    """Return the cursor of the page that follows the row in this list."""
-    orders = EXPERIMENT_ORDERS if isinstance(row, ExperimentRow) else STUDY_ORDERS
-    return encode(*orders[wanted.sort.removeprefix("-")].key(row), bound_to=wanted.digest())
 
 
 def _cut(

@@ -1,7 +1,7 @@
 """Experiments and studies, read with their repetitions, samples and simulators. Use cases raise StoreUnavailable."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from typing import Any
 
 from gaplab.schemas.records import (
     AttemptRead,
@@ -17,13 +17,12 @@ from gaplab.schemas.submitted import SpecRead
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
 from gaplab.services.specs.shortening import experiment_spec, study_spec
+from gaplab.services.store.cursor import next_cursor
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import attempts, results
 from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, repetitions_of
 from gaplab.services.store.session import Session, snapshot
 from gaplab.services.store.stored_specs import complete, without_truth
-
-R = TypeVar("R")
 
 
 @snapshot
@@ -103,7 +102,7 @@ def list_samples(
     rows = results.page_of_samples(
         session, experiment_id, repetition=repetition, kind=kind, limit=limit + 1, cursor=cursor
     )
-    return Page(items=rows[:limit], next=_next(rows, limit, results.cursor_of))
+    return Page(items=rows[:limit], next=next_cursor(rows, limit, results.cursor_of))
 
 
 @snapshot
@@ -126,7 +125,7 @@ def list_simulators(
     rows = results.page_of_simulators(
         session, row, repetition=repetition, iteration=iteration, limit=limit + 1, cursor=cursor
     )
-    return Page(items=rows[:limit], next=_next(rows, limit, results.cursor_of))
+    return Page(items=rows[:limit], next=next_cursor(rows, limit, results.cursor_of))
 
 
 @snapshot
@@ -138,8 +137,3 @@ def list_attempts(session: Session, experiment_id: str, repetition: int) -> tupl
     """
     secret = bool(hidden(session, [get_experiment(session, experiment_id)]))
     return attempts.attempts_of(session, experiment_id, repetition, secret=secret)
-
-
-def _next(rows: Sequence[R], limit: int, cursor_of: Callable[[R], str]) -> str | None:
-    """Return the cursor of the next page; `rows` has one row more than the page if a next page exists."""
-    return cursor_of(rows[limit - 1]) if len(rows) > limit else None

@@ -15,12 +15,13 @@ from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.progress import caveat_of, mean_best, progress_of, study_caveat_of
 from gaplab.services.experiments.time_left import Span
 from gaplab.services.plugins.refusals import tells_unavailable
+from gaplab.services.specs.robots import sensors
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries import attempts
 from gaplab.services.store.queries.experiments import experiments_of
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
 from gaplab.services.store.queries.results import best_recorded
-from gaplab.services.store.stored_specs import complete, without_truth
+from gaplab.services.store.stored_specs import checked, complete, without_truth
 from gaplab.services.store.texts import unpack_tags
 
 _MOVING = (State.RUNNING, State.PAUSING, State.STOPPING)
@@ -37,6 +38,11 @@ def view_experiments(
         reveal: include hidden parameters of reality.
     """
     return _view(session, rows, _work(session, rows), reveal=reveal)
+
+
+def with_sensors(experiment: ExperimentRead) -> ExperimentRead:
+    """Return the experiment with the sensors of its robot."""
+    return experiment.model_copy(update={"sensors": sensors(checked(experiment.spec))})
 
 
 def view_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = False) -> tuple[StudyRead, ...]:

@@ -35,7 +35,10 @@ TOO_LATE = timedelta(days=1)
 """Age of an end of which nobody is told any more, as after notifications were off for a week."""
 
 TURN = timedelta(minutes=2)
-"""Time for which one process at a time sends; longer than any delivery takes."""
+"""Time for which one process at a time sends."""
+
+LEAST_TURN = TURN * 0.75
+"""Time that is left of a turn when a delivery begins; longer than any delivery takes."""
 
 _AT_ONCE = 10_000
 
@@ -75,7 +78,7 @@ def collect(session: Session, owner: str, channels: Sequence[Channel]) -> bool:
     assert notifier is not None
     if notifier.owner not in (None, owner) and notifier.until and present < notifier.until <= present + TURN:
         return False
-    if notifier.owner != owner or notifier.until is None or notifier.until < present + TURN / 2:
+    if notifier.owner != owner or notifier.until is None or notifier.until < present + LEAST_TURN:
         notifier.owner, notifier.until = owner, present + TURN
     latest = session.execute(select(EventCounterRow.latest)).scalar_one()
     after = latest if notifier.after is None or notifier.after > latest else notifier.after

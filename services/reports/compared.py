@@ -2,15 +2,21 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from gaplab.schemas.comparison_columns import UNPAIRED, shown_tests
 from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
 from gaplab.services.reports.blocks import Grid
 from gaplab.services.reports.content import Facts
 from gaplab.services.reports.judged import SIGNIFICANT, p_of
 from gaplab.services.reports.numbers import MISSING, fixed, interval, probability, signed
 
-UNPAIRED = {"student": "Student", "welch": "Welch", "mann_whitney": "Mann-Whitney"}
-PAIRED = {"paired_t": "Paired t", "wilcoxon": "Wilcoxon"}
-SPREAD = {"brown_forsythe": "Spread (Brown-Forsythe)"}
+NAMES = {
+    "student": "Student",
+    "welch": "Welch",
+    "mann_whitney": "Mann-Whitney",
+    "paired_t": "Paired t",
+    "wilcoxon": "Wilcoxon",
+    "brown_forsythe": "Spread (Brown-Forsythe)",
+}
 
 
 def summaries(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
@@ -61,10 +67,10 @@ def pairs(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
 
 def tests(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
     """Return p of each test of all pairs, with p after Holm's correction in brackets."""
-    shared = any(pair.shared_streams for pair in compared)
-    names = UNPAIRED | (PAIRED if shared else {}) | SPREAD
-    rows = tuple((*_pair(facts, pair), *_tests(pair, names)) for pair in compared)
-    return Grid(f"{caption}: p, and in brackets p after Holm's correction", ("Pair", *names.values()), rows)
+    shown = shown_tests(compared)
+    rows = tuple((*_pair(facts, pair), *_tests(pair, shown)) for pair in compared)
+    head = ("Pair", *(NAMES[test] for test in shown))
+    return Grid(f"{caption}: p, and in brackets p after Holm's correction", head, rows)
 
 
 def pooled(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
@@ -74,7 +80,7 @@ def pooled(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
         for pair in compared
         if (found := pair.pooled)
     )
-    return Grid(caption, ("Pair", "n", "Difference", *UNPAIRED.values()), rows)
+    return Grid(caption, ("Pair", "n", "Difference", *(NAMES[test] for test in UNPAIRED)), rows)
 
 
 def _pair(facts: Facts, pair: Comparison) -> tuple[str]:

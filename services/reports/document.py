@@ -6,9 +6,9 @@ from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number_of, spoken
 from gaplab.services.reports import compared, simulator_tables, tables
-from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Paragraph, Report, Section
+from gaplab.services.reports.blocks import Block, Bullets, Drawing, Paragraph, Report, Section
 from gaplab.services.reports.content import Facts, experiment_facts, study_facts
-from gaplab.services.reports.reproduction import instructions, spec_text
+from gaplab.services.reports.reproduction import reproduction
 from gaplab.services.results.comparisons import Margin
 from gaplab.services.results.coordinates import simulator_coordinates
 from gaplab.services.store.session import Store
@@ -43,7 +43,7 @@ def _report(store: Store, facts: Facts) -> Report:
         Section("Cost", (tables.cost(facts),)),
         Section("Settings", _settings(facts)),
         Section("Provenance", _provenance(facts)),
-        Section("How to reproduce it", (*_instructions(facts), Code(spec_text(facts.experiments, facts.name)))),
+        Section("How to reproduce it", tuple(reproduction(facts))),
     ]
     kind = number_of("experiment", len(facts.experiments)) if facts.study else "1 experiment"
     repetitions = sum(experiment.progress.completed for experiment in facts.experiments)
@@ -117,7 +117,3 @@ def _settings(facts: Facts) -> tuple[Block, ...]:
 def _provenance(facts: Facts) -> tuple[Block, ...]:
     found = tables.provenance(facts)
     return found or (Paragraph("The versions of what computed it are not stored."),)
-
-
-def _instructions(facts: Facts) -> tuple[Block, ...]:
-    return tuple(Paragraph(sentence) for sentence in instructions(facts.id))

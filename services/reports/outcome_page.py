@@ -7,7 +7,7 @@ from gaplab.services.reports import tables
 from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Grid, Paragraph, Report, Section
 from gaplab.services.reports.numbers import MISSING
 from gaplab.services.reports.outcome import ExperimentOutcome
-from gaplab.services.reports.reproduction import instructions
+from gaplab.services.reports.reproduction import reproduction
 
 MOST_SHOWN = 60
 """Most measurements on the page; the files have all."""
@@ -23,7 +23,7 @@ def outcome_report(outcome: ExperimentOutcome) -> Report:
         Section("Curve", (Drawing(curves_figure(outcome.facts.curves)),)),
         *([Section("Measurements", _measurements(outcome))] if outcome.measured else []),
         Section("Provenance", tables.provenance(outcome.facts) or (Paragraph("Its versions are not stored."),)),
-        Section("How to compute it again", tuple(Paragraph(sentence) for sentence in instructions(experiment.id))),
+        Section("How to compute it again", tuple(reproduction(outcome.facts))),
     ]
     robot = spoken(outcome.robot.label)
     return Report(

@@ -24,8 +24,6 @@ FILES = {(FAMILY, ""): "DejaVuSans.ttf", (FAMILY, "B"): "DejaVuSans-Bold.ttf", (
 INK, FAINT = (34, 34, 34), (85, 85, 85)
 SIZES_PT = {"title": 18, "headline": 11.5, "section": 13, "text": 9.5, "note": 8, "table": 7, "code": 6.5}
 
-Font = tuple[str, str, float]
-
 
 class _Pages(FPDF):
     """Pages with the title and their number at the bottom."""

@@ -1,55 +1,42 @@
 """How to compute a study or an experiment again: its spec, and the commands."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
-from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.submitted import SpecRead
+from gaplab.services.reports.blocks import Block, Code, Paragraph
+from gaplab.services.reports.content import Facts
+from gaplab.services.specs.shortening import experiment_spec, study_spec
 
-APART = {"name", "strategy", "repetitions", "iterations"}
-"""Fields that may differ between the experiments of one submitted study."""
-
-
-def instructions(id_: str) -> Iterator[str]:
-    """Yield what to do, in sentences."""
-    yield "Save the spec below as spec.json and submit it: gaplab submit spec.json --watch"
-    yield "The same spec and seed give the same numbers, to the last bit, with the engines of the provenance above."
-    yield f"Every number is in the archive that gaplab export {id_} writes."
+ONE = "Save the spec below as spec.json and submit it: gaplab submit spec.json --watch"
+EACH = "Save each spec below as a file and submit it: gaplab submit spec.json --watch"
 
 
-def spec_text(experiments: Sequence[ExperimentRead], name: str) -> str:
-    """Return the spec to submit, as JSON: of a study if one gives all experiments, else one after another.
-
-    A hidden parameter of reality is left out.
-    """
-    specs = [_without_hidden(experiment.spec) for experiment in experiments]
-    if len(specs) == 1:
-        return json.dumps(specs[0], indent=2, ensure_ascii=False)
-    found = _study(experiments, specs, name)
-    return "\n".join(json.dumps(spec, indent=2, ensure_ascii=False) for spec in ([found] if found else specs))
-
-
-def _study(experiments: Sequence[ExperimentRead], specs: Sequence[dict[str, Any]], name: str) -> dict[str, Any] | None:
-    """Return the spec of a study that resolves to these specs; None if they differ in more than a study can."""
-    both = list(zip(experiments, specs, strict=True))
-    learned = [spec for experiment, spec in both if not experiment.direct] or list(specs)
-    sampled = [spec for experiment, spec in both if not experiment.level] or learned
-    baselines = [spec["repetitions"] for experiment, spec in both if experiment.direct]
-    shared = _without(sampled[0], "name", "strategy")
-    alike = all(_without(spec, "name", "strategy") == shared for spec in sampled)
-    alike = alike and len({spec["repetitions"] for spec in learned}) == 1
-    rest = _without(shared, "repetitions", "iterations")
-    if not alike or any(_without(spec, *APART) != rest for spec in specs) or len(set(baselines)) > 1:
-        return None
-    direct = {"direct_repetitions": baselines[0]} if baselines else {}
-    return {"name": name, "strategies": [spec["strategy"] for spec in specs], **shared, **direct}
+def reproduction(facts: Facts) -> Iterator[Block]:
+    """Yield what to do, in sentences, and the spec to submit; that of each experiment if no single spec gives all."""
+    found = submitted(facts)
+    yield Paragraph(ONE if found.spec else EACH)
+    yield Paragraph(
+        "The same spec and seed give the same numbers, to the last bit, with the engines of the provenance above."
+    )
+    yield Paragraph(f"Every number is in the archive that gaplab export {facts.id} writes.")
+    for remark in found.remarks:
+        yield Paragraph(f"{remark[0].upper()}{remark[1:]}.", note=True)
+    if found.spec:
+        yield Code(spec_text(found.spec))
+        return
+    for experiment, one in zip(facts.experiments, facts.judged, strict=True):
+        yield Paragraph(f"{one.name}:")
+        yield Code(spec_text(experiment_spec(experiment.spec).spec))
 
 
-def _without(spec: dict[str, Any], *fields: str) -> dict[str, Any]:
-    return {field: value for field, value in spec.items() if field not in fields}
+def submitted(facts: Facts) -> SpecRead:
+    """Return the spec to submit, without parameters of reality that are hidden yet."""
+    specs = [experiment.spec for experiment in facts.experiments]
+    return study_spec(facts.name, specs) if facts.study else experiment_spec(specs[0])
 
 
-def _without_hidden(spec: dict[str, Any]) -> dict[str, Any]:
-    reality = spec["reality"]
-    known = {name: value for name, value in reality["parameters"].items() if value is not None}
-    return {**spec, "reality": {**reality, "parameters": known}}
+def spec_text(spec: dict[str, Any] | None) -> str:
+    """Return a spec as JSON to read."""
+    return json.dumps(spec, indent=2, ensure_ascii=False)

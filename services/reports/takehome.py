@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from typing import Any
-from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+from zipfile import ZipFile
 
 from gaplab.schemas.records import SampleRead
 from gaplab.services.bench import motions
@@ -15,13 +15,9 @@ from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.reports.html import render_html
 from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
 from gaplab.services.reports.outcome_page import outcome_report, verdict_sentences
-from gaplab.services.reports.reproduction import spec_text
+from gaplab.services.reports.reproduction import spec_text, submitted
+from gaplab.services.results.zip_entries import entry_of
 from gaplab.services.store.session import Store
-
-_MOMENT = (1980, 1, 1, 0, 0, 0)
-"""Date of every file, the earliest of the zip format, so that the same content gives the same bytes."""
-
-_FILE = 0o644 << 16
 
 MOTIONS: dict[motions.MotionFormat, str] = {"csv": "motion.csv", "json": "motion.json", "ros2": "motion.ros2.yaml"}
 
@@ -67,9 +63,9 @@ def takehome_zip(store: Store, experiment_id: str, draw: Callable[[Callable[[], 
     """
     outcome, content = outcome_of(store, experiment_id), io.BytesIO()
     with ZipFile(content, "w") as archive:
-        archive.writestr(_info("page.html"), draw(lambda: _page(outcome)))
+        archive.writestr(entry_of("page.html"), draw(lambda: _page(outcome)))
         for name, text in _files(outcome):
-            archive.writestr(_info(name), text)
+            archive.writestr(entry_of(name), text)
     return content.getvalue()
 
 
@@ -82,7 +78,7 @@ def _files(outcome: ExperimentOutcome) -> Iterator[tuple[str, str]]:
     experiment, best = outcome.experiment, outcome.best
     yield "README.txt", README.format(id=experiment.id, name=experiment.name, version=version("gaplab"))
     yield "verdict.txt", "\n\n".join((outcome.facts.verdict.headline, *verdict_sentences(outcome))) + "\n"
-    yield "spec.json", spec_text(outcome.facts.experiments, outcome.facts.name) + "\n"
+    yield "spec.json", spec_text(submitted(outcome.facts).spec) + "\n"
     yield "provenance.json", outcome.facts.provenance[experiment.id].model_dump_json(indent=1) + "\n"
     if best is not None:
         yield "controller.json", _json(best.model_dump(mode="json") | {"unit": outcome.robot.unit})
@@ -158,9 +154,3 @@ def _simulator(outcome: ExperimentOutcome) -> dict[str, Any]:
 
 def _json(value: Any) -> str:  # noqa: ANN401 - JSON
     return json.dumps(value, indent=1, ensure_ascii=False) + "\n"
-
-
-def _info(name: str) -> ZipInfo:
-    info = ZipInfo(name, _MOMENT)
-    info.compress_type, info.external_attr, info.create_system = ZIP_DEFLATED, _FILE, 3
-    return info

@@ -5,13 +5,18 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from gaplab.schemas.comparison_columns import COLUMNS, row
+from gaplab.schemas.comparison_columns import COLUMNS, UNPAIRED, row, shown_tests
 from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
 from gaplab.services.results.texts import cell
 
-UNPAIRED = {"student": "Student", "welch": "Welch", "mann_whitney": "Mann--Whitney"}
-PAIRED = {"paired_t": "Paired $t$", "wilcoxon": "Wilcoxon"}
-SPREAD = {"brown_forsythe": "Brown--Forsythe"}
+NAMES = {
+    "student": "Student",
+    "welch": "Welch",
+    "mann_whitney": "Mann--Whitney",
+    "paired_t": "Paired $t$",
+    "wilcoxon": "Wilcoxon",
+    "brown_forsythe": "Brown--Forsythe",
+}
 
 WORDS = {"First", "Second", "Experiment", "Verdict"}
 """Columns of words, which are set to the left."""
@@ -49,10 +54,10 @@ def comparisons_latex(comparisons: Sequence[Comparison], unit: str) -> str:
 
 
 def _pairs(comparisons: Sequence[Comparison], unit: str) -> str:
-    shared = any(pair.shared_streams for pair in comparisons)
-    tests = UNPAIRED | (PAIRED if shared else {}) | SPREAD
+    tests = shown_tests(comparisons)
     margins = {pair.equivalence.margin for pair in comparisons if pair.equivalence}
-    head = ["First", "Second", "$n$", "Difference", "$d$", "$P(>)$", *tests.values(), *(["Verdict"] if margins else [])]
+    head = ["First", "Second", "$n$", "Difference", "$d$", "$P(>)$", *(NAMES[test] for test in tests)]
+    head += ["Verdict"] if margins else []
     rows = [
         [*_names(pair), *_sizes(pair, pair), _estimate(pair.improvement), *_tests(pair, tests), *_verdict(pair)]
         for pair in comparisons
@@ -62,7 +67,7 @@ def _pairs(comparisons: Sequence[Comparison], unit: str) -> str:
         "Cohen's $d$",
         "$P(>)$, the probability that a repetition of the first is fitter, with its 95\\,\\% interval",
         "two-sided $p$-values, in brackets with Holm's correction over all pairs",
-        *(["paired tests by repetition where two experiments share random streams"] if shared else []),
+        *(["paired tests by repetition where two experiments share random streams"] if "paired_t" in tests else []),
         *[f"equivalence within $\\pm{margin:.3g}$ by two one-sided tests" for margin in margins],
     ]
     return _table("; ".join(caption), head, rows)
@@ -87,7 +92,7 @@ def _pooled(comparisons: Sequence[Comparison]) -> Iterator[str]:
         return
     rows = [[*_names(pair), *_sizes(tests, None), *_tests(tests, UNPAIRED)] for pair, tests in pooled]
     caption = f"The same pairs, {escaped(pooled[0][1].caution)}; $p$-values as above"
-    yield _table(caption, ["First", "Second", "$n$", "Difference", "$d$", *UNPAIRED.values()], rows)
+    yield _table(caption, ["First", "Second", "$n$", "Difference", "$d$", *(NAMES[test] for test in UNPAIRED)], rows)
 
 
 def _table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from math import inf, nan
+from statistics import fmean
 
 import numpy as np
 
@@ -54,6 +55,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         for iteration in range(row.iterations if takes_samples(spec) else 0)
         if by_iteration[iteration]
     )
+    samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
     unseen = overfitting(points[-1], error_unit) if points else ""
     return MisfitRead(
@@ -64,7 +66,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         remarks=(*remarks(points, unit(spec), error_unit), *([unseen] if unseen else [])),
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
-        verdicts=verdicts(points, _means(spec)),
+        verdicts=verdicts(points, samples, _means(spec)),
     )
 
 

@@ -15,7 +15,7 @@ from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.errors import RealityFailed, gather
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.ports import PhysicalReality, Reality, Simulate
+from gaplab.services.core.ports import PhysicalReality, Reality, Sense, Simulate
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sensitivity import Subject
 from gaplab.services.core.space import Space
@@ -27,6 +27,7 @@ from gaplab.services.core.types import Budget, Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.forecasts import forecast_of
+from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.specs.measured import samples_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
@@ -82,9 +83,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
     """
     robot = robot_of(spec)
     strategy = strategies.create(spec.strategy)
-    edits = edits_of(ref.name for ref in spec.tunables)
-    engine = engine_of(spec.engine)
-    simulation = Simulation(robot, engine, edits)
+    engine, simulation = engine_of(spec.engine), _simulation(spec, robot)
     simulate, reality = _realities(spec, robot, simulation, in_reality=strategy.in_reality)
     return Setting(
         simulate=simulate,
@@ -110,6 +109,23 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         known_samples=samples_of(spec),
         forecast=forecast_of(spec, robot, simulation),
     )
+
+
+def simulated(spec: ResolvedSpec) -> tuple[Simulate, Sense]:
+    """Return the same `simulate` and `sense` as `setting`, without an engine of reality that these do not use.
+
+    So a process that only simulates opens no hardware.
+    """
+    robot = robot_of(spec)
+    simulation = _simulation(spec, robot)
+    if not strategies[spec.strategy.name].in_reality:
+        return simulation, simulation.sense
+    assert hardware_of(spec) is None, "a strategy that evolves in reality is refused for hardware"
+    return _realities(spec, robot, simulation, in_reality=True)[0], simulation.sense
+
+
+def _simulation(spec: ResolvedSpec, robot: Robot) -> Simulation:
+    return Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
 
 
 def _realities(

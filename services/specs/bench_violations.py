@@ -3,18 +3,21 @@
 from collections.abc import Iterator
 
 from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import Violation
 from gaplab.services.core.measured_values import sample_violations
 from gaplab.services.core.robots.base import Robot
+from gaplab.services.specs.measured import lack_violations
 
 
-def bench_violations(spec: ExperimentSpec, robot: Robot) -> Iterator[Violation]:
-    """Yield limits that nothing can check, a refusal without limits, and samples that the robot cannot have."""
+def bench_violations(spec: ExperimentSpec, robot: Robot, discrepancy: Discrepancy) -> Iterator[Violation]:
+    """Yield limits that nothing can check, a refusal without limits, and samples that cannot be, or teach nothing."""
     if spec.reality.kind != "physical":
         return
     yield from _limit_violations(spec, robot)
     for place, sample in enumerate(spec.reality.samples):
-        for violation in sample_violations(sample, robot):
+        found = list(sample_violations(sample, robot))
+        for violation in found or lack_violations(discrepancy, robot.sensors, sample.values, sample.readings):
             yield violation.moved("", f"/reality/samples/{place}")
 
 

@@ -8,14 +8,14 @@ from gaplab.services.engines.base import Engine
 
 
 def default_engine(robot: Robot | type[Robot]) -> str:
-    """Return the engine that the robot names, or another of gaplab's own if it is not installed or lacks something.
+    """Return the engine that the robot names, or another of gaplab's own if that one cannot run its world here.
 
     PyBullet has no wheels for Python 3.12 and later. There, the quadruped's engine is MuJoCo. The resolved spec records
     the choice, so a stored experiment does not depend on it.
     """
     world = (robot.example() if isinstance(robot, type) else robot).world
     named = engines.get(robot.engine)
-    if named is None or (named.available() and not named.lacks(world)):
+    if named is None or (named.available() and runs(named, world) and not named.lacks(world)):
         return robot.engine
     others = (name for name, engine in engines.items() if file_of(engine) is None and engine.available())
     able = (name for name in others if runs(engines[name], world) and not engines[name].lacks(world))

@@ -1,12 +1,14 @@
 """Measured values as the core takes them: the mean of repeats, and readings over the noise of their sensors."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Readings, frozen
+from gaplab.services.core.discrepancies.base import Discrepancy
+from gaplab.services.core.errors import Violation
 from gaplab.services.core.repeats import mean
 from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.types import Outcome, Sample
@@ -28,6 +30,18 @@ def outcome_of(
     repeats = frozen(values) if len(values) > 1 else NO_READINGS
     fitness = values[0] if len(values) == 1 else mean(repeats)
     return Outcome(fitness, _standardised(sensors, readings)), repeats
+
+
+def lack_violations(
+    discrepancy: Discrepancy, sensors: Sensors, values: Sequence[float], readings: Sequence[Any] | None
+) -> Iterator[Violation]:
+    """Yield that measured values, as of `outcome_of`, lack what the discrepancy compares: every simulator would fit."""
+    if not (discrepancy.senses and sensors.size):
+        return
+    lack = discrepancy.lack(outcome_of(sensors, values, readings)[0].readings, sensors.reading_times_s)
+    if lack is not None:
+        message = f"the discrepancy {discrepancy.name} compares nothing else, and there is none"
+        yield Violation("/readings", None if readings is None else "without", f"{lack} is missing: {message}", lack)
 
 
 def _standardised(sensors: Sensors, readings: Sequence[Any] | None) -> Readings:

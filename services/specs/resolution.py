@@ -75,8 +75,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         *strategy_violations(spec, strategy, robot),
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, robot, simulated=engine, engine=reality_engine),
-        *bench_violations(spec, robot),
-        *budget_violations(budget, strategy, len(spec.tunables), Searches(controllers, simulators, divisor)),
+        *bench_violations(spec, robot, discrepancy),
+        *budget_violations(budget, strategy, len(spec.tunables), Searches(controllers, simulators, tuner, divisor)),
     ]:
         raise InvalidSpec(violations)
     return ResolvedSpec(

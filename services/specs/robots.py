@@ -6,9 +6,10 @@ from types import ModuleType
 from typing import Protocol
 
 from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.results import SensorsRead
 from gaplab.services.core import external_plugins
 from gaplab.services.core.controllers import controllers
-from gaplab.services.core.errors import InvalidSpec, Violation, gather
+from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, gather
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.tasks import tasks
@@ -78,6 +79,22 @@ def unit(spec: NamesARobot) -> str:
         return _own_unit(external_plugins.package(), spec.robot.model_dump_json())
     except InvalidSpec:
         return ""
+
+
+def sensors(spec: NamesARobot) -> SensorsRead | None:
+    """Return the sensors of the robot of a stored spec; None if it or its task is not installed, or its file gone.
+
+    They are those of `robot_of`, also if the controller is not installed.
+    """
+    try:
+        robot = robots.create(spec.robot)
+        rating = spec.task or (robot.usual_task if spec.controller else None)
+        found = tasks.create(rating).sensors if rating else robot.sensors
+    except GaplabError:
+        return None
+    return SensorsRead(
+        names=found.names, units=found.units, noises=tuple(found.noises.tolist()), times_s=tuple(found.times_s.tolist())
+    )
 
 
 @lru_cache

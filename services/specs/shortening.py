@@ -19,6 +19,7 @@ Stored = Mapping[str, Any]
 
 KEPT = {"engine", "strategy"}
 SCHEDULE = {"priority", "max_parallel"}
+SAMPLES = ("reality", "samples")
 ALONE = ("name", "preset")
 """Fields that may stand for an object that has nothing else."""
 
@@ -32,7 +33,7 @@ def study_spec(name: str, stored: Sequence[Stored]) -> SpecRead:
     """Return the spec of a study from the stored specs of its experiments.
 
     Experiments that were extended count with the size that all have. The spec is None if the experiments differ in more
-    than their strategies.
+    than their strategies, or cannot be resolved here.
     """
     specs = [spec_of(each) for each in stored]
     if not specs:
@@ -42,16 +43,14 @@ def study_spec(name: str, stored: Sequence[Stored]) -> SpecRead:
     strategies = [_shortest(_complete(spec), within="strategy")["strategy"] for spec in wanted]
     shared = {field: value for field, value in _shortest(_complete(base)).items() if field not in {"name", "strategy"}}
     spec = ({"name": name} if name != "study" else {}) | {"strategies": strategies} | shared | size
-    remarks = list(_hidden(stored))
-    if specs != wanted:
-        remarks.append("experiments were extended since; the spec has the iterations and repetitions that all have")
-    if not _gives(spec, wanted, hidden=bool(_hidden(stored))):
-        return SpecRead(
-            spec=None,
-            resolved=tuple(map(dict, stored)),
-            remarks=(*remarks, "the experiments differ in more than their strategies; submit them one by one"),
+    remarks, is_given = _hidden(stored), _gives(spec, wanted, hidden=bool(_hidden(stored)))
+    if not is_given:
+        remarks += (
+            "the experiments differ in more than their strategies, or a plug-in is missing; submit them one by one",
         )
-    return SpecRead(spec=spec, resolved=tuple(map(dict, stored)), remarks=tuple(remarks))
+    elif specs != wanted:
+        remarks += ("experiments were extended since; the spec has the iterations and repetitions that all have",)
+    return SpecRead(spec=spec if is_given else None, resolved=tuple(map(dict, stored)), remarks=remarks)
 
 
 def _common_size(specs: Sequence[ResolvedSpec]) -> tuple[Spec, list[ResolvedSpec]]:
@@ -112,7 +111,12 @@ def _resolved(spec: Spec) -> ResolvedSpec:
 
 
 def _without_defaults(spec: Spec, same: Callable[[Spec], bool], within: str | None) -> Spec:
-    """Return the spec without each field, outer ones first, whose absence gives the same."""
+    """Return the spec without each field, outer ones first, whose absence gives the same.
+
+    Of samples, which may be thousands, the fields that are null are left out together.
+    """
+    bare = _without_nulls(spec)
+    spec = bare if same(bare) else spec
     for path in list(_paths(spec)):
         if within not in {None, path[0]} or (len(path) == 1 and path[0] in KEPT):
             continue
@@ -122,11 +126,20 @@ def _without_defaults(spec: Spec, same: Callable[[Spec], bool], within: str | No
 
 
 def _paths(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:  # noqa: ANN401 - JSON
+    if path == SAMPLES:
+        return
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, item in items:
         if isinstance(value, dict):
             yield (*path, key)
         yield from _paths(item, (*path, key))
+
+
+def _without_nulls(spec: Spec) -> Spec:
+    """Return the spec without the fields of samples that are null."""
+    reality = spec["reality"]
+    samples = [{name: item for name, item in each.items() if item is not None} for each in reality.get("samples", ())]
+    return {**spec, "reality": {**reality, "samples": samples}}
 
 
 def _without(value: Any, path: Sequence[str | int]) -> Any:  # noqa: ANN401 - JSON

@@ -181,19 +181,21 @@ class Searches(NamedTuple):
 
     Attributes:
         controllers: optimizer of controllers.
-        simulators: optimizer of simulators.
+        simulators: optimizer of simulators, if the tuner uses one.
+        tuner: finds simulators.
         divisor: number that divides the evaluations of the last tuning.
     """
 
     controllers: Optimizer
     simulators: Optimizer
+    tuner: Tuner
     divisor: int
 
 
 def budget_violations(
     budget: ResolvedBudget, strategy: Strategy, tunables: int, searches: Searches
 ) -> Iterator[Violation]:
-    """Yield searches whose budget is smaller than the population that they start with.
+    """Yield searches whose budget is smaller than what they begin with: of most, a population.
 
     Args:
         budget: with every number.
@@ -202,7 +204,6 @@ def budget_violations(
         searches: optimizers, and what divides their evaluations.
     """
     least, shared = searches.controllers.least_evaluations, strategy.equal_rollouts
-    tuner = searches.simulators.diverse(strategy.ensemble) if strategy.ensemble > 1 else searches.simulators
     transfer = strategy.transfer_simulators(tunables) if shared else 1
     needed = {"controller_evaluations": (budget.controller_evaluations, least, transfer, "simulators")}
     if strategy.searches and strategy.takes_samples:
@@ -211,13 +212,13 @@ def budget_violations(
     if strategy.tunes and strategy.takes_samples:
         needed["simulator_evaluations"] = (
             budget.simulator_evaluations,
-            tuner.least_evaluations,
+            searches.tuner.least_evaluations(searches.simulators, strategy.ensemble),
             searches.divisor,
             "samples",
         )
     for name, (given, population, count, what) in needed.items():
         minimum = population * count
         if given < minimum:
-            message = f"{given} evaluations do not fill the population of {population} that the search starts with"
+            message = f"{given} evaluations are fewer than the {population} that the search needs to begin"
             message += f"; equal_rollouts divides them by {count} {what}" if count > 1 else ""
             yield Violation(f"/budget/{name}", given, message, f"at least {minimum}")

@@ -2,14 +2,16 @@
 
 import json
 from base64 import urlsafe_b64decode, urlsafe_b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import ColumnElement, Tuple, literal, tuple_
 from sqlalchemy.orm import InstrumentedAttribute
 
 from gaplab.services.core.errors import InvalidSpec, Violation
+
+R = TypeVar("R")
 
 Column = InstrumentedAttribute[Any] | ColumnElement[Any]
 
@@ -21,6 +23,11 @@ def encode(*key: str | int | datetime, bound_to: str = "") -> str:
     """Return the cursor of a key, valid only for the list that `bound_to` describes."""
     plain = [bound_to] + [part.isoformat() if isinstance(part, datetime) else part for part in key]
     return urlsafe_b64encode(json.dumps(plain, ensure_ascii=False).encode()).decode().rstrip("=")
+
+
+def next_cursor(rows: Sequence[R], limit: int, cursor_of: Callable[[R], str]) -> str | None:
+    """Return the cursor of the next page; `rows` has one row more than the page if a next page exists."""
+    return cursor_of(rows[limit - 1]) if len(rows) > limit else None
 
 
 def decode(cursor: str, columns: Sequence[Column], bound_to: str = "") -> Tuple:

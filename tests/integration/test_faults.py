@@ -4,6 +4,7 @@ from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 from threading import Event, Lock
+from threading import enumerate as enumerate_threads
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -17,7 +18,7 @@ from gaplab.services.core.errors import Conflict, InvalidSpec, TryAgain
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
-from gaplab.services.core.types import Outcome
+from gaplab.services.core.types import Measured, Outcome, Probed, Sample
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, lifecycle, reading, submission
@@ -33,6 +34,7 @@ from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from gaplab.workers import checkpoints, permits, supervisor
 from gaplab.workers.patience import Patience
+from gaplab.workers.repetitions import Repetitions
 from gaplab.workers.run import Run
 from tests.fakes import flat, install
 from tests.without_ray import Here
@@ -356,12 +358,12 @@ def test_a_hung_rollout_and_a_hung_step_are_told_but_hardware_takes_as_long_as_i
         return hung.overdue(patience)
 
     assert reason(None) is None
-    assert reason(Pulse(3, False, 19.0, 19.0)) is None
-    assert "no rollout ended for 21 s; GAPLAB_ROLLOUT_LIMIT_S is 1 s" in str(reason(Pulse(3, False, 21.0, 21.0)))
-    assert "reality did not answer for 21 s" in str(reason(Pulse(3, True, 21.0, 21.0)))
+    assert reason(Pulse(3, False, 99.0, 99.0)) is None
+    assert "no rollout ended for 101 s; GAPLAB_ROLLOUT_LIMIT_S is 1 s" in str(reason(Pulse(3, False, 101.0, 101.0)))
+    assert "reality did not answer for 101 s" in str(reason(Pulse(3, True, 101.0, 101.0)))
     assert reason(Pulse(3, True, 1e9, 1e9), permits=object()) is None
     assert "a step took 1001 s; GAPLAB_STEP_LIMIT_S" in str(reason(Pulse(3, False, 0.0, 1_001.0)))
-    assert reason(Pulse(3, False, 21.0, 21.0), begun=False) is None
+    assert reason(Pulse(3, False, 101.0, 101.0), begun=False) is None
 
 
 def test_a_repetition_that_does_nothing_gives_signs_of_life(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -400,7 +402,7 @@ def test_hardware_stops_when_its_permit_runs_out(monkeypatch: pytest.MonkeyPatch
         events.append("ends")
         done.set()
 
-    def remaining() -> float:
+    def remaining(_: int) -> float:
         if asked.is_set():
             return -1.0
         return left.pop() if left else 1e9
@@ -411,6 +413,68 @@ def test_hardware_stops_when_its_permit_runs_out(monkeypatch: pytest.MonkeyPatch
     assert events == ["moves", "stops", "ends"]
 
 
+def test_a_permit_is_for_one_measurement_and_comes_after_its_beginning_is_stored(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    permitted: list[Any] = []
+    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: permitted.append(keys)))
+    claim: Any = SimpleNamespace(id=7, epoch=1, experiment_id="x", number=0)
+    monkeypatch.setattr(execution, "note_measuring", lambda store, claims: permitted.append("noted"))
+    held, moving = Repetitions(None, "here", None), Run(claim, None, permits=handle)  # type: ignore[arg-type]
+    held._permits, held.runs = handle, [moving]
+
+    for batch in ((Pulse(3, True, 0.0, 0.0),), (TimedStep(Measured(1, Sample(np.zeros(1), 1.0)), 1.0),),
+                  (Pulse(8, True, 0.0, 0.0),), (TimedStep(Probed(1, 1.0, 1.0), 1.0),)):  # fmt: skip
+        moving.take(batch)
+        held._permit()
+        held._note_measuring()
+
+    assert permitted == [[], "noted", [(7, 1, 3)], [], [], "noted", [(7, 1, 8)], []]
+
+
+def test_a_worker_asks_for_the_permit_of_its_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def left(step: int) -> float:
+        asked.append(step)
+        return 1e9
+
+    whole = setting(resolve_experiment(small(repetitions=1)), 0)
+    moving = permits.PermittedReality(whole.reality, lambda: None, left)
+    steps = [each.step for each in checkpoints.recorded(replace(whole, reality=moving), (), ())
+             if isinstance(each, TimedStep)]  # fmt: skip
+
+    assert asked == [place for place, step in enumerate(steps) if isinstance(step, Measured | Probed)]
+
+
+def test_an_answer_ends_its_permit_and_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The supervisor may withdraw the permit while the worker still asks for it."""
+    monkeypatch.setattr(permits, "POLL_S", 0.001)
+    events: list[str] = []
+    asks, answered = Event(), Event()
+
+    def left(_: int) -> float:
+        if not events:
+            events.append("permitted")
+            return 1e9
+        asks.set()
+        assert answered.wait(60)
+        return 0.0
+
+    def moving(genome: Any) -> Outcome:
+        assert asks.wait(60)
+        return Outcome(1.0)
+
+    reality = permits.PermittedReality(moving, lambda: events.append("stops"), left, lambda: events.append("ends"))
+    reality(np.zeros(1))
+    answered.set()
+    for thread in enumerate_threads():
+        if thread.name == "permit":
+            thread.join(60)
+
+    assert events == ["permitted"]
+
+
 def test_a_permit_runs_out_although_nobody_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(permits, "POLL_S", 0.001)
     answers, done = [0.05], Event()
@@ -419,7 +483,7 @@ def test_a_permit_runs_out_although_nobody_answers(monkeypatch: pytest.MonkeyPat
         assert done.wait(60)
         return Outcome(1.0)
 
-    def silent() -> float:
+    def silent(_: int) -> float:
         if answers:
             return answers.pop()
         raise GetTimeoutError
@@ -433,7 +497,7 @@ def test_a_measurement_waits_for_permits_whose_process_has_died(monkeypatch: pyt
     monkeypatch.setattr(permits, "POLL_S", 0.001)
     answers: list[Any] = [1e9, ActorUnavailableError("it starts again", None), ActorDiedError()]
 
-    def answering() -> float:
+    def answering(_: int) -> float:
         answer = answers.pop() if answers else 1e9
         if isinstance(answer, Exception):
             raise answer

@@ -1,6 +1,8 @@
 """Tags, archived records, deletion, saved views and notes: what people do with results once they have them."""
 
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from inspect import unwrap
 from io import BytesIO
 from typing import Any
 
@@ -11,6 +13,7 @@ from sqlalchemy import func, select, update
 from gaplab.api.app import create_app
 from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind
+from gaplab.schemas.keeping import DeletionRead
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
@@ -210,6 +213,43 @@ def test_an_experiment_leaves_its_study_unless_it_is_the_only_one(store: Store) 
     assert [each.id for each in reading.read_study(store, made.id).experiments] == [second]
     with pytest.raises(Conflict, match="is the only one of study"):
         deletion.delete_experiment(store, second, ME)
+
+
+def deleted_during(store: Store, before: tuple[str, str], after: tuple[str, str]) -> Future[DeletionRead]:
+    """Delete something in a transaction that has not ended when the other deletion begins; return that."""
+    verbs = {"study": deletion.delete_study, "experiment": deletion.delete_experiment}
+    with ThreadPoolExecutor(1) as pool:
+        with store.transaction() as session:
+            unwrap(verbs[before[0]])(session, before[1], ME)
+            later = pool.submit(verbs[after[0]], store, after[1], ME)
+            wait([later], timeout=0.5)
+        return later
+
+
+def test_two_deletions_at_the_same_time_leave_a_study_with_an_experiment(store: Store) -> None:
+    made = study(store)
+    finish(store)
+    first, second = (each.id for each in made.experiments)
+
+    later = deleted_during(store, ("experiment", first), ("experiment", second))
+
+    with pytest.raises(Conflict, match="is the only one of study"):
+        later.result()
+    assert [each.id for each in reading.read_study(store, made.id).experiments] == [second]
+
+
+@pytest.mark.parametrize(
+    ("before", "after"), [("experiment", "experiment"), ("experiment", "study"), ("study", "experiment")]
+)
+def test_what_is_deleted_twice_at_the_same_time_is_deleted_once(store: Store, before: str, after: str) -> None:
+    made = study(store)
+    finish(store)
+    ids = {"study": made.id, "experiment": made.experiments[0].id}
+
+    later = deleted_during(store, (before, ids[before]), (after, ids[after]))
+
+    assert later.result().id == ids[after]
+    assert rows(store)["deletion"] == (1 if before == after else 3)
 
 
 def test_an_archive_of_the_deleted_brings_it_back_under_its_id(store: Store) -> None:

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,23 @@ def test_repetitions_that_are_under_way_count_as_far_as_they_are(store: Store) -
     found = misfit(store, experiment)
 
     assert [each.tunables[0].n for each in found.points] == [2, 2, 1]
+
+
+def test_advice_counts_samples_and_not_iterations(store: Store) -> None:
+    """The repetitions disagree, and 40 samples are from before: two more do not tell whether more would help."""
+    known = [{"genome": [0.5], "values": [0.5]}] * 40
+    spec = toy(repetitions=5, reality={"kind": "physical", "samples": known})
+    experiment = submission.submit_experiment(store, spec).id
+    for number, claim in enumerate(execution.claim(store, "me", 5)):
+        found = Simulator([0.3 * number, 0.2 * number], 0.04)  # type: ignore[arg-type]
+        for step in some_log():
+            execution.record(store, claim, replace(step, simulators=(found,)) if isinstance(step, Tuned) else step)
+
+    told = misfit(store, experiment)
+
+    assert [each.error.n for each in told.points] == [5, 5, 5]
+    assert [each.verdict for each in told.verdicts] == [Identification.NOT] * 2
+    assert not any("more samples" in sentence for each in told.verdicts for sentence in each.helps)
 
 
 def test_a_coefficient_at_its_bound_is_remarked_on(store: Store) -> None:

@@ -2,14 +2,15 @@
 
 import hmac
 import json
+import socket
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
-from datetime import timedelta
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from threading import Thread
+from threading import Event, Thread
 from time import sleep
 from typing import Any
 
@@ -19,8 +20,8 @@ from sqlalchemy import select, update
 
 from gaplab.api.app import create_app
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import Verb
-from gaplab.schemas.notifications import WebhookSpec
+from gaplab.schemas.lifecycle import State, Verb
+from gaplab.schemas.notifications import Notification, WebhookSpec
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
 from gaplab.services import events
@@ -28,7 +29,7 @@ from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.experiments.extension import extend_experiment
-from gaplab.services.notifications import outbox
+from gaplab.services.notifications import delivery, outbox
 from gaplab.services.notifications.courier import Courier, courier
 from gaplab.services.notifications.webhooks import refusal, set_experiment_webhook, set_study_webhook
 from gaplab.services.running import execution
@@ -37,6 +38,7 @@ from gaplab.services.store.clock import moment
 from gaplab.services.store.models import EventRow, NotificationRow, NotifierRow
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, some_log, toy
+from tests.waiting import wait_until
 
 STUDY = {"strategies": ["random", "known_fit"], "robot": "toy_function", "budget": "smoke", "repetitions": 1}
 
@@ -363,9 +365,68 @@ def test_the_courier_works_in_the_background_until_it_is_stopped(sqlite_store: S
     with courier(sqlite_store, Notify(url=receiver.url), "") as bob:
         assert bob.work()
         cancel(sqlite_store, submission.submit_experiment(sqlite_store, toy()).id)
-        while not told(sqlite_store):
-            sleep(0.05)
+        wait_until(lambda: told(sqlite_store))
     assert len(receiver.messages) == 1
+
+
+@contextmanager
+def dripping() -> Iterator[str]:
+    """The address of a server that sends a byte of its header each tenth of a second, for a minute."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(60.0)
+
+        def drip() -> None:
+            connection, _ = server.accept()
+            with connection, suppress(OSError):
+                connection.sendall(b"HTTP/1.1 200 OK\r\nX-Slow: ")
+                for _ in range(600):
+                    connection.sendall(b"x")
+                    sleep(0.1)
+                connection.sendall(b"\r\nContent-Length: 0\r\n\r\n")
+
+        thread = Thread(target=drip)
+        thread.start()
+        yield f"http://127.0.0.1:{server.getsockname()[1]}/"
+        thread.join()
+
+
+def message() -> Notification:
+    about: Any = {"id": "1-x", "kind": "experiment", "subject": "x", "name": "x", "state": State.FAILED, "text": "x"}
+    return Notification(**about, experiments=(), ended_at=datetime(2026, 1, 1, tzinfo=UTC))
+
+
+def test_a_server_that_sends_byte_by_byte_has_no_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(delivery, "WEBHOOK_S", 0.5)
+
+    with dripping() as url:
+        outcome = delivery.post(url, message())
+
+    assert outcome.failure == "it did not answer within 0.5 s"
+
+
+def test_a_host_that_is_looked_up_for_long_has_no_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = Event()
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: found.wait(60.0))
+    monkeypatch.setattr(delivery, "WEBHOOK_S", 0.5)
+
+    outcome = delivery.post("http://hooks.example.org/", message())
+
+    assert not found.is_set()
+    found.set()
+    assert outcome.failure == "it did not answer within 0.5 s"
+
+
+def test_a_turn_is_longer_than_a_delivery_that_begins_in_it(store: Store) -> None:
+    bob = begun(store, command="true")
+    with store.transaction() as session:
+        session.get_one(NotifierRow, 1).until = moment(session) + timedelta(seconds=delivery.COMMAND_S + 1)
+
+    bob.work()
+
+    with store.reading() as session:
+        until = session.get_one(NotifierRow, 1).until
+        assert until is not None
+        assert (until - moment(session)).total_seconds() > 1.25 * delivery.COMMAND_S
 
 
 @pytest.mark.parametrize(("variable", "value"), [("URL", "ftp://x"), ("HOSTS", "a b;c"), ("URL", "http://")])

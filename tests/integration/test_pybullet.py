@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from gc import collect
 from importlib import import_module
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,11 +21,14 @@ from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, Wo
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 from gaplab.services.engines.stepping import WARM_SCENES
+from gaplab.services.specs.default_engines import default_engine
 
 pytest.importorskip("pybullet")
 
 ROBOT = Quadruped()
 MOTION = open_loop(ROBOT.motion(ROBOT.known))
+
+INERTIA = Inertia((0.1, 0.1, 0.1))
 
 
 @pytest.fixture
@@ -39,6 +44,22 @@ def in_material(material: Material) -> World:
 
 def path(engine: PyBullet, world: World, motion: Motion = MOTION) -> FloatArray:
     return engine.rollout(world, motion).positions_m
+
+
+def test_a_robot_with_more_links_than_bullet_permits_is_refused(engine: PyBullet) -> None:
+    def of(parts: int) -> World:
+        base = Body("base", 1.0, tuple(Part(Sphere(0.01), (0.03 * n, 0.0, 0.0)) for n in range(parts)), inertia=INERTIA)
+        joint = Joint("joint", "base", "child", (0.0, 0.0, 0.3), (0.0, 1.0, 0.0), Motor(0.1, 1.0))
+        return World((base, Body("child", 0.1, Sphere(0.01))), (joint,), start_height_m=0.01)
+
+    motion = Motion(np.array([0.0]), np.zeros((1, 1)), np.array([0.01]))
+    assert PyBullet.runs(of(127))
+    assert np.isfinite(engine.rollout(of(127), motion).positions_m).all()
+    assert not PyBullet.runs(of(128))
+    with pytest.raises(engine._bullet.error, match="out-of-range"):
+        engine._build(of(128))
+    imported: Any = SimpleNamespace(world=of(128), engine="pybullet")
+    assert default_engine(imported) == "mujoco"
 
 
 def test_importing_the_engine_does_not_load_its_library() -> None:

@@ -90,6 +90,12 @@ QUERIES = {
     "created > -1h": ALL,
     "created < 2012-11-05 or ended > 2012-11-05T09:00": {"done"},
     "ended = none": ALL - {"done"},
+    "ended in (none, 2012-11-05)": ALL - {"done"},
+    "note not in (None)": {"Tagged"},
+    "note ~ 'none'": set(),
+    "tag ~ 'none'": set(),
+    "created > 9999-12-31": set(),
+    "created = 9999-12-30": set(),
     "started = 2012-11-05": set(),
     "slippery": {"Tagged"},
     "gait": {"Tagged"},
@@ -162,6 +168,15 @@ ERRORS = {
     "fitness > inf": ("character 11: 'inf' is no number", None),
     "created > soon": ("character 11: 'soon' is no time, like 2026-11-05", None),
     "created > -99999999999d": ("is no time", None),
+    "created = 9999-12-31": ("character 11: '9999-12-31' is too late for =; permitted: times before 9999-12-31", None),
+    "created != 9999-12-31T23:59:30": ("character 12: '9999-12-31T23:59:30' is too late for =", None),
+    "fitness > none": ("character 11: 'none' is what is missing, and has no operator >; permitted: =, !=, in", None),
+    "best_fitness <= NONE": ("character 17: 'NONE' is what is missing, and has no operator <=", None),
+    "ended < none": ("character 9: 'none' is what is missing, and has no operator <", None),
+    "name ~ none": ("character 8: 'none' is what is missing, and has no operator ~; permitted: =, !=, in", None),
+    "note !~ none": ("not in; put a text in quotes", None),
+    "tag ~ none": ("character 7: 'none' is what is missing, and has no operator ~", None),
+    "priority > none": ("character 12: 'none' is no number", None),
     "archived = maybe": (
         "character 12: unknown value 'maybe' (did you mean 'any'?); permitted: true, false, any",
         "any",
@@ -203,12 +218,13 @@ def test_every_field_can_be_asked_on_both_databases(store: Store, ids: dict[str,
 
     for fields, ask in ((EXPERIMENT_FIELDS, found), (STUDY_FIELDS, studies)):
         for name, field in fields.items():
-            number = "created" not in name and name in {"fitness", "iterations", "repetitions", "priority"}
+            number = name in {"fitness", "best_fitness", "iterations", "repetitions", "priority"}
             time = name in {"created", "started", "ended"}
             value = values.get(name, "1.5" if number else "2012-11-05" if time else "none")
             for operator in field.operators:
-                ask(store, f"{name} {operator} {value}")
-                ask(store, f"not ({name} {operator} {value}) and {name} not in ({value}, {value})")
+                asked = f'"{value}"' if operator == "~" else value
+                ask(store, f"{name} {operator} {asked}")
+                ask(store, f"not ({name} {operator} {asked}) and {name} not in ({value}, {value})")
 
 
 def test_archived_ones_are_listed_only_if_the_query_or_the_study_asks(store: Store, ids: dict[str, str]) -> None:

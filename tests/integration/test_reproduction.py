@@ -396,8 +396,8 @@ def test_each_statement_has_its_estimate_and_both_p(document: Document) -> None:
 
 def made(study: str, strategy: str) -> np.ndarray:
     """The fitness `(repetitions, samples + 1)` that a study was made with."""
-    curves, repetitions, samples, _ = STUDIES[study]
-    return values(strategy, curves[strategy], repetitions, 1 if strategy == "direct" else samples + 1)
+    found = STUDIES[study]
+    return values(strategy, found.curves[strategy], found.repetitions, 1 if strategy == "direct" else found.samples + 1)
 
 
 def numbers(told: str) -> list[float]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -22,6 +23,7 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
+from gaplab.services.specs import shortening
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from gaplab.services.specs.shortening import experiment_spec, study_spec
@@ -83,6 +85,25 @@ def test_a_short_spec_of_an_experiment_gives_the_same(name: str) -> None:
     assert resolve_experiment(ExperimentSpec.model_validate(found.spec)) == resolved
     assert found.spec is not None
     assert found.spec["budget"] == given.budget.preset
+
+
+def test_many_known_samples_are_shortened_in_as_many_trials_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    trials: list[Any] = []
+
+    def resolved(spec: Any) -> Any:
+        trials.append(spec)
+        return resolve_experiment(spec)
+
+    monkeypatch.setattr(shortening, "resolve_experiment", resolved)
+
+    def tried(count: int) -> int:
+        samples = [{"genome": [0.2], "values": [0.4]}, {"genome": [0.7], "values": [0.5], "unit": "m/s"}] * count
+        spec = toy(reality={"kind": "physical", "samples": samples})
+        before = len(trials)
+        assert experiment_spec(resolve_experiment(spec).model_dump(mode="json")).spec["reality"]["samples"] == samples  # type: ignore[index]
+        return len(trials) - before
+
+    assert tried(10) == tried(1)
 
 
 def test_a_study_whose_experiments_were_extended_has_the_size_that_all_have() -> None:

@@ -12,17 +12,19 @@ from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
 from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import import_archive
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.types import Probed
-from gaplab.services.experiments import lifecycle, reading, submission
+from gaplab.services.experiments import extension, lifecycle, reading, submission
+from gaplab.services.reports.blocks import Code, Paragraph
 from gaplab.services.reports.content import study_verdict
 from gaplab.services.reports.document import study_report
 from gaplab.services.reports.pdf import render_pdf
-from gaplab.services.reports.reproduction import spec_text
 from gaplab.services.running import execution
-from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
 
@@ -206,12 +208,63 @@ def test_hidden_parameters_of_reality_are_in_no_report(sqlite_store: Store, api:
 def test_the_spec_in_a_report_gives_the_same_experiments(sqlite_store: Store, study: str) -> None:
     experiments = reading.read_study(sqlite_store, study).experiments
 
-    resolved = resolve_study(StudySpec.model_validate_json(spec_text(experiments, "again")))
+    (spec,), _ = how_to_reproduce(sqlite_store, study)
+    resolved = resolve_study(StudySpec.model_validate_json(spec))
 
     known = set(experiments[0].spec)  # without the schedule, which changes no number
     read = [spec_of(each.spec) for each in experiments]  # with options that strategies got since
     stored = [{**each.model_dump(mode="json", include=known), "name": None} for each in read]
     assert [{**each.model_dump(mode="json", include=known), "name": None} for each in resolved] == stored
+
+
+def how_to_reproduce(store: Store, study: str) -> tuple[list[str], list[str]]:
+    """Return the specs and the sentences of the report's section."""
+    blocks = study_report(store, study).sections[-1].blocks
+    return (
+        [block.text for block in blocks if isinstance(block, Code)],
+        [block.text for block in blocks if isinstance(block, Paragraph)],
+    )
+
+
+def two_strategies(store: Store) -> tuple[str, list[str]]:
+    """A study with two repetitions of two strategies, and the ids of its experiments."""
+    spec = toy(repetitions=2).model_dump(mode="json", exclude_unset=True, exclude={"strategy"})
+    both = StudySpec.model_validate({**spec, "strategies": ["simulated_fit", "informative"]})
+    made = submission.submit_study(store, both)
+    return made.id, [experiment.id for experiment in made.experiments]
+
+
+def test_the_spec_of_a_study_of_which_one_experiment_was_extended_has_the_size_that_all_have(
+    sqlite_store: Store,
+) -> None:
+    study, (extended, _) = two_strategies(sqlite_store)
+    for claim in execution.claim(sqlite_store, "test", limit=4):
+        run(sqlite_store, claim)
+    extension.extend_experiment(sqlite_store, extended, ExtensionSpec(repetitions=3))
+
+    (spec,), sentences = how_to_reproduce(sqlite_store, study)
+
+    resolved = resolve_study(StudySpec.model_validate_json(spec))
+    assert [(each.strategy.name, each.repetitions) for each in resolved] == [("simulated_fit", 2), ("informative", 2)]
+    remark = "Experiments were extended since; the spec has the iterations and repetitions that all have."
+    assert remark in sentences
+
+
+def test_experiments_without_a_single_spec_have_a_spec_each(sqlite_store: Store) -> None:
+    study, (changed, _) = two_strategies(sqlite_store)
+    with sqlite_store.transaction() as session:
+        row = session.get(ExperimentRow, changed)
+        assert row is not None
+        row.spec = {**row.spec, "seed": 5}
+
+    specs, sentences = how_to_reproduce(sqlite_store, study)
+
+    resolved = [resolve_experiment(ExperimentSpec.model_validate_json(spec)) for spec in specs]
+    assert [(each.strategy.name, each.seed) for each in resolved] == [("simulated_fit", 5), ("informative", 0)]
+    assert {"Save each spec below as a file and submit it: gaplab submit spec.json --watch", "Simulated fit:"} <= set(
+        sentences
+    )
+    assert any(sentence.startswith("The experiments differ in more") for sentence in sentences)
 
 
 @pytest.mark.parametrize("address", ["/studies/nope/report", "/experiments/nope/report"])

@@ -3,6 +3,7 @@
 import io
 import json
 from collections.abc import Iterator
+from html import unescape
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -85,6 +86,7 @@ def test_everything_is_in_the_zip_and_can_be_used(store: Store, client: Client, 
     assert second["bounds"] == [0.0, pytest.approx(second["bounds"][1])]
     assert simulator["error"] == pytest.approx(0.1)
     assert client.estimate(json.loads(found["spec.json"])).rollouts > 0
+    assert found["spec.json"].strip() in unescape(found["page.html"])
     assert found["verdict.txt"]
 
 

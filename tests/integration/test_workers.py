@@ -155,13 +155,13 @@ def test_a_worker_that_hangs_is_ended_with_the_reason_even_if_it_holds_the_inter
 
     monkeypatch.setattr(task, "run", hanging)
     experiment = submission.submit_experiment(sqlite_store, toy()).id
-    patience = Patience(rollout_s=1.5)
+    patience = Patience(rollout_s=0.3)
 
     run(Supervisor(sqlite_store, lambda: 3, lease_s=3.0, patience=patience), sqlite_store, experiment)
 
     states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
     assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
-    assert "GAPLAB_ROLLOUT_LIMIT_S is 1.5 s" in reading.read_experiment(sqlite_store, experiment).reasons[0]
+    assert "GAPLAB_ROLLOUT_LIMIT_S is 0.3 s" in reading.read_experiment(sqlite_store, experiment).reasons[0]
 
 
 class Bench(Analytic):
@@ -188,7 +188,7 @@ def moving(told: Path) -> Any:
         def prepared() -> Any:
             computed = claim.spec.reality.model_copy(update={"engine": claim.spec.engine})
             whole = setting(claim.spec.model_copy(update={"reality": computed}), claim.number)
-            left = lambda: ray.get(permits.left.remote((claim.id, claim.epoch)))  # noqa: E731
+            left = asking(permits, claim.id, claim.epoch)
             return replace(whole, reality=PermittedReality(measure, lambda: say("stops"), left))
 
         yield ()
@@ -199,9 +199,8 @@ def moving(told: Path) -> Any:
 
 def test_permits_whose_process_was_killed_permit_again_once_they_are_renewed() -> None:
     handle: Any = Permits.remote()  # type: ignore[attr-defined]  # Ray adds it
-    key = (1, 1)
-    ask = asking(handle, key)
-    renewed = lambda: handle.renew.remote([key], 1e9)  # noqa: E731
+    ask = asking(handle, 1, 1)
+    renewed = lambda: handle.renew.remote([(1, 1, 3)], 1e9)  # noqa: E731
     renewed()
     wait_until(lambda: _answer(ask) > 0)
     handle.__ray_call__.remote(lambda _: os._exit(1))
@@ -213,7 +212,7 @@ def test_permits_whose_process_was_killed_permit_again_once_they_are_renewed() -
 
 def _answer(ask: Any) -> float:
     try:
-        return float(ask())
+        return float(ask(3))
     except RayError:
         return 0.0
 

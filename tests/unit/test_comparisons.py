@@ -9,12 +9,15 @@ from hypothesis import strategies as st
 from numpy.random import default_rng
 from scipy import stats
 
-from gaplab.schemas.comparison_columns import COLUMNS, NUMBERS, TEXTS, row
+from gaplab.api.commands import comparison_tables as terminal
+from gaplab.schemas.comparison_columns import COLUMNS, NUMBERS, PAIRED, TESTS, TEXTS, row, shown_tests
 from gaplab.schemas.comparisons import EquivalenceVerdict
 from gaplab.services.core.comparisons import Compared, compare_all, shares_streams
 from gaplab.services.core.equivalence import difference_interval, equivalence_p
 from gaplab.services.core.intervals import improvement, summary
 from gaplab.services.core.statistics import holm
+from gaplab.services.reports import compared as report
+from gaplab.services.results import comparison_tables as latex
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from tests.experiments import toy
@@ -262,3 +265,20 @@ def test_any_values_have_a_comparison_of_finite_numbers(first: Any, second: Any,
 
 def test_one_experiment_alone_has_nothing_to_be_compared_with() -> None:
     assert compare_all([compared("fit", np.ones((3, 2)))], 0, 1) == ()
+
+
+def test_paired_tests_are_shown_only_of_pairs_that_share_their_streams() -> None:
+    alone = compare_all([compared("a", drawn(1.0)), compared("b", drawn(1.1))], 0, 0, intervals=False)
+    sharing = compare_all(
+        [compared(name, drawn(1.0), strategy="fit") for name in ("a", "b")] + [compared("c", drawn(1.1))],
+        *(0, 0),
+        intervals=False,
+    )
+
+    assert set(TESTS) - set(shown_tests(alone)) == set(PAIRED)
+    assert shown_tests(sharing) == TESTS
+
+
+@pytest.mark.parametrize("renderer", [terminal, report, latex])
+def test_each_table_names_every_test(renderer: Any) -> None:
+    assert tuple(renderer.NAMES) == TESTS

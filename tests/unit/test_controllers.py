@@ -38,6 +38,17 @@ def acted(controller: Any, genome: Any, observations: Any, memory: Any = None, t
     return targets[0], memory[0]
 
 
+def test_pulses_too_short_for_a_motion_to_fit_into_memory_are_refused() -> None:
+    controller = controllers.create(PluginRef(name="square_pulses", options={"period_s": 0.001}))
+    told = "^/controller/options/period_s: 0.001 s is too short for motions of 600 s with 12 actuators"
+
+    with pytest.raises(InvalidSpec, match=told) as refused:
+        controller.prepare(WORLD, np.array([600.0]))
+
+    assert refused.value.violations[0].permitted == "at least 0.0173 s, or a shorter motion"
+    controllers.create(PluginRef(name="square_pulses", options={"period_s": 0.0174})).prepare(WORLD, np.array([600.0]))
+
+
 def test_a_sine_has_its_frequency_amplitudes_phases_and_offsets() -> None:
     controller = prepared("sine", slowest_hz=1.0, fastest_hz=3.0)
     genome = np.zeros(controller.space.size)

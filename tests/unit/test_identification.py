@@ -21,7 +21,7 @@ def point(iteration: int, *values: float, interval: Any = None, posterior: Any =
         Tuning(
             frozen([value]),
             changes.get("squared_error", 0.04),
-            samples=iteration,
+            samples=changes.get("samples", iteration),
             simulated=1.0,
             real=1.0,
             held_out_error=changes.get("held_out_error", nan),
@@ -34,8 +34,9 @@ def point(iteration: int, *values: float, interval: Any = None, posterior: Any =
     return misfit_point(iteration, tunings, ["grip"], SPACE)
 
 
-def verdict(*points: MisfitPoint, **means: Any) -> Any:
-    (found,) = verdicts(points, Means(**means))
+def verdict(*points: MisfitPoint, earlier: int = 0, **means: Any) -> Any:
+    """The verdict after one sample for each iteration, and some from before the experiment."""
+    (found,) = verdicts(points, [earlier + each.iteration for each in points], Means(**means))
     return found
 
 
@@ -75,9 +76,9 @@ def test_the_most_uncertain_sign_decides() -> None:
 
 
 def test_before_the_first_sample_there_is_no_verdict() -> None:
-    assert verdicts([], Means()) == ()
-    assert verdicts([point(0, *SCATTERED)], Means()) == ()
-    assert verdicts([point(1, *SCATTERED, squared_error=inf)], Means()) == ()
+    assert verdicts([], [], Means()) == ()
+    assert verdicts([point(0, *SCATTERED)], [0], Means()) == ()
+    assert verdicts([point(1, *SCATTERED, squared_error=inf)], [1], Means()) == ()
 
 
 def test_an_identified_tunable_needs_no_help() -> None:
@@ -108,6 +109,29 @@ def test_more_samples_help_as_long_as_they_have_helped() -> None:
     assert staying.helps == ("another strategy, or a fixed value: more samples of this kind have not helped",)
 
 
+def tuned(iteration: int, *values: float, earlier: int) -> MisfitPoint:
+    return point(iteration, *values, samples=iteration + earlier)
+
+
+def test_samples_from_before_the_experiment_count() -> None:
+    """With 40 of them, one or four more do not show whether more would help; 40 more do."""
+    first, second, last = (tuned(number, *SCATTERED, earlier=40) for number in (0, 1, 4))
+
+    assert verdict(first, second, earlier=40).helps == ()
+    assert verdict(first, second, last, earlier=40).helps == ()
+    assert verdict(first, second, tuned(40, *PARTLY, earlier=40), earlier=40).helps == (
+        "more samples: 132 % were left at half of them",
+    )
+
+
+def test_the_comparison_is_with_at_most_half_of_the_samples() -> None:
+    """After five, with the second: the third has more than half of them."""
+    points = [point(number, *(SCATTERED if number <= 2 else PARTLY)) for number in range(1, 6)]
+
+    assert verdict(*points).helps == ("more samples: 132 % were left at half of them",)
+    assert verdict(*points[2:]).helps == ()
+
+
 def test_a_tunable_at_its_bounds_may_need_wider_ones() -> None:
     found = verdict(point(1, 0.0, 2.0, 0.0, 2.0, 1.0))
 
@@ -129,7 +153,27 @@ def test_two_particles_move_although_they_span_no_volume() -> None:
     space = Space.box([0.0] * 3, [1.0] * 3)
     particles = np.array([[0.2, 0.3, 0.4], [0.7, 0.1, 0.9]])
     for weights in ([0.5, 0.5], [0.9, 0.1]):
-        moved, densities = _moved(particles, np.array(weights), space, 20, np.random.default_rng(0))
-        assert np.all(np.isfinite(moved))
-        assert np.all((space.lower <= moved) & (moved <= space.upper))
-        assert densities.sum() == pytest.approx(1.0)
+        for redraw in (True, False):
+            moved, densities = _moved(particles, np.array(weights), space, 20, np.random.default_rng(0), redraw=redraw)
+            assert np.all(np.isfinite(moved))
+            assert np.all((space.lower <= moved) & (moved <= space.upper))
+            assert densities.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("redraw", "expected"), [(True, 0.1), (False, 0.113)])
+def test_particles_that_all_fit_are_uniform_up_to_the_bound_if_they_are_drawn_again(
+    redraw: bool, expected: float
+) -> None:
+    """All simulators up to 0.2 fit equally well; of their weight, a tenth belongs below 0.02."""
+    space, shares = Space.box([0.0], [1.0]), []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        particles, weights = space.draw(1000, rng), np.full(1000, 1e-3)
+        for number in range(4):
+            if number:
+                particles, weights = _moved(particles, weights, space, 1000, rng, redraw=redraw)
+            fits = np.flatnonzero(particles[:, 0] < 0.2)[:200]
+            particles, weights = particles[fits], weights[fits] / weights[fits].sum()
+        shares.append(weights[particles[:, 0] < 0.02].sum())
+
+    assert np.mean(shares) == pytest.approx(expected, abs=0.004)

@@ -7,6 +7,7 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.bench.checking import check_values
 from gaplab.services.core.answers import Answers, pack
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.discrepancies.readings import Readings, ReadingsOptions
@@ -79,6 +80,41 @@ def test_early_readings_count_and_a_failed_sensor_does_not() -> None:
     (term,) = discrepancy.terms(simulated, measured, SENSORS.reading_times_s)[0]
 
     assert term == pytest.approx((1 + 9 + 25) / 3)  # the last time is two seconds after the first
+
+
+def test_physics_that_failed_is_nan_even_where_reality_has_no_readings() -> None:
+    simulated, measured = np.zeros((1, 2, 7)), np.full((1, 7), np.nan)
+    simulated[0, 1], measured[0, 0] = np.nan, 0.3
+
+    terms = Readings().terms(simulated, measured, SENSORS.reading_times_s)
+
+    assert terms.tolist() == [[0.0, pytest.approx(np.nan, nan_ok=True)]]
+
+
+EARLY = [0.02, 0.01, 0.1, 0.0, 0.0]
+WITHOUT = [None] * 5
+TOLD = "a reading up to 1 s after the first is missing: the discrepancy readings compares nothing else"
+
+
+@pytest.mark.parametrize("readings", [None, [[*[WITHOUT] * 9, EARLY]], [[WITHOUT] * 10]])
+def test_what_lacks_the_readings_that_are_compared_is_refused(readings: Any) -> None:
+    """It would fit every simulator, so tuning would be random."""
+    sample = {"genome": [0.5] * 24, "values": [0.4], "readings": readings}
+
+    with pytest.raises(InvalidSpec, match=f"^/reality/samples/0/readings: {TOLD}"):
+        quadruped(discrepancy="readings", reality={"kind": "physical", "samples": [sample]})
+    with pytest.raises(InvalidSpec, match=f"^/readings: {TOLD}"):
+        check_values(quadruped(discrepancy="readings", reality={"kind": "physical"}), (0.4,), readings, None)
+
+    check_values(quadruped(reality={"kind": "physical", "samples": [sample]}), (0.4,), readings, None)
+
+
+def test_one_early_reading_is_enough_and_a_failed_measurement_needs_none() -> None:
+    spec = quadruped(discrepancy="readings", reality={"kind": "physical"})
+
+    early: Any = [[EARLY, *[WITHOUT] * 9]]
+    check_values(spec, (0.4,), early, None)
+    check_values(spec, None, None, None)
 
 
 def test_a_spec_that_compares_readings_needs_a_robot_that_has_some() -> None:

@@ -87,6 +87,29 @@ def test_published_and_former_options_are_options(name: str, attribute: str) -> 
     strategies[name].Options.model_validate(getattr(strategies[name], attribute))
 
 
+@pytest.mark.parametrize(("tuner", "least"), [("search", 20), ("gauss_newton", 2), ("abc_smc", 2)])
+def test_a_tuner_states_its_least_budget(tuner: str, least: int) -> None:
+    def few(evaluations: int) -> ExperimentSpec:
+        return experiment(tuner=tuner, budget={"preset": "smoke", "simulator_evaluations": evaluations})
+
+    resolve_experiment(few(least))
+    with pytest.raises(InvalidSpec) as refused:
+        resolve_experiment(few(least - 1))
+
+    (violation,) = refused.value.violations
+    assert (violation.pointer, violation.permitted) == ("/budget/simulator_evaluations", f"at least {least}")
+
+
+def test_a_stored_tuner_without_a_later_option_has_its_value_of_before() -> None:
+    stored = resolve_experiment(experiment(tuner="abc_smc")).model_dump(mode="json")
+    assert stored["tuner"]["options"] == {"rounds": 4, "kept": 0.2, "moves": "redraw"}
+
+    older = stored | {"tuner": {"name": "abc_smc", "options": {"rounds": 4, "kept": 0.2}}}
+
+    assert spec_to_run(older).tuner.options == {"rounds": 4, "kept": 0.2, "moves": "retry"}
+    assert spec_to_run(stored).tuner.options == stored["tuner"]["options"]
+
+
 def test_a_stored_spec_without_a_later_option_has_its_value_of_before() -> None:
     stored = resolve_experiment(experiment(strategy="simulated_fit_and_unique")).model_dump(mode="json")
     assert stored["strategy"]["options"] == {"distances": "scaled"}

@@ -13,7 +13,7 @@ from gaplab.services.core.motions import Motion, Trajectory
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.specs.robots import Driven, robot_of, unit
+from gaplab.services.specs.robots import Driven, robot_of, sensors, unit
 
 QUADRUPED = PluginRef(name="quadruped")
 
@@ -90,6 +90,31 @@ def test_the_unit_is_that_of_the_task() -> None:
     assert unit(Driven(QUADRUPED)) == "m/s"
     assert unit(Driven(QUADRUPED, task=PluginRef(name="walk"))) == "m/s"
     assert unit(Driven(PluginRef(name="nobody"))) == ""
+
+
+@pytest.mark.parametrize(
+    "driven",
+    [
+        Driven(QUADRUPED),
+        Driven(PluginRef(name="quadruped", options={"counted_s": 1.0})),
+        Driven(QUADRUPED, pulses()),
+        Driven(QUADRUPED, task=PluginRef(name="walk", options={"counted_s": 1.0})),
+        Driven(QUADRUPED, pulses(), PluginRef(name="reach")),
+        Driven(PluginRef(name="toy_function")),
+    ],
+)
+def test_the_sensors_are_those_of_the_robot_with_its_task(driven: Driven) -> None:
+    own, told = robot_of(driven).sensors, sensors(driven)
+
+    assert told is not None
+    assert (told.names, told.units) == (own.names, own.units)
+    assert (list(told.noises), list(told.times_s)) == (own.noises.tolist(), own.times_s.tolist())
+
+
+def test_the_sensors_of_a_robot_that_is_not_installed_are_unknown() -> None:
+    assert sensors(Driven(PluginRef(name="nobody"))) is None
+    assert sensors(Driven(QUADRUPED, task=PluginRef(name="nothing"))) is None
+    assert sensors(Driven(QUADRUPED, PluginRef(name="nobody"))) is not None
 
 
 def test_a_base_that_begins_turned_is_level_at_the_start() -> None:

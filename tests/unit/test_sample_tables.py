@@ -1,5 +1,6 @@
 """Tables of samples: what is read, and every error with its line and column."""
 
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -117,6 +118,26 @@ def test_errors_say_what_is_permitted() -> None:
 def test_a_hostile_table_gives_a_short_answer() -> None:
     found = read_samples("gene_0,value\n" + "x,y\n" * 2_000, TOY)
     assert (len(found.errors), found.more) == (1_000, 3_000)
+
+
+def test_a_hostile_table_takes_little_memory() -> None:
+    """All of its errors together would take 10 MB."""
+    tracemalloc.start()
+
+    found = read_samples("gene_0,value\n" + "x,y\n" * 5_000, TOY)
+
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (len(found.errors), found.more) == (1_000, 9_000)
+    assert peak < 5e6
+
+
+def test_a_cell_without_an_end_is_an_error_of_its_line() -> None:
+    endless = '"' + "0123456789\n" * 20_000
+
+    assert [place for place, _ in errors("gene_0,value\n1.5,0.4\n" + endless)] == [2, 13_110]
+    (error,) = read_samples(endless, TOY).errors
+    assert error.message == "the line is no CSV: field larger than field limit (131072)"
 
 
 def test_the_client_reads_a_file_for_a_spec(tmp_path: Path) -> None:

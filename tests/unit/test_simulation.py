@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.answers import Answers
+from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
-from gaplab.services.specs.assembly import MeasuredReality
+from gaplab.services.specs.assembly import MeasuredReality, setting, simulated
+from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.simulation import Simulation
+from tests.experiments import toy
+from tests.fakes import install
 
 
 class Endless(ToyFunction):
@@ -40,3 +45,37 @@ def test_a_fitness_that_is_not_finite_is_physics_that_failed_in_simulation_and_i
     np.testing.assert_array_equal(fitnesses, np.where(failed, np.nan, expected))
     assert answers.cost_of(50).failures == failed.sum()
     assert np.isnan(MeasuredReality(broken, np.empty(0))(genomes[failed[:, 0]][0]).fitness)
+
+
+class Arm(Analytic):
+    """Hardware whose driver opens its port when it is created."""
+
+    name = "arm"
+    repeatable = False
+
+    def __init__(self, options: Any = None) -> None:
+        super().__init__(options)
+        raise ConnectionError("the port is opened")
+
+
+def test_a_process_that_only_simulates_opens_no_hardware(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, engines, Arm)
+    spec = resolve_experiment(toy(reality={"engine": "arm"}))
+
+    simulate, _ = simulated(spec)
+
+    assert np.isfinite(simulate(np.array([[0.2]]), np.full((1, len(spec.tunables)), 0.5))).all()
+    with pytest.raises(InvalidSpec, match="the port is opened"):
+        setting(spec, 0)
+
+
+@pytest.mark.parametrize("strategy", ["random", "direct"])
+def test_it_simulates_what_the_repetition_does(strategy: str) -> None:
+    spec = resolve_experiment(toy(strategy=strategy))
+    whole, rng = setting(spec, 0), np.random.default_rng(0)
+    genomes, parameters = whole.genomes.draw(5, rng), whole.parameters.draw(4, rng)
+
+    simulate, sense = simulated(spec)
+
+    np.testing.assert_array_equal(simulate(genomes, parameters), whole.simulate(genomes, parameters))
+    np.testing.assert_array_equal(sense(genomes, parameters), whole.sense(genomes, parameters))  # type: ignore[misc]

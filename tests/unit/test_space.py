@@ -33,6 +33,15 @@ def test_drawn_vectors_fill_the_box_evenly() -> None:
     np.testing.assert_allclose(drawn.std(axis=0), SPACE.extent / 12**0.5, rtol=0.05)
 
 
+def test_rounding_carries_no_vector_over_a_bound() -> None:
+    """0.3 + (0.9 - 0.3) is above 0.9, and 0.03 + (0.29 - 0.03) above 0.29."""
+    clips, wraps = Space.box([0.3], [0.9]), Space.box([0.03], [0.29], [True])
+
+    assert clips.at(np.array([0.0])) == 0.3
+    assert clips.at(np.array([1.0])) == 0.9
+    assert wraps.contain(np.nextafter(wraps.lower, 0.0)) == 0.29
+
+
 def test_reversed_bounds_are_refused_with_their_place_and_values() -> None:
     with pytest.raises(ValueError, match=r"coordinate 1 has 5\.0 and 2\.0"):
         Space.box([0.0, 5.0], [1.0, 2.0])

@@ -1,5 +1,6 @@
 """Traces of a physical robot: their clock, their place on the ground, and what is wrong with them."""
 
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.trace_tables import COLUMNS, read_trace
+from gaplab.services.core.trace_tables import COLUMNS, MOST_ERRORS, read_trace
 from gaplab.services.core.traces import TooShort, Trace, align, from_start
 from gaplab.services.engines.mujoco.engine import MuJoCo
 
@@ -91,6 +92,10 @@ def test_a_trace_is_read_with_any_order_units_and_more_columns() -> None:
     assert trace.at(frozen([0.625])).positions_m.tolist() == [[1.5, 2, 3]]
 
 
+ENDLESS = '"' + "0123456789\n" * 20_000
+"""A cell whose quote is not closed."""
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -104,9 +109,25 @@ def test_a_trace_is_read_with_any_order_units_and_more_columns() -> None:
         (table(qw=2), "pose 2: qx, qy, qz, qw have size 2; permitted: 1"),
         (",".join(COLUMNS), "the trace has 0 poses; at least 2 are needed"),
         (table().replace("0.2,0.0,0", "5000,0,0").replace("\n0.2", "\n5000"), "at most 3600 s are permitted"),
+        (f"{table()}\n{ENDLESS}", r"line 13112: the line is no CSV: field larger than field limit \(131072\)"),
+        (ENDLESS, r"line 13108: the line is no CSV: field larger than field limit"),
     ],
 )
 def test_what_is_no_trace_is_refused_with_its_line(text: str, message: str) -> None:
     with pytest.raises(InvalidSpec, match=message) as refused:
         read_trace(text, "/traces/0")
     assert {each.pointer for each in refused.value.violations} == {"/traces/0"}
+
+
+def test_a_hostile_trace_gives_few_errors_and_takes_little_memory() -> None:
+    """The errors of 50,000 lines of eight cells took 40 MB."""
+    text = ",".join(COLUMNS) + "\n" + "x\n" * 50_000
+    tracemalloc.start()
+
+    with pytest.raises(InvalidSpec) as refused:
+        read_trace(text, "/traces/0")
+
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(refused.value.violations) == MOST_ERRORS
+    assert peak < 10e6

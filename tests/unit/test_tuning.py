@@ -10,7 +10,7 @@ from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStat
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.search import SearchTuner
-from gaplab.services.core.tuning import Misfit, simulator_fitness, squared_errors
+from gaplab.services.core.tuning import Misfit, squared_errors
 from gaplab.services.core.types import Sample
 from tests.fakes import TRUTH, Recorder, paraboloid
 
@@ -28,11 +28,6 @@ def test_squared_errors_are_summed_over_samples() -> None:
     fitnesses = np.array([[1.0, 2.0], [3.0, 5.0]])
 
     np.testing.assert_allclose(squared_errors(fitnesses, np.array([1.5, 3.0])), [0.25, 4.25])
-
-
-def test_the_fitness_of_a_simulator_is_one_over_its_squared_error() -> None:
-    np.testing.assert_allclose(simulator_fitness(np.array([0.25, 4.0, np.inf])), [4.0, 0.25, 0.0])
-    assert simulator_fitness(np.array([0.0]))[0] == np.inf
 
 
 def test_a_simulator_that_fails_on_a_sample_has_an_infinite_error() -> None:

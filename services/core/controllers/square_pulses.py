@@ -9,12 +9,16 @@ from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
 from gaplab.services.core.controllers.actuation import middles, swings
 from gaplab.services.core.controllers.base import Controller
+from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.space import Space
 from gaplab.services.core.world import World
 
 NARROWEST, WIDEST = 0.1, 0.9
 """Width of a pulse in periods, at gene values 0 and 1."""
+
+MOST_TARGETS = 10_000_000
+"""Most targets of a motion: of each actuator, whenever a pulse of any begins or ends; 80 MB."""
 
 
 class SquarePulsesOptions(Frozen):
@@ -40,8 +44,13 @@ class SquarePulses(Controller):
     options: SquarePulsesOptions
 
     def prepare(self, world: World, observe_s: FloatArray) -> None:
-        """Compute what all motions share; numpy is faster with these arrays than with numbers or rows to repeat."""
+        """Compute what all motions share; numpy is faster with these arrays than with numbers or rows to repeat.
+
+        Raises:
+            InvalidSpec: the pulses are so short that motions would not fit into memory.
+        """
         actuators = len(world.actuators)
+        self._refuse_too_many(actuators, float(observe_s[-1]))
         self.space = Space.box([0.0] * 2 * actuators, [1.0] * 2 * actuators, [True, False] * actuators)
         self.known = frozen([0.5] * 2 * actuators)
         self._observe_s, self._period_s = observe_s, self.options.period_s
@@ -51,6 +60,14 @@ class SquarePulses(Controller):
         times = 1 + 2 * actuators * self._cycles.size
         self._inside = frozen(np.repeat(rest + swing, times, axis=1))
         self._outside = frozen(np.repeat(rest - swing, times, axis=1))
+
+    def _refuse_too_many(self, actuators: int, duration_s: float) -> None:
+        period_s = self.options.period_s
+        if 2 * actuators**2 * np.ceil(duration_s / period_s) > MOST_TARGETS:
+            least_s = duration_s / max(1, MOST_TARGETS // (2 * actuators**2))
+            message = f"{period_s:g} s is too short for motions of {duration_s:g} s with {actuators} actuators"
+            permitted = f"at least {least_s:.3g} s, or a shorter motion"
+            raise InvalidSpec([Violation("/controller/options/period_s", period_s, message, permitted)])
 
     def motion(self, genome: Genome) -> Motion:
         """Return the motion: each actuator is at plus its amplitude during its pulse, else at minus."""

@@ -31,6 +31,10 @@ class Discrepancy(Plugin):
             times_s: `(q,)`: time of each reading, in seconds from the start of a rollout.
         """
 
+    def lack(self, readings: FloatArray, times_s: FloatArray) -> str | None:  # noqa: ARG002 - for those that need some
+        """Return what a sample with these readings `(q,)` lacks to be compared; None if nothing."""
+        return None
+
     def residuals(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
         """Return `(n, m, r)`: differences whose squares sum to the terms, if it `squares`."""
         raise NotImplementedError(f"{self.name} is no sum of squares")

@@ -26,7 +26,8 @@ class ReadingsOptions(Frozen):
 class Readings(Discrepancy):
     """The squared differences between simulated and real readings, each in units of its noise; their mean.
 
-    A term of 1 is as large as the noise of the sensors. Readings that a sensor failed to give do not count.
+    A term of 1 is as large as the noise of the sensors. Readings that a sensor failed to give do not count; a sample
+    without any is refused, since every simulator would reproduce it.
     """
 
     name = "readings"
@@ -36,6 +37,12 @@ class Readings(Discrepancy):
     error_text = "root mean square difference between readings in simulation and in reality, over the sensors' noise"
     Options = ReadingsOptions
     options: ReadingsOptions
+
+    def lack(self, readings: FloatArray, times_s: FloatArray) -> str | None:
+        """Return that there is no reading early enough."""
+        if not np.isnan(readings[self._early(times_s)]).all():
+            return None
+        return f"a reading up to {self.options.seconds:g} s after the first"
 
     def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
         """Return the mean squares."""
@@ -47,7 +54,8 @@ class Readings(Discrepancy):
         real = measured[:, None, 1 + early]
         there = ~np.isnan(real)
         count = np.maximum(there.sum(axis=-1, keepdims=True), 1)
-        return np.asarray(np.where(there, simulated[..., 1 + early] - real, 0.0) / np.sqrt(count))
+        compared = there | np.isnan(simulated[..., :1])  # where the physics failed, all differences are nan
+        return np.asarray(np.where(compared, simulated[..., 1 + early] - real, 0.0) / np.sqrt(count))
 
     def noise(self, measured: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG002 - as many in each sample
         """Return that of a reading, which is in units of its noise, divided by the number of readings that count."""

@@ -1,7 +1,8 @@
 """A tuner that returns a posterior: simulators as probable as the samples make them."""
 
+from collections.abc import Mapping
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
@@ -9,6 +10,7 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Parameters
+from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.types import Simulator
@@ -19,6 +21,9 @@ WIDER = 2.0
 LEAST_WIDTHS = (1e-9, 1e-7, 1e-5, 1e-3)
 """Least standard deviations of a move, as shares of the bounds: the first with which the covariance has a factor."""
 
+LEAST_SIZE = 2
+"""Fewest simulators of a round: a single one has no covariance."""
+
 TRIES = 100
 """Draws of a move that leaves the bounds, before the particle stays where it is."""
 
@@ -26,9 +31,16 @@ TRIES = 100
 class AbcSmcOptions(Frozen):
     """Options of approximate Bayesian computation."""
 
-    rounds: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(default=4, description="rounds, each narrower")
+    rounds: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
+        default=4, description="most rounds, each narrower; one for every two evaluations at most"
+    )
     kept: Annotated[float, Field(strict=True, gt=0, lt=1)] = Field(
         default=0.2, description="share of a round's simulators that stay: those with the least discrepancy"
+    )
+    moves: Literal["redraw", "retry"] = Field(
+        default="redraw",
+        description="after a move that leaves the bounds, redraw: another particle is drawn, as the weights suppose; "
+        "retry: the same one moves again, which draws too many near the bounds",
     )
 
 
@@ -42,18 +54,25 @@ class AbcSmc(Tuner):
     name = "abc_smc"
     source = "Toni et al. 2009, Beaumont et al. 2009; numbers of rounds and particles are gaplab's"
     intervals = True
+    before: ClassVar[Mapping[str, Any]] = {"moves": "retry"}
     Options = AbcSmcOptions
     options: AbcSmcOptions
 
+    def least_evaluations(self, optimizer: Optimizer, ensemble: int) -> int:  # noqa: ARG002 - it does not use one
+        """Return as many particles as the ensemble has members, and at least two."""
+        return max(LEAST_SIZE, ensemble)
+
     def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
         """Return the best particle, then draws from the posterior."""
-        size = max(2, task.evaluations // self.options.rounds)
+        rounds = min(self.options.rounds, max(1, task.evaluations // LEAST_SIZE))
+        size = task.evaluations // rounds
         stay = max(2, round(size * self.options.kept))
         particles = task.space.draw(size, rng)
         weights = np.full(size, 1.0 / size)
-        for number in range(self.options.rounds):
+        redraw = self.options.moves == "redraw"
+        for number in range(rounds):
             if number:
-                particles, weights = _moved(particles, weights, task.space, size, rng)
+                particles, weights = _moved(particles, weights, task.space, size, rng, redraw=redraw)
             errors = task.misfit.of(particles)
             order = np.argsort(errors, kind="stable")[:stay]
             particles, weights, errors = particles[order], weights[order] / weights[order].sum(), errors[order]
@@ -64,20 +83,21 @@ class AbcSmc(Tuner):
 
 
 def _moved(
-    particles: Parameters, weights: FloatArray, space: Space, count: int, rng: Generator
+    particles: Parameters, weights: FloatArray, space: Space, count: int, rng: Generator, *, redraw: bool
 ) -> tuple[Parameters, FloatArray]:
     """Return new particles `(count, p)` near weighted ones, and the prior density over the density of each move."""
     covariance = WIDER * np.cov(particles.T, aweights=weights).reshape(space.size, space.size)
     factor = _factor(covariance, space.extent)
-    found = particles[rng.choice(len(particles), count, p=weights)]
-    outside = np.arange(count)
-    origin = found.copy()
+    origin = particles[rng.choice(len(particles), count, p=weights)]
+    outside, found = np.arange(count), origin.copy()
     for _ in range(TRIES):
         found[outside] = origin[outside] + rng.standard_normal((len(outside), space.size)) @ factor.T
         inside = np.all((space.lower <= found[outside]) & (found[outside] <= space.upper), axis=1)
         outside = outside[~inside]
         if not outside.size:
             break
+        if redraw:
+            origin[outside] = particles[rng.choice(len(particles), len(outside), p=weights)]
     found[outside] = origin[outside]
     away = np.linalg.solve(factor, (found[:, None, :] - particles[None, :, :]).reshape(-1, space.size).T)
     densities = np.exp(-0.5 * (away**2).sum(axis=0)).reshape(count, len(particles)) @ weights

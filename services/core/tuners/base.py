@@ -49,6 +49,10 @@ class Tuner(Plugin):
     def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
         """Return `task.ensemble` simulators, the best estimate first."""
 
+    def least_evaluations(self, optimizer: Optimizer, ensemble: int) -> int:
+        """Return the fewest evaluations of a tuning; by default the population that the optimizer starts with."""
+        return (optimizer.diverse(ensemble) if ensemble > 1 else optimizer).least_evaluations
+
     def divisor(self, samples: int) -> int:  # noqa: ARG002 - for those that need it
         """Return the number that divides the evaluations of a tuning on some samples, by default 1."""
         return 1

@@ -11,6 +11,7 @@ from scipy.stats.qmc import LatinHypercube
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.types import Simulator
 
@@ -64,15 +65,19 @@ class GaussNewton(Tuner):
     Options = GaussNewtonOptions
     options: GaussNewtonOptions
 
+    def least_evaluations(self, optimizer: Optimizer, ensemble: int) -> int:  # noqa: ARG002 - it does not use one
+        """Return one for each member of the ensemble, and one for the estimate."""
+        return ensemble + 1
+
     def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
         """Return the estimate with its intervals, then draws from its error."""
-        left = min(self.options.evaluations, task.evaluations) - task.ensemble
+        left = min(max(self.options.evaluations - task.ensemble, 1), task.evaluations - task.ensemble)
         box = np.array([np.zeros(task.space.size), np.ones(task.space.size)])
         places, differences = np.empty((0, task.space.size)), None
         estimate = None
-        for share in np.array_split(np.arange(max(left, 1)), self.options.rounds):
+        for share in filter(len, np.array_split(np.arange(left), self.options.rounds)):
             drawn = box[0] + (box[1] - box[0]) * LatinHypercube(task.space.size, seed=rng).random(len(share))
-            found = task.misfit.residuals(_parameters(task, drawn))
+            found = task.misfit.residuals(task.space.at(drawn))
             places = np.vstack([places, drawn])
             differences = found if differences is None else np.vstack([differences, found])
             inside = ((box[0] <= places) & (places <= box[1])).all(axis=1) & np.isfinite(differences).all(axis=1)
@@ -161,13 +166,9 @@ def _place(places: FloatArray, answers: FloatArray, asked: FloatArray, noise: fl
 def _simulators(task: TuningTask, estimate: LocalEstimate, rng: Generator) -> tuple[Simulator, ...]:
     """Return the estimate with its intervals, then draws from its error; each with its discrepancy."""
     drawn = rng.multivariate_normal(estimate.place, estimate.covariance, task.ensemble - 1)
-    found = _parameters(task, np.clip(np.vstack([estimate.place, drawn]), 0.0, 1.0))
+    found = task.space.at(np.clip(np.vstack([estimate.place, drawn]), 0.0, 1.0))
     errors, weight = task.misfit.of(found), 1.0 / task.ensemble
-    interval = _parameters(task, estimate.interval().T).T
+    interval = task.space.at(estimate.interval().T).T
     first = Simulator(found[0], float(errors[0]), interval, weight)
     others = zip(found[1:], errors[1:], strict=True)
     return (first, *(Simulator(parameters, float(error), None, weight) for parameters, error in others))
-
-
-def _parameters(task: TuningTask, places: FloatArray) -> FloatArray:
-    return np.asarray(task.space.lower + places * task.space.extent)

@@ -7,6 +7,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.motions import Tilt
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS
+from gaplab.services.engines.pybullet.robot import MOST_LINKS, links_of
 from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 from gaplab.services.engines.stepped import SteppedEngine
@@ -48,6 +49,11 @@ class PyBullet(SteppedEngine[PyBulletScene]):
         super().__init__(options)
         self._bullet = import_module("pybullet")
         self.failures = (self._bullet.error,)
+
+    @classmethod
+    def runs(cls, world: World) -> bool:
+        """Return whether the world has bodies, and no more links than Bullet permits."""
+        return super().runs(world) and len(links_of(world)) - 1 <= MOST_LINKS
 
     def _build(self, world: World) -> PyBulletScene:
         return PyBulletScene(self._bullet, world)

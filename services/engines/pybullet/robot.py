@@ -16,6 +16,9 @@ from gaplab.services.core.kinematics import inverse, product, rotated
 from gaplab.services.core.shapes import ORIGIN, UNTURNED, Box, Capsule, Cylinder, Hull, Part, Quaternion, Sphere, Vector
 from gaplab.services.core.world import Body, World
 
+MOST_LINKS = 127
+"""Most links of a robot beside its base; Bullet has no place for the state of others."""
+
 BASE = -1
 """Bullet's index of the base. Links count from 0."""
 
@@ -68,7 +71,7 @@ class PyBulletRobot:
 
 def build_robot(bullet: ModuleType, client: int, world: World) -> PyBulletRobot:
     """Build the robot of a world at its start, in the server `client`."""
-    links = _links(world)
+    links = links_of(world)
     robot = _create(bullet, client, world, links)
     joints = tuple(next(i for i, link in enumerate(links) if link.joint == n) + BASE for n in range(len(world.joints)))
     made = PyBulletRobot(robot, links, joints)
@@ -105,7 +108,7 @@ def inertial_frame(body: Body) -> tuple[Vector, Quaternion]:
     return body.center_m, UNTURNED if _is_bullets(body) else inertia_of(body).turn
 
 
-def _links(world: World) -> tuple[Link, ...]:
+def links_of(world: World) -> tuple[Link, ...]:
     """Return the links depth first: Bullet would put them into this order itself, and number them by it."""
     bodies = {body.name: body for body in world.bodies}
     links: list[Link] = []

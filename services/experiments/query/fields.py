@@ -20,6 +20,12 @@ Meets = Callable[[str, Value], Condition]
 TEXT, NUMBER, CHOICE = ("=", "~"), ("=", ">", ">=", "<", "<="), ("=",)
 """Operators of kinds of fields. `!=`, `!~`, `in` and `not in` follow from them."""
 
+OF_MISSING = ("=", "!=", "in", "not in")
+"""Operators of `none`."""
+
+LAST = datetime.max.replace(tzinfo=UTC)
+"""The last time that a database knows."""
+
 _SPANS = {"m": "minutes", "h": "hours", "d": "days", "w": "weeks"}
 _FLAGS = ("true", "false", "any")
 
@@ -43,7 +49,7 @@ def text(column: Column, meaning: str) -> Field:
     """Return the field of a text; `none` asks for one that is missing."""
 
     def meets(operator: str, value: Value) -> Condition:
-        if is_none(value):
+        if asks_for_missing(operator, value):
             return column.is_(None)
         wanted = storable(value.text)
         met = column.icontains(wanted, autoescape=True) if operator == "~" else column == wanted
@@ -57,7 +63,7 @@ def tags(has: Callable[[Callable[[Column], Condition]], Condition], meaning: str
 
     def meets(operator: str, value: Value) -> Condition:
         wanted = storable(value.text.lower())
-        if is_none(value):
+        if asks_for_missing(operator, value):
             return not_(has(lambda column: column.is_not(None)))
         packed = wanted if operator == "~" else f" {wanted} "
         return has(lambda column: and_(column.is_not(None), column.contains(packed, autoescape=True)))
@@ -74,10 +80,12 @@ def moment(column: Column, meaning: str) -> Field:
     """Return the field of a time: a date, a date with a time, or how long ago; a date alone is a whole day for `=`."""
 
     def meets(operator: str, value: Value) -> Condition:
-        if is_none(value):
+        if asks_for_missing(operator, value):
             return column.is_(None)
         at, length = _moment_of(value)
         if operator == "=":
+            if at > LAST - length:
+                raise refusal(value, f"{value.text!r} is too late for =; permitted: times before {LAST:%Y-%m-%d}")
             return and_(column.is_not(None), column >= at, column < at + length)
         return and_(column.is_not(None), compared(column, operator, at))
 
@@ -118,7 +126,7 @@ def fitness(experiment: Column, points: Select[Any], value: ColumnElement[Any], 
     """
 
     def meets(operator: str, wanted: Value) -> Condition:
-        if is_none(wanted):
+        if asks_for_missing(operator, wanted):
             return experiment.not_in(points)
         return experiment.in_(points.having(compared(func.avg(value), operator, number_of(wanted))))
 
@@ -130,9 +138,19 @@ def compared(column: ColumnElement[object] | Column, operator: str, value: objec
     return column.op(operator, is_comparison=True)(literal(value))
 
 
-def is_none(value: Value) -> bool:
-    """Return whether the value asks for something that is missing."""
-    return not value.quoted and value.text.lower() == "none"
+def asks_for_missing(operator: str, value: Value) -> bool:
+    """Return whether the value is `none`, which asks for something that is missing.
+
+    Raises:
+        InvalidSpec: it is, and the operator is not `=`.
+    """
+    if value.quoted or value.text.lower() != "none":
+        return False
+    if operator != "=":
+        hint = "; put a text in quotes" if operator == "~" else ""
+        message = f"{value.text!r} is what is missing, and has no operator {operator}"
+        raise refusal(value, f"{message}; permitted: {', '.join(OF_MISSING)}{hint}", OF_MISSING)
+    return True
 
 
 def number_of(value: Value) -> float:

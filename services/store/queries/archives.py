@@ -1,7 +1,6 @@
 """Rows of whole tables, for archives: read in a stable order, and inserted in bulk."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from datetime import datetime
 from enum import Enum
 from itertools import islice
 from typing import Any
@@ -10,7 +9,6 @@ from sqlalchemy import Select, delete, insert, select, text
 from sqlalchemy.exc import DataError, IntegrityError
 from sqlalchemy.orm import Session
 
-from gaplab.services.store.clock import now
 from gaplab.services.store.models import (
     Base,
     DeletionRow,
@@ -63,11 +61,6 @@ def taken_ids(session: Session, model: type[StudyRow | ExperimentRow], ids: Iter
 def forget_deletions(session: Session, ids: Iterable[str]) -> None:
     """Forget that studies and experiments with these ids were deleted: they are there again."""
     session.execute(delete(DeletionRow).where(DeletionRow.id.in_(list(ids))))
-
-
-def database_time(session: Session) -> datetime:
-    """Return the time by the database's clock."""
-    return session.execute(select(now())).scalar_one()
 
 
 def insert_rows(session: Session, name: str, rows: Iterable[Row]) -> int:

@@ -12,11 +12,11 @@ from sqlalchemy import Table, bindparam, insert, text, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
+from gaplab.services.core.arrays import known
 from gaplab.services.core.types import Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Claim, TimedStep
 from gaplab.services.store.models import EventCounterRow, EventRow
-from gaplab.services.store.queries.step_rows import finite
 from gaplab.services.store.texts import brief
 
 _NOTED = "events"
@@ -95,13 +95,13 @@ def _event_of(step: Step) -> tuple[EventKind, dict[str, Any]]:
         case Selected():
             return EventKind.SELECTED, {}
         case Measured():
-            return EventKind.MEASURED, {"fitness": finite(step.sample.fitness)}
+            return EventKind.MEASURED, {"fitness": known(step.sample.fitness)}
         case Tuned():
-            best = finite(step.simulators[0].squared_error) if step.simulators else None
+            best = known(step.simulators[0].squared_error) if step.simulators else None
             return EventKind.TUNED, {"simulators": len(step.simulators), "squared_error": best}
         case Transferred():
-            return EventKind.TRANSFERRED, {"simulated_fitness": finite(step.fitness)}
+            return EventKind.TRANSFERRED, {"simulated_fitness": known(step.fitness)}
         case Probed():
             left_out = {"left_out": True} if step.left_out else {}
-            recorded = finite(step.recorded)
-            return EventKind.PROBED, {"fitness": finite(step.fitness), "recorded_fitness": recorded} | left_out
+            recorded = known(step.recorded)
+            return EventKind.PROBED, {"fitness": known(step.fitness), "recorded_fitness": recorded} | left_out

@@ -3,14 +3,13 @@
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from functools import cache
-from math import isfinite
 from typing import Any, cast
 
 from sqlalchemy import Connection, Table, Update, bindparam, insert, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import MeasurementKind
-from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.types import Cost, Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import TimedStep
@@ -107,11 +106,6 @@ def vector(values: FloatArray) -> list[float]:
     return [float(each) for each in values]
 
 
-def finite(value: float) -> float | None:
-    """Return the value; None for nan and the infinities."""
-    return float(value) if isfinite(value) else None
-
-
 def iteration_columns(step: Step) -> dict[str, Any]:
     """Return the columns of its iteration that the step fills."""
     match step:
@@ -120,10 +114,10 @@ def iteration_columns(step: Step) -> dict[str, Any]:
         case Tuned():
             return _phase("tuning", step.cost)
         case Transferred():
-            found = {"transferred_genome": vector(step.genome), "simulated_fitness": finite(step.fitness)}
+            found = {"transferred_genome": vector(step.genome), "simulated_fitness": known(step.fitness)}
             return found | _phase("transfer", step.cost)
         case Probed():
-            return {"recorded_fitness": finite(step.recorded)}
+            return {"recorded_fitness": known(step.recorded)}
         case Measured():
             return {}
 
@@ -134,7 +128,7 @@ def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
         {
             "rank": rank,
             "parameters": vector(each.parameters),
-            "squared_error": finite(each.squared_error),
+            "squared_error": known(each.squared_error),
             "lower": None if each.interval is None else vector(each.interval[:, 0]),
             "upper": None if each.interval is None else vector(each.interval[:, 1]),
             "weight": each.weight,
@@ -148,7 +142,7 @@ def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, 
     """Return the row of a measurement; a probe's step does not repeat the transferred genome."""
     seen = step if isinstance(step, Probed) else step.sample
     columns = {
-        "fitness": finite(seen.fitness),
+        "fitness": known(seen.fitness),
         "readings": _readings(seen.readings),
         "repeats": vector(seen.repeats) if len(seen.repeats) else None,
         "left_out": isinstance(step, Probed) and step.left_out,
@@ -159,7 +153,7 @@ def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, 
 
 def _readings(values: FloatArray) -> list[float | None] | None:
     """Return a JSON array with None for each nan; None if there are no readings."""
-    return [finite(each) for each in values.tolist()] if len(values) else None
+    return [known(each) for each in values.tolist()] if len(values) else None
 
 
 def _opens_iteration(step: Step) -> bool:
