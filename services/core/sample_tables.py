@@ -108,7 +108,10 @@ def _columns(line: int, headings: Sequence[str], robot: Robot, errors: FirstErro
         column = _column(name, robot)
         yield column
         if column is None:
-            errors.append(_unknown(line, heading, robot))
+            if errors.count < MOST_ERRORS:  # to find the nearest name takes milliseconds
+                errors.append(_unknown(line, heading, robot))
+            else:
+                errors.count += 1
             continue
         found.append(column)
         own = robot.sensors.units[column.sensor] if column.kind == "reading" else robot.unit

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import gaplab
+from gaplab.services.core import sample_tables
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.robots.quadruped import Quadruped, QuadrupedOptions
@@ -118,6 +119,21 @@ def test_errors_say_what_is_permitted() -> None:
 def test_a_hostile_table_gives_a_short_answer() -> None:
     found = read_samples("gene_0,value\n" + "x,y\n" * 2_000, TOY)
     assert (len(found.errors), found.more) == (1_000, 3_000)
+
+
+def test_names_are_looked_up_for_no_more_unknown_columns_than_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked_up: list[str] = []
+
+    def nearest(name: str, *given: object, **options: object) -> list[str]:
+        looked_up.append(name)
+        return []
+
+    monkeypatch.setattr(sample_tables, "get_close_matches", nearest)
+
+    found = read_samples(",".join(f"x{place}" for place in range(3_000)), TOY)
+
+    assert len(looked_up) == len(found.errors) == 1_000
+    assert found.more > 2_000
 
 
 def test_a_hostile_table_takes_little_memory() -> None:
