@@ -17,7 +17,7 @@ from gaplab.services.settings import Notify
 
 WEBHOOK_S = 10.0
 COMMAND_S = 60.0
-"""Longest times of a delivery, from its begin to its end."""
+"""Longest times of a delivery, from its beginning to its end."""
 
 _GONE = {400, 401, 403, 404, 405, 410, 422}
 """Statuses of an address that refuses the message itself."""
