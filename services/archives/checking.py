@@ -34,7 +34,8 @@ GREATEST, GREATEST_LARGE = 2**30, 2**48
 
 _ID = r"^[A-Za-z0-9]{1,32}$"
 _IDS = {"id", "study_id", "experiment_id", EXPERIMENT}
-_MAY_BE_NEGATIVE = {"precedence"}
+_MAY_BE_NEGATIVE = {"precedence", "tuning_saved", "rollouts_saved"}
+"""An order by priority, and savings, since tuners could once exceed their budget."""
 
 _Moment = Annotated[
     AwareDatetime,

@@ -305,6 +305,14 @@ def test_rows_that_are_none(sqlite_store: Store, good: Any, content: Any, said: 
     refused(sqlite_store, packed(good | {"experiment.jsonl": content}), said)
 
 
+def test_a_tuner_that_took_more_than_its_budget_makes_no_archive_bad(
+    sqlite_store: Store, good: Any, unpacked_here: Any
+) -> None:
+    members = with_table(good, "iteration", lambda rows: set_in(rows, 1, tuning_saved=-140))
+
+    assert import_archive(sqlite_store, BytesIO(packed(members))).experiments
+
+
 def test_a_row_without_an_end(
     sqlite_store: Store, good: Any, monkeypatch: pytest.MonkeyPatch, unpacked_here: Any
 ) -> None:
