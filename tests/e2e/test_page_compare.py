@@ -187,7 +187,9 @@ def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive: 
     many = [each["id"] for each in archive.get("/experiments", limit=60)["items"]]
     page = visit(address(archive, *many))
     expect(page.locator(".chosen li")).to_have_count(60)
+    page.locator(".large").scroll_into_view_if_needed()  # what is out of sight is loaded once it is seen
     expect(page.locator(".large .plot .main-svg").first).to_be_visible()
+    page.get_by_role("heading", name="Which differ").scroll_into_view_if_needed()
     expect(page.get_by_text("Pairs are tested for up to 20 experiments; these are 60.")).to_be_visible()
     page.get_by_role("button", name="Remove all").click()
     expect(page.get_by_text("Choose experiments above")).to_be_visible()
@@ -221,7 +223,9 @@ def test_its_figure_is_saved_in_every_format(archive: Any, ids: Any, visit: Any)
 def test_it_is_accessible_and_fits_a_phone(archive: Any, ids: Any, visit: Any, dark: Any) -> None:
     for width in (1280, 375):
         page = visit(address(archive, *ids), dark=dark, width=width)
+        page.locator(".large").scroll_into_view_if_needed()
         expect(lines(page)).to_have_count(6)
+        page.get_by_role("heading", name="Which differ").scroll_into_view_if_needed()
         expect(page.locator("table.matrix")).to_be_visible()
         page.get_by_text("Every pair, at every range").click()
         axe(page)
