@@ -129,7 +129,7 @@ def bring_a_robot(ask: Callable[..., Any], folder: Path) -> None:
 
 
 def measure_on_a_bench(ask: Callable[..., Any], store: Store, folder: Path) -> None:
-    spec = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 1, "iterations": 1}
+    spec = {"strategy": "random", "robot": "quadruped", "budget": "smoke", "repetitions": 1, "iterations": 1}
     id = ask("submit", "-", stdin=json.dumps(spec | {"reality": {"kind": "physical", "probes": "never"}}))["id"]
     compute(store)
     (request,) = ask("requests", id)
