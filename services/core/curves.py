@@ -3,7 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
-from scipy import special
+import scipy
 
 from gaplab.schemas.curves import CurvePoint
 from gaplab.services.core.arrays import FloatArray, known
@@ -102,4 +102,4 @@ def equal(values: FloatArray) -> bool:
 @lru_cache(maxsize=1024)
 def _quantile(degrees_of_freedom: int) -> float:
     """Return the quantile of Student's t for a two-sided interval; cached, because it dominates the time of a curve."""
-    return float(special.stdtrit(degrees_of_freedom, 0.5 + CONFIDENCE / 2))
+    return float(scipy.special.stdtrit(degrees_of_freedom, 0.5 + CONFIDENCE / 2))

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from scipy.spatial.transform import Rotation, Slerp
 
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.motions import Trajectory
@@ -40,7 +39,8 @@ class Trace:
     def at(self, times_s: FloatArray) -> Trajectory:
         """Return the poses at times `(t,)` within the trace, interpolated."""
         position = [np.interp(times_s, self.times_s, column) for column in self.positions_m.T]
-        turns = Slerp(self.times_s, Rotation.from_quat(self.orientations))(times_s)
+        transform = scipy.spatial.transform
+        turns = transform.Slerp(self.times_s, transform.Rotation.from_quat(self.orientations))(times_s)
         return Trajectory(times_s, np.stack(position, axis=-1), turns.as_quat())
 
 
@@ -105,10 +105,11 @@ def from_start(trace: Trace, lag_s: float, times_s: FloatArray) -> Trajectory:
     """
     seen = trace.at(np.clip(times_s + lag_s, trace.times_s[0], trace.times_s[-1]))
     start = trace.at(frozen([lag_s]))
-    heading = Rotation.from_quat(start.orientations[0]).apply([1.0, 0.0, 0.0])
-    back = Rotation.from_rotvec([0.0, 0.0, -np.arctan2(heading[1], heading[0])])
+    rotation = scipy.spatial.transform.Rotation
+    heading = rotation.from_quat(start.orientations[0]).apply([1.0, 0.0, 0.0])
+    back = rotation.from_rotvec([0.0, 0.0, -np.arctan2(heading[1], heading[0])])
     moved = seen.positions_m - start.positions_m[0] * [1.0, 1.0, 0.0]
-    turned = (back * Rotation.from_quat(seen.orientations)).as_quat()
+    turned = (back * rotation.from_quat(seen.orientations)).as_quat()
     return Trajectory(times_s, back.apply(moved), turned)
 
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from PIL import Image, ImageChops, ImageDraw
-from scipy.spatial import ConvexHull, QhullError
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.shapes import Vector
@@ -183,8 +183,8 @@ def _round(pen: ImageDraw.ImageDraw, solid: Solid, radius_m: float, length_m: fl
 
 def _hull(places: FloatArray) -> Points:
     try:
-        return _points(places[ConvexHull(places).vertices])
-    except QhullError:  # all on one line: a shadow without area
+        return _points(places[scipy.spatial.ConvexHull(places).vertices])
+    except scipy.spatial.QhullError:  # all on one line: a shadow without area
         return _points(places[:2])
 
 

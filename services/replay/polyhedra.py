@@ -5,7 +5,7 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.shapes import Vector
@@ -43,8 +43,8 @@ def hull_faces(points_m: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], tuple[
     """
     points = np.array(points_m, dtype=float)
     try:
-        hull = ConvexHull(points)
-    except (QhullError, ValueError):
+        hull = scipy.spatial.ConvexHull(points)
+    except (scipy.spatial.QhullError, ValueError):
         low, high = points.min(axis=0), points.max(axis=0)
         return _vectors((low + high) / 2 + np.array(SIGNS) * (high - low)), BOX
     corners = np.sort(hull.vertices)

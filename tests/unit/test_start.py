@@ -8,14 +8,17 @@ import sys
 
 import pytest
 
+PARTS = {"scipy.stats", "scipy.special", "scipy.spatial", "scipy.signal", "scipy.linalg"}
+
 UNUSED = {
     "gaplab.api.commands.cli": {"numpy", "scipy", "sqlalchemy", "psycopg", "fastapi", "ray"},
-    "gaplab.api.app": {"scipy.stats", "scipy.signal", "matplotlib", "plotly", "fpdf", "pyarrow", "ray"},
+    "gaplab.api.app": {*PARTS, "matplotlib", "plotly", "fpdf", "pyarrow", "ray"},
     "gaplab.workers.task": {"scipy", "sqlalchemy", "psycopg", "pybullet", "mujoco", "sapien"},
     "gaplab.services.engines.mujoco": {"scipy.spatial", "mujoco", "numba"},
     "gaplab.services.engines.pybullet": {"scipy.spatial", "pybullet"},
     "gaplab.services.engines.physx": {"scipy.spatial", "sapien"},
-    "gaplab.workers.supervisor": {"scipy.stats", "pybullet", "mujoco", "sapien"},
+    "gaplab.services.core.tuners.gauss_newton": PARTS,
+    "gaplab.workers.supervisor": {*PARTS, "pybullet", "mujoco", "sapien"},
 }
 """Libraries by the module that a process imports first, which leaves them to the few requests that want them."""
 

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+import scipy
 from numpy.random import Generator
 from pydantic import Field
-from scipy import stats
-from scipy.stats.qmc import LatinHypercube
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
@@ -76,7 +75,8 @@ class GaussNewton(Tuner):
         places, differences = np.empty((0, task.space.size)), None
         estimate = None
         for share in filter(len, np.array_split(np.arange(left), self.options.rounds)):
-            drawn = box[0] + (box[1] - box[0]) * LatinHypercube(task.space.size, seed=rng).random(len(share))
+            hypercube = scipy.stats.qmc.LatinHypercube(task.space.size, seed=rng)
+            drawn = box[0] + (box[1] - box[0]) * hypercube.random(len(share))
             found = task.misfit.residuals(task.space.at(drawn))
             places = np.vstack([places, drawn])
             differences = found if differences is None else np.vstack([differences, found])
@@ -112,7 +112,7 @@ class LocalEstimate:
     def interval(self) -> FloatArray:
         """Return `(p, 2)`: ends of the interval of each tunable, by Student's t."""
         freedom = max(1, len(self.errors) - self.place.size - 1)
-        half = stats.t.ppf((1 + CONFIDENCE) / 2, freedom) * np.sqrt(np.diag(self.covariance))
+        half = scipy.stats.t.ppf((1 + CONFIDENCE) / 2, freedom) * np.sqrt(np.diag(self.covariance))
         return np.asarray(np.clip(np.transpose([self.place - half, self.place + half]), 0.0, 1.0))
 
     def box(self, within: FloatArray) -> FloatArray:
@@ -131,7 +131,7 @@ def _estimate(places: FloatArray, differences: FloatArray, noise: float) -> Loca
         noise: variance of a difference of the right simulator.
     """
     middle = np.median(differences, axis=0)
-    reach = FARTHEST * np.maximum(stats.median_abs_deviation(differences, axis=0, scale="normal"), noise**0.5)
+    reach = FARTHEST * np.maximum(scipy.stats.median_abs_deviation(differences, axis=0, scale="normal"), noise**0.5)
     cut = np.clip(differences, middle - reach, middle + reach)
     others = ~np.eye(len(places), dtype=bool)
     known = [_place(places[rest], cut[rest], one, noise) for rest, one in zip(others, cut, strict=True)]
