@@ -3,6 +3,7 @@
 import json
 import re
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import nbformat
@@ -42,6 +43,12 @@ def anchors(path: Path) -> set[str]:
     return found
 
 
+def tables(path: Path) -> Iterator[list[list[str]]]:
+    """The cells of each of its tables."""
+    for table in re.findall(r"(?:^\|.*\n)+", prose(path) + "\n", re.MULTILINE):
+        yield [re.split(r"(?<!\\)\|", line.strip())[1:-1] for line in table.splitlines()]
+
+
 def dead(path: Path) -> list[str]:
     """Its links that lead nowhere; those to other hosts are not followed."""
     wrong = []
@@ -58,6 +65,11 @@ def dead(path: Path) -> list[str]:
 @pytest.mark.parametrize("path", [*DOCUMENTS, *NOTEBOOKS], ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_no_link_is_dead(path: Path) -> None:
     assert dead(path) == []
+
+
+@pytest.mark.parametrize("path", [*DOCUMENTS, *NOTEBOOKS], ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_each_row_of_a_table_has_the_columns_of_its_heading(path: Path) -> None:
+    assert [row for heading, *rows in tables(path) for row in rows if len(row) != len(heading)] == []
 
 
 def test_dead_links_would_be_found(tmp_path: Path) -> None:
