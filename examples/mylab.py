@@ -2,7 +2,7 @@
 
 from numpy.random import default_rng
 
-from gaplab.api.clients.driving import DriverMotion
+from gaplab.api.clients.motions import DriverMotion
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.motions import Motion

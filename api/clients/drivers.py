@@ -15,7 +15,8 @@ from pathlib import Path
 from threading import Thread
 from typing import Any, Protocol
 
-from gaplab.api.clients.driving import DriverMotion, TakenRequest
+from gaplab.api.clients.driving import TakenRequest
+from gaplab.api.clients.motions import DriverMotion
 
 
 class MeasurementFailed(Exception):

@@ -1,12 +1,10 @@
 """The loop of a driver: requests are taken one after the other, kept by heartbeats, and answered once."""
 
-import json
 import logging
 import socket
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import cached_property
 from threading import Event, Thread
 from typing import Any
@@ -14,6 +12,7 @@ from typing import Any
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, refuses_sender
 from gaplab.api.clients.journal import Journal
+from gaplab.api.clients.motions import DriverMotion, motion_of
 from gaplab.api.clients.records import Records
 from gaplab.schemas.measurements import AnswerRead, RequestRead, RequestState
 from gaplab.schemas.records import Page
@@ -24,26 +23,10 @@ WAIT_S = 20.0
 PAUSE_S = 2.0
 """Pause after a request that the service could not serve."""
 
+_NOT_THIS_ONE = {404, 409, 429}
+"""Statuses after which a driver tries the next request: somebody else was faster, it is deleted, or too many ask."""
+
 log = logging.getLogger("gaplab.driver")
-
-
-@dataclass(frozen=True)
-class DriverMotion:
-    """Targets of actuators over time, constant between changes.
-
-    Attributes:
-        actuators: their names.
-        units: unit of the targets of each: rad, rad/s or N·m for a hinge, m, m/s or N for a slide.
-        times_s: times at which targets change.
-        targets: a row of targets for each time, with a column for each actuator.
-        observe_s: times of observation; the last one ends the run.
-    """
-
-    actuators: tuple[str, ...]
-    units: tuple[str, ...]
-    times_s: tuple[float, ...]
-    targets: tuple[tuple[float, ...], ...]
-    observe_s: tuple[float, ...]
 
 
 class TakenRequest:
@@ -185,14 +168,18 @@ class Driving:
                 return given
 
     def _next(self, experiment: str | None, bench: str | None) -> RequestRead | None:
-        """Take the oldest open request; None if there is none, or others have the bench."""
+        """Take the oldest open request; None if there is none, or others have the bench.
+
+        Raises:
+            ServiceError: the service refuses the token of the driver, or what it asks for.
+        """
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": WAIT_S}
         request = None
         try:
             for request in self._connection.items(Page[RequestRead], "/requests", **parameters):
-                if request.state is RequestState.OPEN and not request.busy:
-                    with suppress(ServiceError):
-                        return self._take(request)
+                is_free = request.state is RequestState.OPEN and not request.busy
+                if is_free and (taken := self._take(request)):
+                    return taken
         except (ServiceUnreachable, ServiceError) as error:
             if isinstance(error, ServiceError) and error.problem.status < 500:
                 raise
@@ -203,20 +190,20 @@ class Driving:
             time.sleep(PAUSE_S)
         return None
 
-    def _take(self, request: RequestRead) -> RequestRead:
+    def _take(self, request: RequestRead) -> RequestRead | None:
+        """Take a request; None if somebody else was faster, or it is wanted no more."""
         body = {"operator": self._operator, "lease_s": self._lease_s}
-        return self._connection.post(RequestRead, f"/requests/{segment(request.id)}/take", body)
+        try:
+            return self._connection.post(RequestRead, f"/requests/{segment(request.id)}/take", body)
+        except ServiceError as error:
+            if error.problem.status not in _NOT_THIS_ONE:
+                raise
+            log.info("not taken: %s", error)
+            return None
 
     def motion(self, request: RequestRead) -> DriverMotion:
         """Return the motion that a request asks for."""
-        found = json.loads(self._connection.get_bytes(f"/requests/{segment(request.id)}/motion", format="json"))
-        return DriverMotion(
-            actuators=tuple(found["actuators"]),
-            units=tuple(found["units"]),
-            times_s=tuple(found["times_s"]),
-            targets=tuple(map(tuple, found["targets"])),
-            observe_s=tuple(found["observe_s"]),
-        )
+        return motion_of(self._connection, request.id)
 
     def _release(self, request: RequestRead) -> None:
         with suppress(ServiceError, ServiceUnreachable):

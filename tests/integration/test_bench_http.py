@@ -12,6 +12,8 @@ import yaml
 from gaplab import Client, ServiceError
 from gaplab.api.clients import driving
 from gaplab.api.clients.journal import Journal
+from gaplab.schemas.access import Role
+from gaplab.services import access
 from gaplab.services.store.session import Store
 from tests.experiments import toy
 from tests.integration.test_bench import compute, truth
@@ -172,6 +174,20 @@ def test_answers_stay_in_the_journal_while_the_token_is_refused(
 
     with Journal(tmp_path / "journal") as journal:
         assert [answer for _, answer, _ in journal.unsent()] == [{"values": [0.5]}]
+
+
+def test_a_driver_that_may_read_but_not_take_is_told_so(store: Store, network: InProcess) -> None:
+    tokens = {role: access.create_token(store, role, role.value).secret for role in (Role.RUNNER, Role.READER)}
+    with Client("http://test", token=tokens[Role.RUNNER], transport=network) as runner:
+        submitted(runner)
+    compute(store)
+
+    with Client("http://test", token=tokens[Role.READER], transport=network) as reader:
+        assert len(reader.bench.pending()) == 1
+        with pytest.raises(ServiceError, match="runner") as refused:
+            next(reader.requests())
+
+    assert refused.value.problem.status == 403
 
 
 @pytest.mark.parametrize(
