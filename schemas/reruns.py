@@ -6,6 +6,8 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Id, Name
 
+Outcome = Literal["same", "different", "not computed"]
+
 
 class RepetitionRerun(Frozen):
     """One repetition of an archive, computed again."""
@@ -13,7 +15,7 @@ class RepetitionRerun(Frozen):
     experiment: Id
     name: Name
     repetition: int
-    outcome: Literal["same", "different", "not computed"]
+    outcome: Outcome
     steps: int = Field(description="steps with the same bits, up to the first that differs")
     stored_steps: int = Field(description="steps in the archive")
     reason: str | None = Field(default=None, description="first difference, or why it was not computed")

@@ -1,15 +1,18 @@
 """Recomputation of an archive without a service: each repetition from its beginning, compared with its stored steps."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from multiprocessing import get_context
 from typing import IO, Any
 
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.reruns import RepetitionRerun, RerunRead
+from gaplab.schemas.reruns import Outcome, RepetitionRerun, RerunRead
 from gaplab.services.archives.reading import CheckedArchive, checked_archive
 from gaplab.services.archives.step_differences import difference
 from gaplab.services.core import robot_library
@@ -91,10 +94,9 @@ def verify(
         recorded = list(_recorded(session, checked, most))
         versions = _other_versions(session, checked)
     results: list[RepetitionRerun] = []
-    with ProcessPoolExecutor(cores or os.cpu_count(), get_context("spawn"), folders.load) as processes:
-        for result in processes.map(rerun, recorded):
-            results.append(result)
-            computed(result)
+    for result in rerun_all(recorded, cores or os.cpu_count()):
+        results.append(result)
+        computed(result)
     counts = {outcome: sum(result.outcome == outcome for result in results) for outcome in ("same", "different")}
     return RerunRead(
         **counts,
@@ -104,12 +106,41 @@ def verify(
     )
 
 
+def rerun_all(recorded: Sequence[Recorded], cores: int | None) -> Iterator[RepetitionRerun]:
+    """Recompute repetitions in processes, and yield the results in their order.
+
+    A process that dies is the reason why its repetition is not computed, and ends no other one. A pool breaks with any
+    of its processes, so the first repetition without a result is tried alone, and those after it in another pool.
+    """
+    left = deque(recorded)
+    while left:
+        with _pool(cores) as processes, suppress(BrokenProcessPool):
+            for result in processes.map(rerun, tuple(left)):
+                left.popleft()
+                yield result
+        if left:
+            yield _rerun_alone(left.popleft())
+
+
+def _rerun_alone(recorded: Recorded) -> RepetitionRerun:
+    try:
+        with _pool(1) as process:
+            return process.submit(rerun, recorded).result()
+    except BrokenProcessPool:
+        return _result(recorded, "not computed", 0, "its process died: it was killed, or ran out of memory")
+
+
+def _pool(cores: int | None) -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(cores, get_context("spawn"), folders.load)
+
+
 def rerun(recorded: Recorded) -> RepetitionRerun:
     """Recompute a repetition, and compare it step by step until one differs.
 
     Any error is the reason why the repetition is not computed, and ends no other one.
     """
-    same, outcome, reason = 0, "same", None
+    same, reason = 0, None
+    outcome: Outcome = "same"
     try:
         if (reason := _obstacle(recorded)) is not None:
             outcome = "not computed"
@@ -125,12 +156,16 @@ def rerun(recorded: Recorded) -> RepetitionRerun:
                     outcome, reason = "different", f"it ends here after {same} steps"
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
         outcome, reason = "not computed", f"{type(error).__name__}: {error}"
+    return _result(recorded, outcome, same, reason)
+
+
+def _result(recorded: Recorded, outcome: Outcome, steps: int, reason: str | None) -> RepetitionRerun:
     return RepetitionRerun(
         experiment=recorded.experiment,
         name=recorded.name,
         repetition=recorded.number,
         outcome=outcome,
-        steps=same,
+        steps=steps,
         stored_steps=len(recorded.log),
         reason=reason,
     )

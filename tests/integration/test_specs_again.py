@@ -15,7 +15,7 @@ from gaplab.api.app import create_app
 from gaplab.arithmetic import chosen, has_avx2
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import export_study
-from gaplab.services.archives.rerunning import Recorded, rerun, submitted_spec
+from gaplab.services.archives.rerunning import Recorded, rerun, rerun_all, submitted_spec
 from gaplab.services.archives.step_differences import difference
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict
@@ -42,6 +42,19 @@ class Quitter(ToyFunction):
 
     def motion(self, genome):
         raise SystemExit(3)
+"""
+DIES = """
+import os
+import signal
+
+from gaplab.services.core.robots.toy_function import ToyFunction
+
+
+class Dies(ToyFunction):
+    name = "dies"
+
+    def motion(self, genome):
+        os.kill(os.getpid(), signal.SIGKILL)
 """
 SMALL = {"strategies": ["simulated_fit", "direct"], "robot": "toy_function", "budget": "smoke", "seed": 2**63}
 
@@ -218,6 +231,20 @@ def test_an_error_of_one_repetition_is_its_reason_and_ends_no_other(
 
     assert found.outcome == "not computed"
     assert str(found.reason).startswith(f"{error}: ")
+
+
+def test_a_process_that_dies_is_the_reason_of_its_repetition_and_ends_no_other(
+    put: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GAPLAB_PLUGINS", str(put(dies=DIES)))
+    spec = resolve_experiment(toy())
+    whole = Recorded("x", "x", 0, spec.model_dump(mode="json"), tuple(repetition(setting(spec, 0))))
+    deadly = replace(whole, spec={**whole.spec, "robot": {"name": "dies", "options": {}}})
+
+    found = list(rerun_all([whole, deadly, replace(whole, number=1)], cores=1))
+
+    assert [(each.outcome, each.repetition) for each in found] == [("same", 0), ("not computed", 0), ("different", 1)]
+    assert found[1].reason == "its process died: it was killed, or ran out of memory"
 
 
 def test_zeros_of_both_signs_differ_and_nan_is_nan() -> None:
