@@ -5,10 +5,11 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import ray
-from ray._private import ray_constants
+from ray._private import parameter, ray_constants
 from ray.exceptions import RayError
 
 from gaplab.arithmetic import chosen
@@ -105,7 +106,7 @@ def _start(cores: int | None, folder: Path) -> None:
         msg = "RAY_AUTH_MODE is 'disabled': anyone who reaches a Ray without a token can run any code; unset it"
         raise ClusterUnusable(msg)
     limit_files()
-    with _on_loopback():
+    with _on_loopback(), _without_monitors():
         try:
             ray.init(
                 address="local",  # not another Ray on this machine
@@ -134,6 +135,21 @@ def _on_loopback() -> Iterator[None]:
         yield
     finally:
         ray_constants.ENABLE_RAY_CLUSTER = before
+
+
+@contextmanager
+def _without_monitors() -> Iterator[None]:
+    """Let a Ray that starts within the context have fewer processes, as the options of `ray start` do.
+
+    The monitor of its autoscaler and that of its logs have nothing to do here: nodes are not added, and no log is
+    shown. `ray.init` does not pass these options on.
+    """
+    before = parameter.RayParams
+    parameter.RayParams = partial(before, no_monitor=True, include_log_monitor="")  # type: ignore[misc,assignment]
+    try:
+        yield
+    finally:
+        parameter.RayParams = before  # type: ignore[misc]
 
 
 def _join(address: str) -> None:

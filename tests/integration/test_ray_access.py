@@ -54,6 +54,7 @@ with cluster(Settings(workers=1)):
     print("LOGS", sum(each.stat().st_size for each in os.scandir(logs)) // 1_000_000)
     address = ray.get_runtime_context().gcs_address
     print("AT", address, *sorted(set(listening())))
+    print("MONITORS", sum(b"monitor" in command for pid, command in processes() if is_ours(pid) and pid != os.getpid()))
     token = os.environ["RAY_AUTH_TOKEN"].encode()
     print("SHOWN" if any(token in command for _, command in processes()) else "SECRET")
     asking = f"GcsClient(address={address!r}).internal_kv_keys(b'', None); print('IN')"
@@ -88,6 +89,7 @@ def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_env
     assert set(found) <= LOOPBACK
     assert done.stdout.count("REFUSED\n") == 2, done.stdout
     assert "SECRET\n" in done.stdout
+    assert "MONITORS 0\n" in done.stdout  # two processes of Ray that would have nothing to do
     assert int(re.search(r"LOGS (\d+)", done.stdout)[1]) < 10, done.stdout
     assert not (tmp_path / ".ray").exists()  # where Ray keeps a token that everybody may read
 
