@@ -15,6 +15,7 @@ from gaplab.services.core.equivalence import SIGNIFICANT
 from gaplab.services.core.statistics import both, holm
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING, probability
+from gaplab.services.reports.sentences import listed
 from gaplab.services.specs.differences import SpecColumn, differences
 
 COUNTS = (0, 1, 2, 3, 5, 10)
@@ -108,10 +109,13 @@ def rows(control: Study, study: Study) -> Iterator[Row]:
 def shown(found: Sequence[Row]) -> str:
     """Return which differences of a table are shown after Holm's correction over its rows; empty if none is."""
     corrected = holm([row.difference.p for row in found])
-    return ", ".join(
-        f"{row.strategy.lower()} at {row.samples}" if row.strategy != DIRECT else row.strategy.lower()
-        for row, p in zip(found, corrected, strict=True)
-        if p is not None and p < SIGNIFICANT
+    counts: dict[str, list[str]] = {}
+    for row, p in zip(found, corrected, strict=True):
+        if p is not None and p < SIGNIFICANT:
+            counts.setdefault(row.strategy, []).append(str(row.samples))
+    return "; ".join(
+        strategy.lower() if strategy == DIRECT else f"{strategy.lower()} at {listed(each)}"
+        for strategy, each in counts.items()
     )
 
 

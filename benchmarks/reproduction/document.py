@@ -74,14 +74,14 @@ class Document:
             if lead := origins.lead(self.store, study):
                 yield f"{lead} [Why](#where-the-recorded-fitness-comes-from)."
             changed = [
-                f"[{control}](#{control}-beside-{label}) ({shown})"
+                f"\n- [{control}](#{control}-beside-{label}): {shown}"
                 for control, (beside, rows) in self._beside.items()
                 if beside == label and (shown := controls.shown(rows))
             ]
             if changed:
                 yield (
                     "Controls that differ from it, after Holm's correction, with the strategies and their numbers of "
-                    f"samples: {', '.join(changed)}."
+                    f"samples:\n{''.join(changed)}"
                 )
 
     @cached_property

@@ -53,11 +53,11 @@ def _of_best(pairs: Sequence[Comparison], names: Mapping[str, str], best: str) -
     """Yield from which strategies the one with the highest mean differs, and to which it is equivalent."""
     others = [(pair, names[pair.second if pair.first == best else pair.first]) for pair in pairs]
     if different := [other for pair, other in others if differs(pair)]:
-        yield f"It differs significantly from {_listed(different)}."
+        yield f"It differs significantly from {listed(different)}."
     if alike := [other for pair, other in others if is_equivalent(pair)]:
-        yield f"Its difference from {_listed(alike)} is {_within(pairs)}."
+        yield f"Its difference from {listed(alike)} is {_within(pairs)}."
     if open_ := [other for pair, other in others if not differs(pair) and not is_equivalent(pair)]:
-        yield f"It is not shown to differ from {_listed(open_)}, which may be as good."
+        yield f"It is not shown to differ from {listed(open_)}, which may be as good."
 
 
 def _within(pairs: Sequence[Comparison]) -> str:
@@ -91,9 +91,9 @@ def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: 
             if {pair.first, pair.second} == {key, one.curve.experiment} and p_of(pair) is not None
         }
         if same := [name for name, pair in known.items() if is_equivalent(pair)]:
-            yield f"No difference from {baseline.name} {_within(pairs)}: {_listed(same)}."
+            yield f"No difference from {baseline.name} {_within(pairs)}: {listed(same)}."
         if open_ := [name for name, pair in known.items() if not differs(pair) and not is_equivalent(pair)]:
-            yield f"Not shown to differ from {baseline.name}: {_listed(open_)}."
+            yield f"Not shown to differ from {baseline.name}: {listed(open_)}."
 
 
 def spread(learned: Sequence[Judged]) -> Iterator[str]:
@@ -158,8 +158,9 @@ def _with_interval(one: Judged) -> str:
 
 
 def _named(trends: Sequence[TrendRead]) -> str:
-    return _listed([trend.name for trend in trends])
+    return listed([trend.name for trend in trends])
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
+    """Return names, at least one, as a sentence has them: `a, b and c`."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -519,7 +519,8 @@ def test_a_control_tells_what_its_change_does_to_fitness_over_its_own_direct(doc
     assert first["p"] == "< 0.001"
     assert first["difference"].startswith("\N{MINUS SIGN}0.100 (\N{MINUS SIGN}0.1")
     assert (direct["study"], direct["control"]) == ("1.00", "2.00")
-    assert "Shown after Holm's correction over the table: direct, simulated fit at 0, " in document.text
+    assert "correction over the table: direct; simulated fit at 0, 1, 2, 3, 5 and 10." in document.text
+    assert "\n- [bouncing](#bouncing-beside-agrees): direct; simulated fit at 0, 1, 2, 3, 5 and 10\n" in document.text
 
 
 def test_a_control_without_direct_is_judged_by_that_of_its_study_as_far_as_it_goes(document: Document) -> None:
