@@ -107,7 +107,8 @@ class Stop:
 
 def work(url: str) -> None:
     """What a supervisor does from its start to the end of all that is queued; it is told to stop once on the way."""
-    supervisor.HEARTBEATS, repetitions.WAIT_S = 10**9, 0.0  # a heartbeat in each round, and no pause
+    supervisor.HEARTBEATS = 10**9  # a heartbeat in each round
+    repetitions.WAIT_S = repetitions.LOOK_S = 0.0
     store = Store(url)
     execution.requeue_lost(store, stale_after_s=-1.0)  # half a minute has passed since the last one died
     Here(store).serve(Stop(8))  # type: ignore[arg-type]

@@ -23,7 +23,10 @@ from gaplab.workers.plugins import Plugins
 from gaplab.workers.run import Run
 
 WAIT_S = 0.2
-"""Longest wait for a delivery, and shortest interval between checks for queued work."""
+"""Longest wait for a delivery."""
+
+LOOK_S = 0.5
+"""Shortest interval between looks for queued work, beside the one when a repetition ends; each takes milliseconds."""
 
 STOP_S = 5.0
 """Longest wait for a task to stop its hardware."""
@@ -59,7 +62,7 @@ class Repetitions:
         self._checkpoint_s = checkpoint_s
         self._patience = patience or Patience()
         self._lease_s = lease_s
-        self._looked = -WAIT_S
+        self._looked = -LOOK_S
         self._unsure = False
         self._permits: Handle | None = None
         self._renewed = -lease_s
@@ -95,7 +98,7 @@ class Repetitions:
 
     def claim(self, capacity: Callable[[], int]) -> None:
         """Hand back repetitions that should not start now, and claim up to the capacity."""
-        if monotonic() - self._looked < WAIT_S:
+        if monotonic() - self._looked < LOOK_S:
             return
         self._looked = monotonic()
         waiting = [run.claim for run in self.runs if not (run.begun or run.over)]
@@ -158,7 +161,7 @@ class Repetitions:
             else:
                 log.info("completed", extra=run.place)
             self.runs.remove(run)
-        self._looked = -WAIT_S  # cores are free: look for work at once
+        self._looked = -LOOK_S  # cores are free: look for work at once
 
     def hand_back(self, runs: list[Run]) -> None:
         """Stop these runs, and return their leases; without the database, the leases expire."""

@@ -25,7 +25,7 @@ from gaplab.workers.patience import Patience
 from gaplab.workers.plugins import Plugins
 from gaplab.workers.task import told
 
-LOOK_S = 0.2
+LOOK_S = 1.0
 """Shortest interval between checks of the queue."""
 
 Result: TypeAlias = "ObjectRef[tuple[Sensitivity, ...] | Failure]"

@@ -166,6 +166,7 @@ def hurry(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {"HEARTBEATS": 1e9, "RETRY_S": 0.0}.items():
         monkeypatch.setattr(supervisor, name, value)
     monkeypatch.setattr(repetitions, "WAIT_S", 0.0)
+    monkeypatch.setattr(repetitions, "LOOK_S", 0.0)
     monkeypatch.setattr(checking, "LOOK_S", 0.0)
     for module in MODULES.values():
         monkeypatch.setattr(module, "requeue_lost", partial(requeue_late, module, module.requeue_lost))
