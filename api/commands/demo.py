@@ -6,7 +6,10 @@ a complete run, the next one submits both studies again and keeps the old result
 """
 
 import json
+import os
+import shutil
 import signal
+import sys
 import time
 from pathlib import Path
 from shlex import quote
@@ -53,15 +56,24 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
             for name, spec in specs.items():
                 _run_study(name, spec, client, folder, console)
     except KeyboardInterrupt:
-        msg = f"interrupted; all results are kept, and `gaplab demo --folder {quote(str(folder))}` continues"
+        msg = f"interrupted; all results are kept, and `{command_here()} demo --folder {quote(str(folder))}` continues"
         raise CommandError(msg, Exit.INTERRUPTED) from None
     (folder / "demo.json").unlink()
     minutes, seconds = divmod(round(time.monotonic() - started_at), 60)
     _print(f"\nDone in {minutes} min {seconds} s; the service has ended. Results are in {folder}/:", console)
     _print("\n".join(f"  {folder / name}.html" for name in STUDIES), console, style="bold")
     _print("To explore them, start the service on the same database:", console)
-    serve = f"  GAPLAB_DATABASE_URL={quote(database)} gaplab serve"
-    _print(f"{serve}\n  gaplab list; gaplab curve ID; http://127.0.0.1:8000/docs", console, style="bold")
+    gaplab = command_here()
+    serve = f"  GAPLAB_DATABASE_URL={quote(database)} {gaplab} serve"
+    _print(f"{serve}\n  {gaplab} list; {gaplab} curve ID; http://127.0.0.1:8000/", console, style="bold")
+
+
+def command_here() -> str:
+    """Return what calls this installation's `gaplab` from this folder: its name if it is on the path, else its place."""
+    beside, found = Path(sys.executable).with_name("gaplab"), shutil.which("gaplab")
+    if not beside.exists() or (found is not None and beside.samefile(found)):
+        return "gaplab"
+    return quote(os.path.relpath(beside) if beside.is_relative_to(Path.cwd()) else str(beside))
 
 
 def _run_study(name: str, spec: dict[str, Any], client: Client, folder: Path, console: Console) -> None:
