@@ -70,7 +70,9 @@ def test_a_demo_killed_outright_leaves_nothing_running_and_goes_on_when_run_agai
     assert "toy: 12 of 12 repetitions" in said
     assert "evolved in reality itself" in said
     assert "real-world evaluation" in said
-    assert f"  GAPLAB_DATABASE_URL='sqlite:///{folder}/gaplab.db' gaplab serve" in said.splitlines()
+    (serve,) = [line for line in said.splitlines() if line.endswith("gaplab serve")]
+    assert serve.startswith(f"  GAPLAB_DATABASE_URL='sqlite:///{folder}/gaplab.db' ")
+    assert subprocess.run(["sh", "-c", f"{serve.removesuffix('serve')}--version"], check=False).returncode == 0
     for name in ("toy", "quadruped"):
         assert f"  {folder / name}.html" in said.splitlines()
         assert (folder / f"{name}.html").read_text().startswith("<!doctype html>")
