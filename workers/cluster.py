@@ -139,10 +139,10 @@ def _on_loopback() -> Iterator[None]:
 
 @contextmanager
 def _without_monitors() -> Iterator[None]:
-    """Let a Ray that starts within the context have fewer processes, as the options of `ray start` do.
+    """Let a Ray that starts within the context start neither the monitor of its autoscaler nor that of its logs.
 
-    The monitor of its autoscaler and that of its logs have nothing to do here: nodes are not added, and no log is
-    shown. `ray.init` does not pass these options on.
+    They have nothing to do here: no node is added, and no log is shown. `ray start` has options for both, but `ray.init`
+    passes none on, so this replaces the class of its parameters.
     """
     before = parameter.RayParams
     parameter.RayParams = partial(before, no_monitor=True, include_log_monitor="")  # type: ignore[misc,assignment]

@@ -24,7 +24,7 @@ PAUSE_S = 2.0
 """Pause after a request that the service could not serve."""
 
 _NOT_THIS_ONE = {404, 409, 429}
-"""Statuses after which a driver tries the next request: somebody else was faster, it is deleted, or too many ask."""
+"""Statuses after which a driver tries the next request: it is deleted, somebody else was faster, or too many ask."""
 
 log = logging.getLogger("gaplab.driver")
 

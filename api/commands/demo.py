@@ -69,7 +69,7 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
 
 
 def command_here() -> str:
-    """Return what calls this installation's `gaplab` in this folder: its name if it is on the path, else its place."""
+    """Return the command that runs this `gaplab` from this folder: its name if it is on the path, else its place."""
     beside, found = Path(sys.executable).with_name("gaplab"), shutil.which("gaplab")
     if not beside.exists() or (found is not None and beside.samefile(found)):
         return "gaplab"
