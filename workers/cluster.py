@@ -141,7 +141,7 @@ def _on_loopback() -> Iterator[None]:
 def _without_monitors() -> Iterator[None]:
     """Let a Ray that starts within the context start neither the monitor of its autoscaler nor that of its logs.
 
-    They have nothing to do here: no node is added, and no log is shown. `ray start` has options for both, but `ray.init`
+    They have nothing to do here: no node is added, and no log is shown. `ray start` has options for both; `ray.init`
     passes none on, so this replaces the class of its parameters.
     """
     before = parameter.RayParams
