@@ -104,20 +104,27 @@ class Bench:
         dry_run: bool = False,
         **details: Unpack[Details],
     ) -> Consequences:
-        """Replace the values of a measurement; return what follows. A dry run only says it.
+        """Replace the values of a measurement; return what follows.
 
         Args:
             answer: id of the answer that counts.
             values: the right values; None if it `failed`.
             reason: why it is corrected.
-            dry_run: change nothing.
+            dry_run: return what would follow, and change nothing.
             details: `failed`, `readings`, `unit` and `operator`.
         """
         body = {"values": None if values is None else list(values), "reason": reason} | dict(details)
         return self._after(answer, "corrections", body, dry_run=dry_run)
 
     def void(self, answer: str, *, reason: str, operator: str | None = None, dry_run: bool = False) -> Consequences:
-        """Say that a measurement is worth nothing; its controller is asked for again. A dry run only says it."""
+        """Void a measurement, whose controller is asked for again; return what follows.
+
+        Args:
+            answer: id of the answer that counts.
+            reason: why it is worth nothing.
+            operator: name of the person who voids it.
+            dry_run: return what would follow, and change nothing.
+        """
         return self._after(answer, "void", {"reason": reason, "operator": operator}, dry_run=dry_run)
 
     def decide(

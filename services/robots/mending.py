@@ -21,7 +21,7 @@ ROUNDING = 1e-6
 
 
 def hold(base: Any, notes: Notes) -> None:  # noqa: ANN401
-    """Give a base that never moves a mass and an inertia, if it has none: no number depends on it."""
+    """Give a fixed base a mass and an inertia, if it has none; no number depends on them."""
     if _is_empty(base):
         _state(base)
         base.mass = max(base.mass, HELD_KG)
