@@ -67,7 +67,7 @@ class RequestQuery(Paging):
     experiment: Id | None = Field(default=None, description="only requests of this experiment")
     bench: str | None = Field(default=None, max_length=200, description="only requests of this bench")
     pending: bool = Field(
-        default=True, description="only requests that are still wanted, of experiments that are not paused"
+        default=True, description="only requests that are still wanted; of a paused experiment, only one that is taken"
     )
     conflicts: bool = Field(default=False, description="only requests with an answer in conflict, to be decided")
     wait_s: float = Field(default=0.0, ge=0, le=60, description="wait for so long if there is none")

@@ -41,7 +41,7 @@ class RequestFilter:
     Attributes:
         experiment: only those of this experiment.
         bench: only those of this bench.
-        pending: only those that are still wanted, of experiments that are not paused.
+        pending: only those that are still wanted; of a paused experiment, only one that is taken.
         conflicts: only those with an answer in conflict, which a person decides.
     """
 
@@ -76,7 +76,7 @@ def list_requests(
             .where(repetition.id == row.repetition_id, experiment.id == repetition.experiment_id)
             .where(experiment.state.in_(_AT_REST))
         )
-        conditions.append(~resting)
+        conditions.append(~resting | (row.state == RequestState.TAKEN))
     if wanted.conflicts:
         in_conflict = (AnswerRow.request_id == row.id) & (AnswerRow.state == AnswerState.CONFLICT)
         conditions.append(exists().where(in_conflict))

@@ -10,9 +10,11 @@ import pytest
 from playwright.sync_api import Error, expect
 from sqlalchemy import update
 
+from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
 from gaplab.services.bench import answering, attachments, taking
 from gaplab.services.bench.taking import RequestFilter
+from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.clock import moment as moment_of
@@ -100,6 +102,26 @@ def test_a_request_that_is_given_back_is_open(visit: Any, api: Any, written: Sto
     page.get_by_role("button", name="Give it back").click()
     page.get_by_role("button", name="Take it").wait_for()
     assert waiting(written, experiment)[0].state == "open"
+
+
+def test_an_operator_keeps_the_form_when_the_experiment_is_paused(visit: Any, api: Any, written: Store) -> None:
+    experiment, _ = asked(written, "stairs")
+    page = visit(f"{api.url}/#/bench?experiment={experiment.id}")
+    take(page)
+    fill(page, "0.41", "0.44")
+    lifecycle.ask_experiment(written, experiment.id, Verb.PAUSE)
+    page.reload()
+    expect(page.get_by_label("Repeat 2 (m/s)", exact=True)).to_have_value("0.44")
+    page.get_by_role("button", name="Give it back").click()
+    expect(page.get_by_text("Nothing is to be measured now.")).to_be_visible()
+
+    page.goto(f"{api.url}/#/experiments/{experiment.id}?tab=samples")
+    panel = page.get_by_role("tabpanel")
+    panel.scroll_into_view_if_needed()
+    expect(panel.get_by_text("○ open, but the experiment is paused")).to_be_visible()
+    expect(panel.get_by_role("link", name="To the bench")).to_have_count(0)
+    lifecycle.ask_experiment(written, experiment.id, Verb.RESUME)
+    expect(panel.get_by_role("link", name="To the bench")).to_have_count(1)
 
 
 @pytest.mark.parametrize("moment", ["before the service has it", "before it is acknowledged"])

@@ -332,7 +332,10 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
     one, two, three = (submit_experiment(store, bench(reality={"bench": name})) for name in "abc")
     compute(store)
     requests = {each.experiment: each for each in pending(store)}
+    taken = taking.take(store, requests[one.id].id, TakeSpec(operator="Ada"), FREELY).answer
     assert lifecycle.ask_experiment(store, one.id, Verb.PAUSE).state is State.PAUSED
+    assert {each.experiment for each in pending(store)} == {one.id, two.id, three.id}  # a taken one is being measured
+    taking.release(store, taken.id, HolderSpec(take=taken.takes))
     assert {each.experiment for each in pending(store)} == {two.id, three.id}
     with pytest.raises(Conflict, match="PAUSED"):
         taking.take(store, requests[one.id].id, TakeSpec(operator="Ada"), FREELY)

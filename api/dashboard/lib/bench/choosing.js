@@ -11,6 +11,13 @@
 export const isWanted = ({ state }) => ["open", "taken", "stuck"].includes(state);
 
 /**
+ * Return whether no measurement of an experiment begins in its state.
+ *
+ * @param {Api.State} state
+ */
+export const isAtRest = (state) => ["PAUSING", "PAUSED", "STOPPING"].includes(state);
+
+/**
  * Return whether this browser holds a request.
  *
  * @param {Api.RequestRead} request

@@ -1,7 +1,7 @@
 // @ts-check
 /** The measurements of a robot on a bench: repeats, operators, what was corrected, and the way to take one back. */
 
-import { isWanted } from "../../lib/bench/choosing.js";
+import { isAtRest, isWanted } from "../../lib/bench/choosing.js";
 import { undoButtons } from "../../lib/bench/corrections.js";
 import { answerText, requestWords } from "../../lib/bench/values.js";
 import { h } from "../../lib/dom.js";
@@ -57,9 +57,12 @@ function row(page, request, reload) {
   const { repetition, iteration, kind, unit, repeats, answers, branch, same_as: same } = request;
   const answer = answers.find(({ state }) => state === "counted") ?? null;
   const words = requestWords(request);
-  const state = [ENDED[request.state] ?? stateText(request), branch === null ? null : `, in closed branch ${branch}`, same ? ", same controller as before" : null];
+  const experiment = page.experiment.state;
+  const isHeldUp = isWanted(request) && request.state !== "taken" && isAtRest(experiment);
+  const state = [ENDED[request.state] ?? stateText(request), isHeldUp ? `, but the experiment is ${experiment.toLowerCase()}` : null,
+    branch === null ? null : `, in closed branch ${branch}`, same ? ", same controller as before" : null];
   const undo = answer && branch === null ? undoButtons({ answer, repeats, unit, words }, page.signal, reload)
-    : isWanted(request) ? h("a", { href: `#/bench?experiment=${page.id}&request=${request.id}`, "aria-label": `To the bench: ${words}` }, "To the bench") : "";
+    : isWanted(request) && !isHeldUp ? h("a", { href: `#/bench?experiment=${page.id}&request=${request.id}`, "aria-label": `To the bench: ${words}` }, "To the bench") : "";
   return [repetition, iteration, kind, answer ? [answerText(answer), ...history(request)] : history(request),
     answer?.values ? number(answer.fitness) : "–", state, answer?.operator ?? "–", answer ? new Date(answer.at).toLocaleString() : "–",
     replayLink(page, request), undo];
