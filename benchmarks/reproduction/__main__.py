@@ -9,7 +9,8 @@ from pathlib import Path
 
 from benchmarks.archives import private_store
 from benchmarks.reproduction.document import ROOT, Document
-from benchmarks.reproduction.studies import Study, read_study
+from benchmarks.reproduction.reading import read_study
+from benchmarks.reproduction.studies import Study
 from benchmarks.reproduction.tables import FIGURE_3, is_toy
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.toy import toy_figure

@@ -11,7 +11,7 @@ from benchmarks.reproduction.tables import table
 WORDS = {
     Verdict.REPRODUCED: "**reproduced**",
     Verdict.SMALLER: "**reproduced**, smaller",
-    Verdict.NOT: "**not**",
+    Verdict.NOT: "**not reproduced**",
     Verdict.OPEN: "open",
     Verdict.ABSENT: "not in this study",
 }

@@ -1,12 +1,23 @@
-"""The paper's claims C1 to C8, each with its rule; `pairs.py` has those that strategies differ."""
+"""The paper's claims C1 to C8, each with its rule.
 
-from collections.abc import Callable, Iterable
+`levels.py` examines those that compare fitness with direct, `pairs.py` those that strategies differ, and `curves.py`
+those on spread and shape.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
-from benchmarks.reproduction import paper, statements
-from benchmarks.reproduction.evidence import NO_TEST, Evidence, Examined
+from benchmarks.reproduction import paper
+from benchmarks.reproduction.curves import NEARER_TO_A_THIRD, curves_flatten, curves_rise, fit_strategies_vary_less
+from benchmarks.reproduction.evidence import Examined
+from benchmarks.reproduction.levels import (
+    all_end_near_direct,
+    four_samples_tune_simulators,
+    one_sample_is_enough,
+    one_sample_tunes_the_simulator,
+    starts_at_two_thirds,
+    three_samples_reach_direct,
+)
 from benchmarks.reproduction.pairs import (
     fit_strategies_differ,
     fit_strategies_lead,
@@ -16,113 +27,6 @@ from benchmarks.reproduction.pairs import (
     weak_strategies_differ,
 )
 from benchmarks.reproduction.studies import Study
-from gaplab.services.core.arrays import FloatArray
-from gaplab.services.figures.words import number_of, spoken
-from gaplab.services.reports.numbers import signed
-
-NEARER_TO_A_THIRD = (1 / 3) ** 0.5
-"""Ratio of standard deviations that is as far from a third as from 1, by factors."""
-
-NO_DIRECT = "direct baseline"
-FEWEST_SAMPLES = 4
-"""Samples below which a curve has no two halves to compare."""
-
-
-def starts_at_two_thirds(study: Study) -> Examined:
-    """Return the evidence that controllers of random simulators have `paper.START` of direct (C1)."""
-    lacking = tuple(spoken(name).lower() for name in paper.STRATEGIES if not study.arm(name))
-    starts = {name: own for name in study.present if len(own := study.values(name, 0, 0))}
-    if not len(study.direct) or not starts:
-        return Examined("", "", (), lacking if len(study.direct) else (NO_DIRECT,))
-    together = np.concatenate(list(starts.values()))
-    tested = statements.near(together, study.direct, paper.START, paper.START_MARGIN)
-    ratios = [own.mean() / study.unit for own in starts.values()]
-    here = f"{tested.estimate} of direct; strategies {min(ratios):.2f} to {max(ratios):.2f}"
-    return Examined(here, NO_TEST, (Evidence(f"all together near {paper.START:.2f}", tested),))
-
-
-def three_samples_reach_direct(study: Study) -> Examined:
-    """Return the evidence that strategies with simulated fit reach direct after three samples, and pass it (C2)."""
-    present = [name for name in paper.SIMULATED_FIT if study.arm(name)]
-    lacking = [spoken(name).lower() for name in paper.SIMULATED_FIT if name not in present]
-    if not len(study.direct) or not present or study.last < 3:
-        missing = [] if len(study.direct) else [NO_DIRECT]
-        short = [f"value after 3 samples: it ends after {study.last}"] if present and study.last < 3 else []
-        return Examined("", "", (), (*missing, *lacking, *short))
-    evidence = [_reaches(study, name, 3, paper.LEAST_AFTER_THREE) for name in present]
-    if study.last >= paper.ITERATIONS:
-        evidence += [_reaches(study, name, paper.ITERATIONS, paper.LEAST_AFTER_TEN) for name in present]
-    else:
-        lacking.append(f"value after {number_of('sample', paper.ITERATIONS)}: it ends after {study.last}")
-    counts = [count for count in (3, paper.ITERATIONS) if count <= study.last]
-    here = "; ".join(f"{spoken(name)} {', '.join(_ratio(study, name, each) for each in counts)}" for name in present)
-    return Examined(here, NO_TEST, tuple(evidence), tuple(lacking))
-
-
-def one_sample_is_enough(study: Study) -> Examined:
-    """Return the evidence that one sample of simulated fit and informative all but reaches direct (C4b)."""
-    best = paper.SIMULATED_FIT[2]
-    if not study.arm(best) or not len(study.direct) or study.last < 1:
-        return Examined("", "", (), (NO_DIRECT if study.arm(best) else spoken(best).lower(),))
-    evidence = _reaches(study, best, 1, paper.LEAST_AFTER_THREE)
-    return Examined(_ratio(study, best, 1), NO_TEST, (evidence,))
-
-
-def _reaches(study: Study, name: str, count: int, share: float) -> Evidence:
-    tested = statements.reaches(study.values(name, count, count), study.direct, share)
-    return Evidence(f"{spoken(name)} above {share:.2f} after {count}", tested)
-
-
-def _ratio(study: Study, name: str, count: int) -> str:
-    values = study.values(name, count, count)
-    return f"{values.mean() / study.unit:.2f} after {count}" if len(values) else f"nothing after {count}"
-
-
-def fit_strategies_vary_less(study: Study) -> Examined:
-    """Return the evidence that strategies with simulated fit vary less than 0.58 times as much as the others (C3)."""
-    sides = [_complete(study, names) if study.last >= 3 else {} for names in (paper.SIMULATED_FIT, paper.WEAK)]
-    names = [name for side in sides for name in side]
-    lacking = tuple(spoken(name).lower() for name in paper.STRATEGIES if name not in names)
-    if not all(sides):
-        short = (f"value after 3 samples: it ends after {study.last}",)
-        return Examined("", "", (), lacking if study.last >= 3 else short)
-    narrow, wide = (list(side.values()) for side in sides)
-    tested = statements.narrower(narrow, wide, NEARER_TO_A_THIRD, 1 / paper.LEAST_TIMES)
-    here = f"ratio of the deviations over 3 to {study.last} samples {tested.estimate}"
-    evidence = Evidence(f"ratio of the deviations below {NEARER_TO_A_THIRD:.2f}", tested)
-    return Examined(here, NO_TEST, (evidence,), lacking, study.unequal(names))
-
-
-def _complete(study: Study, names: Iterable[str]) -> dict[str, FloatArray]:
-    """Return the complete repetitions `(r, k)` from three samples on, of strategies with two or more."""
-    found = {name: study.complete(name, 3, study.last) for name in names if study.arm(name)}
-    return {name: values for name, values in found.items() if len(values) > 1}
-
-
-def curves_rise_and_flatten(study: Study) -> Examined:
-    """Return the evidence that all curves rise and flatten (C8)."""
-    present = study.present
-    lacking = [spoken(name).lower() for name in paper.STRATEGIES if name not in present]
-    if not present or study.last < FEWEST_SAMPLES:
-        short = f"value after {number_of('sample', FEWEST_SAMPLES)}: it ends after {study.last}"
-        return Examined("", "", (), (*lacking, *([short] if present else [])))
-    middle, evidence, told = study.last // 2, [], []
-    for name in present:
-        recorded = study.complete(name, 0, study.last)
-        early, late = recorded[:, middle] - recorded[:, 0], recorded[:, -1] - recorded[:, middle]
-        slowing = early / middle - late / (study.last - middle)
-        for verb, gains, least in (("rises", early + late, paper.LEAST_RISE), ("flattens", slowing, 0.0)):
-            evidence.append(Evidence(f"{spoken(name)} {verb}", statements.rises(gains, least, study.unit)))
-        if len(recorded):
-            told.append(f"{spoken(name)} {_gain(study, early)} and {_gain(study, late)}")
-    unit = "" if np.isnan(study.unit) else " of direct"
-    here = f"gain{unit} to {middle} samples, and from there to {study.last}: {'; '.join(told)}"
-    return Examined(here, NO_TEST, tuple(evidence), tuple(lacking))
-
-
-def _gain(study: Study, gains: FloatArray) -> str:
-    unit = 1.0 if np.isnan(study.unit) else study.unit
-    return signed(float(gains.mean() / unit))
 
 
 @dataclass(frozen=True)
@@ -151,13 +55,13 @@ CLAIMS = (
         f"Before any sample every strategy starts alike, at about {paper.START:.2f} of direct.",
         "Before any sample all strategies do the same: they search in a random simulator. So they start alike, but for "
         f"chance, and are taken together. Their mean is within {paper.START_MARGIN:.2f} of {paper.START:.2f} of "
-        "direct: half of the last digit of the paper's 0.9, and two standard errors of its mean. Refuted if it is "
+        "direct: half a unit of the last digit of the paper's 0.9, plus two standard errors. Refuted if it is "
         "shown to be outside. The robot was chosen among trials that start at 0.38 to 0.83, so agreement says little. "
         "Where reality is another engine, the start has the gap between the engines as well, which the paper lacks.",
         starts_at_two_thirds,
     ),
     Claim(
-        "C2",
+        "C2a",
         "strategies with simulated fit reach direct after three samples and pass it by ten",
         f"The three strategies with simulated fit reach {paper.AFTER_THREE:.2f} of direct after three samples, and "
         f"{paper.AFTER_TEN:.2f} by ten.",
@@ -168,12 +72,24 @@ CLAIMS = (
         three_samples_reach_direct,
     ),
     Claim(
+        "C2b",
+        "after four samples, simulators of strategies with simulated fit are nearly perfect",
+        "Strategies with simulated fit have nearly perfectly tuned simulators after three or four samples.",
+        "The paper infers it from the recorded fitness (C2a), which may be a sample's. Here the transferred "
+        f"controller of each of the three is, by itself, above {paper.LEAST_AFTER_THREE:.2f} of direct after four "
+        "samples. Refuted if one is shown to be below.",
+        four_samples_tune_simulators,
+    ),
+    Claim(
         "C3",
         "strategies with simulated fit vary less than 0.58 times as much as the others",
         "The standard deviation of these three is about a third of the others'.",
-        "The ratio of the standard deviations, from three samples on, is by factors nearer to a third than to 1: below "
-        f"{NEARER_TO_A_THIRD:.2f}, by a bootstrap over whole repetitions. Refuted if it is shown to be above. Smaller "
-        f"than in the paper if it is shown to be above {1 / paper.LEAST_TIMES:.2f}: three may be {paper.LEAST_TIMES}.",
+        "The ratio of the standard deviations, from three samples on, is geometrically nearer to a third than to 1: "
+        f"below {NEARER_TO_A_THIRD:.2f}, by a bootstrap over whole repetitions. Refuted if it is shown to be above. "
+        f"The effect is smaller than in the paper if the ratio is shown to be above {1 / paper.LEAST_TIMES:.2f}: the "
+        f"paper's factor of three may be a rounded {paper.LEAST_TIMES}. The largest of several controllers varies less "
+        "than one, so a small ratio does not show that transferred controllers vary less: [both]"
+        "(#where-the-recorded-fitness-comes-from).",
         fit_strategies_vary_less,
     ),
     Claim(
@@ -188,11 +104,20 @@ CLAIMS = (
     ),
     Claim(
         "C4b",
-        "with one sample, simulated fit and informative all but reaches direct",
+        "with one sample, simulated fit and informative almost reaches direct",
         "Simulated fit and informative has a nearly perfect result after a single sample.",
-        f"It is above {paper.LEAST_AFTER_THREE:.2f} of direct after one sample, as others are after three (C2). "
+        f"It is above {paper.LEAST_AFTER_THREE:.2f} of direct after one sample, as others are after three (C2a). "
         "Refuted if it is shown to be below.",
         one_sample_is_enough,
+    ),
+    Claim(
+        "C4c",
+        "with one sample, the simulator of simulated fit and informative is nearly optimal",
+        "That single sample results in a nearly optimal simulator.",
+        f"The controller transferred after it is, by itself, above {paper.LEAST_AFTER_THREE:.2f} of direct. Refuted if "
+        "it is shown to be below. The recorded fitness of C4b may be that of the sample, which was selected before any "
+        "simulator was tuned.",
+        one_sample_tunes_the_simulator,
     ),
     Claim(
         "C5a",
@@ -204,12 +129,13 @@ CLAIMS = (
     ),
     Claim(
         "C5b",
-        "beyond two samples, unique is above plain simulated fit, and both are above the informative one",
+        "beyond two samples, unique is above plain simulated fit, and both are above simulated fit and informative",
         "Beyond two samples, the strategies with simulated fit differ from each other (p ≪ 0.001): the unique one is "
-        "above plain simulated fit, and both are above the informative one.",
+        "above plain simulated fit, and both are above simulated fit and informative.",
         "Over 3 to 10 samples, each of the three pairs has this order. Refuted if a lead is shown to be smaller than "
         f"{paper.BEYOND_TWO.least(*paper.SIMULATED_FIT[:2]):.3f} of direct. The paper's p may also be that of each "
-        "against the other three strategies (C5a); the order is in its text.",
+        "against the other three strategies (C5a); the order is in its text. With that reading the order has no size, "
+        "and is refuted only by a pair whose opposite is shown.",
         fit_strategies_differ,
     ),
     Claim(
@@ -239,12 +165,27 @@ CLAIMS = (
         uniqueness_gains,
     ),
     Claim(
-        "C8",
-        "all curves rise and flatten",
-        "All curves rise, and flatten.",
-        "In each strategy the last recorded fitness is above the first, paired by repetition, and the first half "
-        "of the samples gains more a sample than the second. Refuted if a rise is shown to be smaller than "
-        f"{paper.LEAST_RISE:.2f} of direct, half of the paper's, or if the second half is shown to gain more.",
-        curves_rise_and_flatten,
+        "C8a",
+        "all curves rise",
+        "The fitness of all strategies increases with the number of samples.",
+        "In each strategy the last recorded fitness is above the first, paired by repetition. Refuted if a rise is "
+        f"shown to be smaller than {paper.LEAST_RISE:.2f} of direct, half of the paper's.",
+        curves_rise,
+    ),
+    Claim(
+        "C8b",
+        "all curves flatten",
+        "The increase diminishes with more samples.",
+        "In each strategy the first half of the samples gains more per sample than the second, paired by repetition. "
+        "Refuted if the second half is shown to gain more.",
+        curves_flatten,
+    ),
+    Claim(
+        "C8c",
+        "all strategies end near direct",
+        f"With more samples, all strategies come to about {paper.AT_LAST:.2f} of direct.",
+        f"Each is above {paper.LEAST_AFTER_THREE:.2f} of direct after ten samples: the paper's 1.3 may be a rounded "
+        "1.25. Refuted if one is shown to be below.",
+        all_end_near_direct,
     ),
 )

@@ -11,7 +11,7 @@ from benchmarks.reproduction.claims import CLAIMS
 from benchmarks.reproduction.controls import Row
 from benchmarks.reproduction.costs import costs
 from benchmarks.reproduction.limits import limits
-from benchmarks.reproduction.opening import OPENING, WORDS
+from benchmarks.reproduction.opening import EXTENSION, OPENING, WORDS
 from benchmarks.reproduction.paper import LEARNED_SD
 from benchmarks.reproduction.studies import Study
 from gaplab.services.store.session import Store
@@ -70,8 +70,12 @@ class Document:
         told = {label: each for label, each in robots.items() if each.whole or claim_tables.decides(each)}
         for label, study in (told or robots).items():
             yield f"**In short**, {label} ({tables.in_words(study)}):"
+            if len(study.arms[0].engines) > 1:
+                yield EXTENSION
+            if label in self.controls and not study.whole:
+                yield f"*A control of {self._beside[label][0]}*: it was chosen after results of that study were read."
             yield claim_tables.in_short(study)
-            if lead := origins.lead(self.store, study):
+            if lead := origins.lead(study):
                 yield f"{lead} [Why](#where-the-recorded-fitness-comes-from)."
             changed = [
                 f"\n- [{control}](#{control}-beside-{label}): {shown}"
@@ -144,8 +148,8 @@ class Document:
         toys = {label: each for label, each in self.studies.items() if label not in robots}
         if toys:
             yield (
-                "### On the toy function\n\nThe same rules on a function of one number, which say nothing of a robot: "
-                "its direct search finds the maximum, which no strategy can pass (C2) and most reach, so that they end "
+                "### On the toy function\n\nThe same rules on a function of one number; its verdicts say nothing of a "
+                "robot. Direct search finds the maximum. No strategy can pass it (C2a), and most reach it, so they end "
                 f"alike (C5 to C7).\n\n{claim_tables.verdicts(toys)}"
             )
 
@@ -153,10 +157,11 @@ class Document:
         yield (
             "## Fig. 4\n\nRecorded fitness over direct, mean ± standard deviation over repetitions (their number is in "
             "brackets), by number of real-world evaluations. A dash in the paper's rows is a number that its text does "
-            "not have. It has a range of standard deviations, without a number of samples: "
+            "not have. The text has a range of standard deviations, without a number of samples: "
             f"{LEARNED_SD[0]:.2f} to {LEARNED_SD[1]:.2f} with simulated fit, and about three times as much for the "
-            "others. *The best of samples + 1* is the mean fitness of the best of so many direct searches, if there "
-            "are 20 or more: recorded fitness is the largest of as many controllers, samples and the transferred one."
+            "others. *The best of samples + 1* is the mean fitness of the best of n + 1 direct searches, if there are "
+            "20 or more: recorded fitness after n samples is also the best of n + 1, the samples and the transferred "
+            "controller."
         )
         for label, study in self.studies.items():
             yield f"### {label}\n\n{tables.direct_in_words(study)}"
@@ -186,20 +191,11 @@ class Document:
             )
 
     def _origins(self) -> Iterator[str]:
-        yield (
-            "## Where the recorded fitness comes from\n\nThe recorded fitness is the larger of two: that of the "
-            "transferred controller, and that of the best sample so far. So a strategy may lead because its simulators "
-            "are better, or because its samples are fit. Means over repetitions, in reality and over direct; the share "
-            "of repetitions whose recorded fitness is a sample's; and the median distance of the best simulators from "
-            "the truth: Euclidean, with the bounds of each tunable scaled to 1. The paper says of itself that beyond "
-            'three or four samples "the algorithm is hardly tuning the simulator anymore, instead just searching for '
-            'fitter samples", because its simulators are nearly perfect by then. Distances tell how far coefficients '
-            "are from the truth: one that matters little to fitness makes them large, though its simulator may do well."
-        )
+        yield origins.WORDS
         for label, study in self._of_robots():
             if len(study.direct) and study.present:
                 told = tables.table(origins.HEAD, origins.rows(self.store, study))
-                yield "\n\n".join(filter(None, (f"### Origins: {label}", origins.lead(self.store, study), told)))
+                yield "\n\n".join(filter(None, (f"### Origins: {label}", origins.lead(study), told)))
 
     def _claims(self) -> Iterator[str]:
         yield f"## The claims\n\n{OTHER_WAY}"
@@ -220,12 +216,14 @@ class Document:
         if not self.controls:
             return
         yield (
-            "## Controls\n\nEach control repeats strategies of a study with one change, or those between two budgets. "
+            "## Controls\n\nEach control repeats strategies of a study with one change, or with another preset. "
             "Fitness is over the direct baseline of its own study, and over the other's if the control has none; rows "
             "of direct itself are in the unit of fitness. Means are over the repetitions that both have. These share "
             "their random numbers, so they are paired; where there are two baselines, the difference has the errors of "
             "both (Welch and Satterthwaite). Brackets have 95 % intervals. Each p is uncorrected. A row that the "
-            "change leaves the same in every repetition is left out."
+            "change leaves the same in every repetition is left out. Repetitions that were computed on "
+            f"[another kind of processor]({self._link('docs/keeping.md')}#numbers-and-processors) differ also where "
+            "the change cannot act, as before any sample."
         )
         yield f"### The controls\n\n{self._study_table(self.controls)}"
         for label, control in self.controls.items():

@@ -16,3 +16,6 @@ transferred controller. The six strategies choose the samples: *simulated fit* t
 simulator; *unique* keeps it away from earlier samples; *informative* takes the one on which 20 simulators disagree
 most; *simulated fit and informative* adds both aims; *random* draws controllers, and *known fit* draws them around one
 that walks."""
+
+EXTENSION = """*An extension*: the paper has one engine for simulators and reality. Here no setting of the simulators is
+exactly right. So a claim that fails here is not contradicted where there is one engine, and C1 may hold by chance."""

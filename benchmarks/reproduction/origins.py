@@ -4,15 +4,16 @@ The recorded fitness is the larger of two: that of the transferred controller, a
 strategy may therefore lead because its simulators are better, or because its samples are fit.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from benchmarks.findings import found
 from benchmarks.reproduction import paper, statements
-from benchmarks.reproduction.studies import Arm, Study, measured
+from benchmarks.reproduction.curves import NEARER_TO_A_THIRD
+from benchmarks.reproduction.reading import samples_of
+from benchmarks.reproduction.studies import Study
 from benchmarks.reproduction.tables import best_of, distance
-from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
@@ -22,6 +23,17 @@ COUNTS = (1, 3, 10)
 FIRST = 3
 """Samples from which on the paper compares the strategies."""
 
+WORDS = (
+    "## Where the recorded fitness comes from\n\nThe recorded fitness is the larger of two: that of the transferred "
+    "controller, and that of the best sample so far. So a strategy may lead because its simulators are better, or "
+    "because its samples are fit. The tables have mean fitness in reality, as a ratio to direct; the share of "
+    "repetitions whose recorded fitness is a sample's; and the median Euclidean distance of the best simulators from "
+    "the truth, with the bounds of each tunable scaled to 1. The paper says of itself that beyond three or four "
+    'samples "the algorithm is hardly tuning the simulator anymore, instead just searching for fitter samples", '
+    "because its simulators are nearly perfect by then. A coefficient that matters little to fitness can make the "
+    "distance large, although the simulator does well."
+)
+GROUPS = paper.SIMULATED_FIT, paper.WEAK
 HEAD = ("strategy", "samples", "last sample", "best sample", "transferred", "recorded", "from a sample", "distance")
 
 
@@ -34,7 +46,7 @@ def rows(store: Store, study: Study) -> Iterator[tuple[str, ...]]:
     """
     for arm in (own for name in study.present if (own := study.arm(name))):
         away = found(store, arm.read.id)
-        samples, probed = (measured(store, arm, kind) for kind in (MeasurementKind.SAMPLE, MeasurementKind.PROBE))
+        samples, probed = samples_of(store, arm), arm.transferred
         best = np.fmax.accumulate(samples, axis=1)
         for count in (each for each in COUNTS if each <= arm.last):
             columns = (fitness[:, count] / study.unit for fitness in (samples, best, probed, arm.recorded))
@@ -44,17 +56,16 @@ def rows(store: Store, study: Study) -> Iterator[tuple[str, ...]]:
             yield spoken(arm.strategy), str(count), *map(_mean, columns), share, distance(away.get(count))
 
 
-def lead(store: Store, study: Study) -> str:
-    """Return in a sentence what simulated fit gains, in transferred controllers alone and in recorded fitness.
+def lead(study: Study) -> str:
+    """Return in sentences what simulated fit gains, in transferred controllers alone and in recorded fitness.
 
     Each repetition is one value, and each strategy counts alike. Empty if the study lacks one of both groups.
     """
     if study.last < FIRST:
         return ""
-    spans = [(FIRST, study.last), (study.last, study.last)]
     told = [
-        _lead(store, study, span, transferred_only=transferred_only)
-        for span in spans
+        _lead(study, span, transferred_only=transferred_only)
+        for span in ((FIRST, study.last), (study.last, study.last))
         for transferred_only in (True, False)
     ]
     if not all(told):
@@ -62,7 +73,21 @@ def lead(store: Store, study: Study) -> str:
     return (
         f"Over {FIRST} to {study.last} samples, strategies with simulated fit lead the others by {told[0]} of direct "
         f"in transferred controllers alone, and by {told[1]} in recorded fitness; after {study.last}, by {told[2]} and "
-        f"{told[3]}.{_searched_as_often(study)}"
+        f"{told[3]}.{_spread(study)}{_searched_as_often(study)}"
+    )
+
+
+def _spread(study: Study) -> str:
+    """Return in a sentence how much strategies with simulated fit vary beside the others, in both kinds of fitness."""
+    told = []
+    for transferred_only in (True, False):
+        narrow, wide = (_over(study, names, (FIRST, study.last), transferred_only=transferred_only) for names in GROUPS)
+        if min(map(len, [*narrow, *wide])) < 2:
+            return ""
+        told.append(statements.narrower(narrow, wide, NEARER_TO_A_THIRD, 1 / paper.LEAST_TIMES).estimate)
+    return (
+        f" Over {FIRST} to {study.last}, their standard deviations are {told[0]} times the others' in transferred "
+        f"controllers alone, and {told[1]} times in recorded fitness."
     )
 
 
@@ -71,32 +96,27 @@ def _searched_as_often(study: Study) -> str:
     best = best_of(study)
     if len(best) <= study.last:
         return ""
-    sizes = FIRST + 1, study.last + 1
-    return (
-        f" The best of {sizes[0]} direct searches has {best[FIRST]}, and the best of {sizes[1]} has {best[study.last]}."
-    )
+    few, many = (f"{count} + 1 direct searches has {best[count]}" for count in (FIRST, study.last))
+    return f" The best of {few}, and the best of {many}."
 
 
-def _lead(store: Store, study: Study, span: tuple[int, int], *, transferred_only: bool) -> str:
+def _lead(study: Study, span: tuple[int, int], *, transferred_only: bool) -> str:
     """Return the difference with its interval; the repetitions are those with both values at all its samples."""
-    sides = [
-        [
-            _over(store, arm, span, transferred_only=transferred_only)
-            for name in names
-            if (arm := study.arm(name)) is not None
-        ]
-        for names in (paper.SIMULATED_FIT, paper.WEAK)
-    ]
-    return statements.contrast(sides[0], sides[1], study.unit) if all(sides) else ""
+    firsts, seconds = (
+        [group.mean(axis=1) for group in _over(study, names, span, transferred_only=transferred_only)]
+        for names in GROUPS
+    )
+    return statements.contrast(firsts, seconds, study.unit) if firsts and seconds else ""
 
 
-def _over(store: Store, arm: Arm, span: tuple[int, int], *, transferred_only: bool) -> FloatArray:
-    probed = measured(store, arm, MeasurementKind.PROBE)
+def _over(study: Study, names: Iterable[str], span: tuple[int, int], *, transferred_only: bool) -> list[FloatArray]:
+    """Return the values `(r, k)` of each strategy in the repetitions that have both kinds of fitness throughout."""
     columns = slice(span[0], span[1] + 1)
-    there = np.isfinite(arm.recorded[:, columns] + probed[:, columns]).all(axis=1)
-    chosen = probed if transferred_only else arm.recorded
-    means: FloatArray = chosen[there, columns].mean(axis=1)
-    return means
+    found = []
+    for arm in (own for name in names if (own := study.arm(name))):
+        there = np.isfinite(arm.recorded[:, columns] + arm.transferred[:, columns]).all(axis=1)
+        found.append((arm.transferred if transferred_only else arm.recorded)[there, columns])
+    return found
 
 
 def _mean(values: FloatArray) -> str:

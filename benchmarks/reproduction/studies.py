@@ -1,30 +1,19 @@
 """The values of a stored study, by strategy."""
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from datetime import datetime
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.archives import import_file
 from benchmarks.reproduction.paper import ITERATIONS, STRATEGIES
 from gaplab.schemas.curves import Curve
-from gaplab.schemas.records import ExperimentRead, MeasurementKind
+from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.comparisons import Compared, Range
 from gaplab.services.core.statistics import finite
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
-from gaplab.services.experiments import reading
-from gaplab.services.results.curves import curves, recorded_of
-from gaplab.services.store.models import MeasurementRow, RepetitionRow
-from gaplab.services.store.queries import attempts, experiments
-from gaplab.services.store.queries.costs import work_of
-from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.session import Session, Store
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +24,7 @@ class Arm:
         read: the experiment, as the API returns it.
         spec: its resolved spec.
         recorded: recorded fitness `(r, k)` by repetition and number of real-world evaluations; nan is missing.
+        transferred: fitness `(r, k)` in reality of the transferred controllers alone; nan if it failed or is missing.
         seconds: seconds of computation in its recorded steps.
         attempts: number of attempts at its repetitions.
         held_s: seconds from the beginnings to the ends of the attempts.
@@ -43,6 +33,7 @@ class Arm:
     read: ExperimentRead
     spec: ResolvedSpec
     recorded: FloatArray
+    transferred: FloatArray
     seconds: float
     attempts: int
     held_s: float
@@ -51,6 +42,12 @@ class Arm:
     def strategy(self) -> str:
         """Return the name of its strategy."""
         return self.spec.strategy.name
+
+    @property
+    def engines(self) -> set[str]:
+        """Return the names of the engines of its simulators and its reality."""
+        reality = self.spec.reality.engine
+        return {self.spec.engine.name, *([reality.name] if reality else [])}
 
     @property
     def cores(self) -> int:
@@ -161,88 +158,3 @@ class Study:
             return None
         told = ", ".join(f"{name} {size:,}" for name, size in sizes.items())
         return f"samples are selected from searches of unequal size ({told} evaluations)"
-
-
-def measured(store: Store, arm: Arm, kind: MeasurementKind) -> FloatArray:
-    """Return measured fitness `(r, k)` by repetition and number of samples; nan if it failed or is missing."""
-    row = MeasurementRow
-    values = np.full(arm.recorded.shape, np.nan)
-    query = of_experiments(row, [arm.read.id], RepetitionRow.number, row.iteration, row.fitness)
-    with store.reading() as session:
-        for repetition, iteration, fitness in session.execute(query.where(row.kind == kind, row.fitness.is_not(None))):
-            values[repetition, iteration] = fitness
-    return values
-
-
-def read_study(store: Store, archives: Sequence[Path]) -> Study:
-    """Import archives of studies or of single experiments, and return them as one study, named by the first.
-
-    Raises:
-        SystemExit: a file is no archive, or the archives differ in robot, engines, reality, budget, tuner,
-            optimizers or seed.
-    """
-    parts = [_part(store, archive) for archive in archives]
-    reads = tuple(read for _, experiments_of in parts for read in experiments_of)
-    with store.reading() as session:
-        arms = _arms(session, reads)
-    if len(parts) > 1 and len({_settings(arm.spec) for arm in arms}) > 1:
-        raise SystemExit(
-            f"{', '.join(map(str, archives))}: robot, engines, reality, budget, tuner, optimizers or seed differ"
-        )
-    drawn = curves(store, [read.id for read in reads])
-    names = _names(arms)
-    return Study(
-        tuple(archives),
-        parts[0][0],
-        tuple(replace(arm, read=arm.read.model_copy(update={"name": names[arm.read.id]})) for arm in arms),
-        tuple(curve.model_copy(update={"name": names[curve.experiment]}) for curve in drawn),
-    )
-
-
-def _names(arms: Sequence[Arm]) -> dict[str, str]:
-    """Return the name of each experiment by id: its strategy's, as in the paper, unless several share it."""
-    times = Counter(arm.strategy for arm in arms)
-    return {arm.read.id: arm.strategy if times[arm.strategy] == 1 else arm.read.name for arm in arms}
-
-
-def _part(store: Store, archive: Path) -> tuple[str, tuple[ExperimentRead, ...]]:
-    """Import an archive, and return its name and its experiments."""
-    made = import_file(store, archive)
-    if made.study is not None:
-        study = reading.read_study(store, made.study)
-        return study.name, study.experiments
-    reads = tuple(reading.read_experiment(store, id_) for id_ in made.experiments)
-    return reads[0].name, reads
-
-
-def _settings(spec: ResolvedSpec) -> str:
-    """Return the settings that experiments of one study share."""
-    world = {"robot", "controller", "task", "engine", "tunables", "reality", "seed"}
-    return spec.model_dump_json(include=world | {"budget", "tuner", "discrepancy", "optimizer", "controller_optimizer"})
-
-
-def _arms(session: Session, reads: Sequence[ExperimentRead]) -> tuple[Arm, ...]:
-    ids = [read.id for read in reads]
-    work, (rows, recorded) = work_of(session, ids), recorded_of(session, ids)
-    spans = {row.id: _spans(session, row.id, row.spec["repetitions"]) for row in rows}
-    return tuple(
-        Arm(
-            read=read,
-            spec=spec_of(experiments.get_experiment(session, read.id).spec),
-            recorded=recorded[read.id],
-            seconds=work[read.id].seconds,
-            attempts=len(spans[read.id]),
-            held_s=sum((end - start).total_seconds() for start, end in spans[read.id]),
-        )
-        for read in reads
-    )
-
-
-def _spans(session: Session, experiment: str, repetitions: int) -> list[tuple[datetime, datetime]]:
-    """Return begin and end of every attempt that has ended."""
-    return [
-        (each.started_at, each.ended_at)
-        for number in range(repetitions)
-        for each in attempts.attempts_of(session, experiment, number)
-        if each.ended_at is not None
-    ]

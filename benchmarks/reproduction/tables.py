@@ -6,9 +6,8 @@ import numpy as np
 
 from benchmarks.findings import Found, found
 from benchmarks.reproduction import paper
-from benchmarks.reproduction.studies import Arm, Study, measured
+from benchmarks.reproduction.studies import Arm, Study
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import best_of_searches, mean_and_deviation
@@ -163,9 +162,9 @@ def figure_4(study: Study) -> str:
     arms = [arm for arm in study.arms if not arm.read.direct]
     counts = range(min(paper.ITERATIONS, max(arm.last for arm in arms)) + 1)
     learned = {0: f"{paper.START:.2f}", 3: f"≥ {paper.AFTER_THREE:.2f}", 10: f"{paper.AFTER_TEN:.2f}"}
-    others = {0: f"{paper.START:.2f}", 10: f"about {paper.AT_LAST:.2f}"}
+    every = {0: f"{paper.START:.2f}", 10: f"about {paper.AT_LAST:.2f}"}
     rows = [("the paper, with simulated fit", *(learned.get(count, MISSING) for count in counts))]
-    rows += [("the paper, the other three", *(others.get(count, MISSING) for count in counts))]
+    rows += [("the paper, all six", *(every.get(count, MISSING) for count in counts))]
     best = best_of(study)[: len(counts)]
     rows += [("direct, the best of samples + 1", *best, *[MISSING] * (len(counts) - len(best)))]
     rows += [_ratios(study, arm, counts) for arm in arms]
@@ -202,7 +201,7 @@ def figure_3(store: Store, study: Study) -> tuple[str, str]:
     counts = [count for count in FIGURE_3 if count <= study.last]
     distances, ratios = [], []
     for arm in (own for name in study.present if (own := study.arm(name))):
-        away, probed = found(store, arm.read.id), measured(store, arm, MeasurementKind.PROBE) / study.unit
+        away, probed = found(store, arm.read.id), arm.transferred / study.unit
         distances.append((spoken(arm.strategy), *(distance(away.get(count)) for count in counts)))
         ratios.append((spoken(arm.strategy), *(_mean(finite(probed[:, count])) for count in counts)))
     head = "samples", *map(str, counts)
