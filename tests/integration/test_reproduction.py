@@ -20,7 +20,7 @@ from tests.made_studies import STEP_S, Made, Study, archive, values
 
 ROOT = Path(__file__).parents[2]
 STORED = ROOT / "docs" / "studies"
-CLAIMS = "C1 C2a C2b C3 C4a C4b C4c C5a C5b C5c C6 C7 C8a C8b C8c".split()
+CLAIMS = ["C1", "C2a", "C2b", "C3", "C4a", "C4b", "C4c", "C5a", "C5b", "C5c", "C6", "C7", "C8a", "C8b", "C8c"]
 
 
 def rising(start: float, last: float, samples: int = 10) -> list[float]:
