@@ -89,18 +89,22 @@ class PermittedReality:
     def __call__(self, genome: Genome, step: int = 0) -> Outcome:
         """Return the outcome of the genome `(g,)` in reality, once it is permitted to ask.
 
+        If the permit expires, it neither returns nor raises: what a stopped robot gives is no measurement.
+
         Args:
             genome: what to measure.
             step: place in the log of the step that it is measured for.
         """
         while (until := self._expiry(step, 0.0)) <= monotonic():
             sleep(POLL_S)
-        answered = Event()
-        Thread(target=self._watch, args=(answered, step, until), name="permit", daemon=True).start()
+        answered, expired = Event(), Event()
+        Thread(target=self._watch, args=(answered, expired, step, until), name="permit", daemon=True).start()
         try:
             return self._reality(genome)
         finally:
             answered.set()
+            if expired.is_set():
+                Event().wait()  # for the end of the process
 
     def _expiry(self, step: int, known: float) -> float:
         """Return when the permit expires; the last known time, if the permits' process does not answer or has died."""
@@ -109,10 +113,11 @@ class PermittedReality:
             return asked + self._left(step)
         return known
 
-    def _watch(self, answered: Event, step: int, until: float) -> None:
+    def _watch(self, answered: Event, expired: Event, step: int, until: float) -> None:
         while not answered.wait(POLL_S):
             until = self._expiry(step, until)
             if monotonic() > until and not answered.is_set():  # an answer ends its permit
+                expired.set()
                 with suppress(Exception):
                     self._stop()
                 self._end()

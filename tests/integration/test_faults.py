@@ -1,9 +1,10 @@
 """Faults of plug-ins, of reality and of hardware: each concerns the repetitions that it hits, and nothing else."""
 
+from contextlib import suppress
 from dataclasses import replace
 from datetime import timedelta
 from functools import partial
-from threading import Event, Lock
+from threading import Event, Lock, Thread
 from threading import enumerate as enumerate_threads
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -387,29 +388,47 @@ def test_a_repetition_that_does_nothing_gives_signs_of_life(monkeypatch: pytest.
     assert pulses[-1].idle_s > pulses[0].idle_s
 
 
-def test_hardware_stops_when_its_permit_runs_out(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("raises", [False, True])
+def test_a_measurement_that_is_cut_off_when_its_permit_runs_out_gives_no_answer(
+    monkeypatch: pytest.MonkeyPatch, raises: bool
+) -> None:
     monkeypatch.setattr(permits, "POLL_S", 0.001)
-    left, done, asked = [0.0, 0.0], Event(), Event()
+    left, stopped, asked, ended = [0.0, 0.0], Event(), Event(), Event()
     events: list[str] = []
 
     def moving(genome: Any) -> Outcome:
         events.append("moves")
         asked.set()
-        assert done.wait(60)
+        assert stopped.wait(60)
+        if raises:
+            raise RuntimeError("stopped")
         return Outcome(1.0)
+
+    def stop() -> None:
+        events.append("stops")
+        stopped.set()
+        measuring.join(0.2)
 
     def end() -> None:
         events.append("ends")
-        done.set()
+        ended.set()
 
     def remaining(_: int) -> float:
         if asked.is_set():
             return -1.0
         return left.pop() if left else 1e9
 
-    reality = permits.PermittedReality(moving, lambda: events.append("stops"), remaining, end)
-    reality(np.zeros(1))
+    def measure() -> None:
+        with suppress(RuntimeError):
+            reality(np.zeros(1))
+        events.append("answers")
 
+    reality = permits.PermittedReality(moving, stop, remaining, end)
+    measuring = Thread(target=measure, daemon=True)
+    measuring.start()
+
+    assert ended.wait(60)
+    assert measuring.is_alive()
     assert events == ["moves", "stops", "ends"]
 
 
@@ -477,20 +496,17 @@ def test_an_answer_ends_its_permit_and_no_process(monkeypatch: pytest.MonkeyPatc
 
 def test_a_permit_runs_out_although_nobody_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(permits, "POLL_S", 0.001)
-    answers, done = [0.05], Event()
-
-    def moving(genome: Any) -> Outcome:
-        assert done.wait(60)
-        return Outcome(1.0)
+    answers, ended = [0.05], Event()
 
     def silent(_: int) -> float:
         if answers:
             return answers.pop()
         raise GetTimeoutError
 
-    permits.PermittedReality(moving, lambda: None, silent, done.set)(np.zeros(1))
+    reality = permits.PermittedReality(lambda _: Outcome(float(ended.wait(60))), lambda: None, silent, ended.set)
+    Thread(target=reality, args=(np.zeros(1),), daemon=True).start()
 
-    assert done.is_set()
+    assert ended.wait(60)
 
 
 def test_a_measurement_waits_for_permits_whose_process_has_died(monkeypatch: pytest.MonkeyPatch) -> None:
