@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from threading import Event
 from time import monotonic
 
@@ -164,11 +165,14 @@ class Repetitions:
         self._looked = -LOOK_S  # cores are free: look for work at once
 
     def hand_back(self, runs: list[Run]) -> None:
-        """Stop these runs, and return their leases; without the database, the leases expire."""
+        """Stop these runs, record their last deliveries, and return their leases; without the database, these expire."""
         runs = list(runs)
         self._stop(runs)
+        self.runs = [run for run in self.runs if run not in runs]
+        if filled := [run for run in runs if run.received]:
+            with suppress(StoreUnavailable):  # then the next holder computes or measures them again
+                self._record(filled)
         for run in runs:
-            self.runs.remove(run)
             try:
                 execution.hand_back(self._store, run.claim)
             except StoreUnavailable as error:
@@ -196,14 +200,15 @@ class Repetitions:
         return tuple(held)
 
     def _note_measuring(self) -> None:
-        """Store for each run, once per measurement, that it waits for reality."""
+        """Store for each run, once per measurement, that it waits for reality; permit it if its claim is valid."""
         noted = [run for run in self.runs if run.pulse and run.pulse.measuring and run.pulse.step != run.measuring]
-        if noted:
-            execution.note_measuring(self._store, [run.claim for run in noted])
+        if not noted:
+            return
+        held = execution.note_measuring(self._store, [run.claim for run in noted])
         for run in noted:
-            run.measuring = run.pulse.step if run.pulse else None
-        if noted:
-            self._permit()
+            if run.pulse and run.claim in held:
+                run.measuring = run.pulse.step
+        self._drop_all_but([*held, *(run.claim for run in self.runs if run not in noted)])
 
     def _permit(self, but: Collection[Run] = ()) -> None:
         """Permit the measurements that are noted to move hardware, for a part of the lease since its renewal."""
@@ -213,10 +218,10 @@ class Repetitions:
             self._permits.renew.remote(keys, self._renewed + SHARE * self._lease_s)
 
     def _stop(self, runs: Collection[Run]) -> None:
-        """End the tasks of these runs; one that moves hardware may stop it first."""
+        """End the tasks of these runs; one that may be moving hardware may stop it first."""
         self._permit(but=runs)
         for run in runs:
-            if run.permits is not None:
+            if run.permits is not None and run.measuring is not None:
                 run.wait_for_end(STOP_S)
             run.cancel()
 

@@ -29,7 +29,7 @@ from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.running.silences import Silences
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.store.lease import Pulse, TimedStep
+from gaplab.services.store.lease import Claim, Pulse, TimedStep
 from gaplab.services.store.models import EventRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
@@ -437,10 +437,8 @@ def test_a_permit_is_for_one_measurement_and_comes_after_its_beginning_is_stored
 ) -> None:
     permitted: list[Any] = []
     handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: permitted.append(keys)))
-    claim: Any = SimpleNamespace(id=7, epoch=1, experiment_id="x", number=0)
-    monkeypatch.setattr(execution, "note_measuring", lambda store, claims: permitted.append("noted"))
-    held, moving = Repetitions(None, "here", None), Run(claim, None, permits=handle)  # type: ignore[arg-type]
-    held._permits, held.runs = handle, [moving]
+    held, moving = measuring(handle)
+    monkeypatch.setattr(execution, "note_measuring", lambda store, claims: permitted.append("noted") or claims)
 
     for batch in ((Pulse(3, True, 0.0, 0.0),), (TimedStep(Measured(1, Sample(np.zeros(1), 1.0)), 1.0),),
                   (Pulse(8, True, 0.0, 0.0),), (TimedStep(Probed(1, 1.0, 1.0), 1.0),)):  # fmt: skip
@@ -449,6 +447,83 @@ def test_a_permit_is_for_one_measurement_and_comes_after_its_beginning_is_stored
         held._note_measuring()
 
     assert permitted == [[], "noted", [(7, 1, 3)], [], [], "noted", [(7, 1, 8)], []]
+
+
+def measuring(handle: Any) -> tuple[Repetitions, Run]:
+    """A supervisor with one run, which permits hardware."""
+    repetitions, claim = Repetitions(None, "here", None), Claim(7, 1, "x", 0, None)  # type: ignore[arg-type]
+    run = LastAnswers(claim, None, permits=handle)  # type: ignore[arg-type]
+    repetitions._permits, repetitions.runs = handle, [run]
+    return repetitions, run
+
+
+class LastAnswers(Run):
+    """A run whose task gives its last deliveries once it is told to end."""
+
+    last: tuple[Any, ...] = ()
+    waits: int = 0
+
+    def wait_for_end(self, longest_s: float) -> None:
+        """Take the last deliveries."""
+        self.waits += 1
+        self.take(self.last)
+
+    def cancel(self) -> None:
+        """It has no task."""
+
+
+def test_no_robot_moves_for_an_experiment_that_was_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
+    permitted: list[Any] = []
+    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: permitted.extend(keys)))
+    held, moving = measuring(handle)
+    freed: list[Any] = []
+    monkeypatch.setattr(execution, "note_measuring", lambda store, claims: ())
+    monkeypatch.setattr(execution, "free_hardware", lambda store, claims: freed.extend(claims))
+    moving.take((Pulse(3, True, 0.0, 0.0),))
+
+    held.store_received()
+
+    assert (held.runs, permitted, freed) == ([], [], [moving.claim])
+
+
+@pytest.mark.parametrize(("measures", "waits"), [(None, 0), (3, 1)])
+def test_only_a_run_that_may_move_hardware_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch, measures: int | None, waits: int
+) -> None:
+    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: None))
+    held, run = measuring(handle)
+    monkeypatch.setattr(execution, "hand_back", lambda store, claim: (claim,))
+    run.measuring = measures
+
+    held.hand_back([run])
+
+    assert run.waits == waits
+
+
+def test_an_answer_of_reality_that_arrives_during_the_hand_back_is_stored(store: Store) -> None:
+    experiment = submission.submit_experiment(store, on_the_bench(repetitions=1)).id
+    (claim,) = execution.claim(store, "me", 1)
+    steps = steps_to_the_first_answer(claim)
+    execution.record_all(store, [(claim, [TimedStep(step, 0.0) for step in steps[:-1]])])
+    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: None))
+    held, run = Repetitions(store, "me", {}), LastAnswers(claim, None, permits=handle)  # type: ignore[arg-type]
+    run.last, run.measuring = (TimedStep(steps[-1], 1.0),), len(steps) - 1
+    held.runs = [run]
+
+    held.hand_back(held.runs)
+
+    (handed_back,) = reading.list_repetitions(store, experiment)
+    assert (held.runs, handed_back.state) == ([], State.QUEUED)
+    assert stored(store, experiment) == {0: flat(steps)}
+
+
+def steps_to_the_first_answer(claim: Claim) -> tuple[Any, ...]:
+    steps = []
+    for step in repetition(setting(claim.spec, 0)):
+        steps.append(step)
+        if isinstance(step, Measured):
+            break
+    return tuple(steps)
 
 
 def test_a_worker_asks_for_the_permit_of_its_step(monkeypatch: pytest.MonkeyPatch) -> None:
