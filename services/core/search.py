@@ -80,7 +80,7 @@ def maximise(
         fitness = np.array([known.get(key, np.nan) for key in keys])
         if new:
             thresholds = thresholds_of(state, genomes)[new]
-            following = partial(_following, optimizer, state, thresholds, rng, evaluations - 1)
+            following = partial(_following, optimizer, state, thresholds, rng, evaluations - len(genomes))
             fitness[new] = evaluate(Question(genomes[new], thresholds, following))
             exact = (index for index, least in zip(new, thresholds, strict=True) if not fitness[index] < least)
             known.update((keys[index], float(fitness[index])) for index in exact)
@@ -101,4 +101,4 @@ def _following(
     rng, genomes = deepcopy(rng), np.empty((0, state.space.size))
     while len(genomes) < wanted:
         genomes = np.vstack([genomes, optimizer.ask(state, rng)])
-    return genomes
+    return genomes[:wanted]

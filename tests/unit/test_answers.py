@@ -11,6 +11,9 @@ from gaplab.services.core.answers import BLOCK, Answers, pack, unpack
 from gaplab.services.core.history import History
 from gaplab.services.core.loop import next_step, repetition
 from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from gaplab.services.core.search import maximise
+from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Budget
 from tests.fakes import Recorder, flat, paraboloid, small_setting
@@ -148,3 +151,37 @@ def test_many_simulators_are_asked_in_parts() -> None:
 
     assert simulate.calls == [(2, BLOCK), (2, BLOCK), (2, 1)]
     np.testing.assert_array_equal(fitnesses, paraboloid(genomes, parameters))
+
+
+@pytest.mark.parametrize("cores", [1, 8, 16])
+@pytest.mark.parametrize("offspring", [1, 2, 5, 12])
+def test_newcomers_that_are_simulated_ahead_fill_the_idle_cores_and_no_more(offspring: Any, cores: Any) -> None:
+    found, cost, calls = searched(offspring, cores)
+    alone, same_cost, _ = searched(offspring, 1)
+
+    assert (found.genomes.tobytes(), found.fitness.tobytes()) == (alone.genomes.tobytes(), alone.fitness.tobytes())
+    assert cost == same_cost
+    assert max(calls) <= max(6, offspring, cores)
+
+
+def test_nothing_is_simulated_ahead_that_the_budget_does_not_reach() -> None:
+    first = np.random.default_rng(0).random((6, 2))  # as the optimizer draws them
+
+    _, cost, calls = searched(5, 16, lambda genomes, _: np.isin(genomes, first).all(axis=1, keepdims=True) * 1.0)
+
+    assert sum(calls) == cost.rollouts
+
+
+def searched(offspring: Any, cores: Any, simulate: Any = paraboloid) -> Any:
+    """What a search finds in one simulator, its cost, and how many genomes it asked for in each call."""
+    simulated, rng = Recorder(simulate), np.random.default_rng(0)
+    answers = Answers(simulated, lambda: cores)
+    optimizer = SteadyState(SteadyStateOptions(population=6, offspring=offspring))
+    found = maximise(
+        optimizer,
+        Space.box([0.0, 0.0], [1.0, 1.0]),
+        lambda asked: answers(asked.genomes, np.array([[0.7, 0.2]]), asked.following)[:, 0],
+        60,
+        rng,
+    )
+    return found, answers.cost_of(60), [genomes for genomes, _ in simulated.calls]
