@@ -120,8 +120,7 @@ def _imported(name: str, paths: list[Path]) -> Iterator[ModuleType]:
         PluginBroken: it cannot be imported, or is in several folders.
     """
     if len(paths) > 1:
-        places = " and in ".join(path.parent.name for path in paths)
-        raise PluginBroken(f"{name}.py is in {places}: rename one of them")
+        raise PluginBroken(f"{' and '.join(map(str, paths))} have the same name: rename one of them")
     if name.startswith("_"):
         return
     try:

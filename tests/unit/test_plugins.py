@@ -64,7 +64,7 @@ def test_files_import_from_each_other_and_one_with_an_underscore_is_only_for_tha
     assert "hidden" not in strategies()
 
 
-def test_folders_are_several_but_a_file_has_one_place(put: Put) -> None:
+def test_folders_are_several_but_a_file_has_one_place(put: Put, tmp_path: Path) -> None:
     put("mine", careful=CAREFUL)
     put("yours", brave=CAREFUL.replace("areful", "rave").replace("crave", "brave"))
     assert {"careful", "brave"} <= set(strategies())
@@ -74,7 +74,8 @@ def test_folders_are_several_but_a_file_has_one_place(put: Put) -> None:
     found = strategies()
     assert "careful" not in found
     assert "brave" in found
-    assert found.unusable["careful"].startswith("careful.py is in mine and in yours: rename one of them")
+    files = " and ".join(str(tmp_path / folder / "careful.py") for folder in ("mine", "yours"))
+    assert found.unusable["careful"].startswith(f"{files} have the same name: rename one of them")
 
 
 BROKEN = [
