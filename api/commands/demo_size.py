@@ -53,13 +53,13 @@ def trial(spec: Spec) -> dict[str, Any]:
     return same | size | {"name": "how long a rollout takes here"}
 
 
-def sized(spec: Spec, estimate: Callable[[Spec], EstimateRead], seconds: float = SECONDS) -> Sized:
+def sized(spec: Spec, estimate: Callable[[Spec], EstimateRead]) -> Sized:
     """Return the largest version of the study that is estimated to fit into the time, or the smallest version."""
     for smaller in _versions(spec):
         found = estimate(smaller)
         rollout_s = max(cost.seconds_per_rollout for cost in found.engines)
         expected_s = found.seconds + CHECK_ROLLOUTS * rollout_s / found.cores
-        if expected_s <= seconds:
+        if expected_s <= SECONDS:
             break
     pace = f"{rollout_s * 1000:.0f} ms a rollout"
     named = smaller | {"name": f"{spec['name']}, sized for {pace}"}

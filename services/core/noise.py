@@ -23,19 +23,18 @@ SEED = 0
 """Seed of all noise: the same for every experiment, so that an evaluation does not depend on the experiment."""
 
 
-def stream_of(genome: Genome, purpose: str, trial: int = 0) -> Generator:
+def stream_of(genome: Genome, purpose: str) -> Generator:
     """Return the random generator of a genome `(g,)`, at the address of its digest.
 
     Args:
         genome: its numbers, to the last bit.
         purpose: use of the numbers; different purposes are independent.
-        trial: number of the evaluation of the same genome, from 0.
     """
     digest = sha256(np.ascontiguousarray(genome, dtype=np.float64).tobytes()).hexdigest()
-    return stream(SEED, purpose, digest, trial)
+    return stream(SEED, purpose, digest, 0)  # the 0 is part of the address: without it, all draws would change
 
 
-def disturbed(world: World, motion: Motion | Loop, genome: Genome, trial: int = 0) -> Motion | Loop:
+def disturbed(world: World, motion: Motion | Loop, genome: Genome) -> Motion | Loop:
     """Return the motion or the loop of a genome with the noise and the latency of a world.
 
     A target is disturbed when it changes, and stays so until it changes again. A longer rollout has the same noise, and
@@ -45,17 +44,16 @@ def disturbed(world: World, motion: Motion | Loop, genome: Genome, trial: int = 
         world: robot and noise.
         motion: what the genome `(g,)` describes.
         genome: address of the draws.
-        trial: number of the evaluation, from 0.
     """
     if world.noise == QUIET:
         return motion
-    commands = stream_of(genome, "noise of targets", trial)
-    tilt = _tilt(world, genome, trial)
+    commands = stream_of(genome, "noise of targets")
+    tilt = _tilt(world, genome)
     if isinstance(motion, Motion):
         targets = _disturbed(motion.targets, world.noise.target, commands)
         return replace(motion, targets=targets, start_tilt_rad=tilt)
     scales = noises(world, motion.senses, world.noise)
-    seen = stream_of(genome, "noise of observations", trial).standard_normal((motion.ticks, len(scales)))
+    seen = stream_of(genome, "noise of observations").standard_normal((motion.ticks, len(scales)))
     sent = commands.standard_normal((motion.ticks, len(world.actuators)))
     return replace(
         motion,
@@ -66,10 +64,10 @@ def disturbed(world: World, motion: Motion | Loop, genome: Genome, trial: int = 
     )
 
 
-def _tilt(world: World, genome: Genome, trial: int) -> Tilt:
+def _tilt(world: World, genome: Genome) -> Tilt:
     if not world.noise.start_tilt_rad:
         return LEVEL
-    x, y = (world.noise.start_tilt_rad * stream_of(genome, "noise of the start", trial).standard_normal(2)).tolist()
+    x, y = (world.noise.start_tilt_rad * stream_of(genome, "noise of the start").standard_normal(2)).tolist()
     return x, y
 
 

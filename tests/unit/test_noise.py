@@ -22,12 +22,12 @@ MOTION = open_loop(ROBOT.motion(ROBOT.known))
 NOISY = replace(ROBOT.world, noise=Noise(target=0.1, angle_rad=0.01, tilt=0.2, latency_s=0.03))
 
 
-def disturbed_targets(world: Any, genome: Any = ROBOT.known, trial: int = 0) -> Any:
-    return open_loop(disturbed(world, MOTION, genome, trial)).targets
+def disturbed_targets(world: Any, genome: Any = ROBOT.known) -> Any:
+    return open_loop(disturbed(world, MOTION, genome)).targets
 
 
-def errors(world: Any, genome: Any = ROBOT.known, trial: int = 0) -> Any:
-    return disturbed_targets(world, genome, trial) - MOTION.targets
+def errors(world: Any, genome: Any = ROBOT.known) -> Any:
+    return disturbed_targets(world, genome) - MOTION.targets
 
 
 def looping(**options: Any) -> Any:
@@ -58,9 +58,8 @@ def test_the_same_genome_has_the_same_draws_scaled_by_each_worlds_noise() -> Non
     np.testing.assert_allclose(twice, 2 * once, atol=1e-12)
     again = errors(NOISY, ROBOT.known.copy())
     np.testing.assert_array_equal(again, once)
-    other, trial = errors(NOISY, ROBOT.known + 1e-15), errors(NOISY, trial=1)
+    other = errors(NOISY, ROBOT.known + 1e-15)
     assert not np.isclose(other, once).any()
-    assert not np.isclose(trial, once).any()
 
 
 def test_a_loop_has_noise_of_observations_and_targets_and_latency() -> None:
@@ -148,7 +147,6 @@ def test_the_start_is_tilted_by_the_genome_and_scaled_by_each_worlds_noise() -> 
 
     assert tilts.std(axis=0) == pytest.approx(0.05, rel=0.2)
     np.testing.assert_allclose(again, 2 * tilts, rtol=1e-12)
-    assert disturbed(little, MOTION, genomes[0], 1).start_tilt_rad != tuple(tilts[0])
     np.testing.assert_array_equal(open_loop(disturbed(little, MOTION, genomes[0])).targets, MOTION.targets)
     loop = looping()
     assert disturbed(little, loop.motion(loop.known), genomes[0]).start_tilt_rad == tuple(tilts[0])
