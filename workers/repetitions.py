@@ -165,7 +165,7 @@ class Repetitions:
         self._looked = -LOOK_S  # cores are free: look for work at once
 
     def hand_back(self, runs: list[Run]) -> None:
-        """Stop these runs, record their last deliveries, and return their leases; without the database, these expire."""
+        """Stop these runs, record their last deliveries, and return their leases; without the database, they expire."""
         runs = list(runs)
         self._stop(runs)
         self.runs = [run for run in self.runs if run not in runs]
