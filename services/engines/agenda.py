@@ -6,6 +6,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.controllers.actuation import middles
 from gaplab.services.core.motions import Loop, Motion
 from gaplab.services.core.world import PDMotor, World
 
@@ -35,14 +36,6 @@ def delays(world: World) -> list[int]:
     motors = [joint.motor for joint in world.actuators]
     delays_s = [motor.delay_s if isinstance(motor, PDMotor) else 0.0 for motor in motors]
     return steps_at(np.array(delays_s, dtype=float), world.time_step_s)
-
-
-def first_targets(world: World) -> list[float]:
-    """Return the targets `(a,)` before any command arrives: a joint's start, or 0 for a velocity or a torque."""
-    return [
-        0.0 if isinstance(joint.motor, PDMotor) and joint.motor.follows != "position" else joint.start
-        for joint in world.actuators
-    ]
 
 
 def tick_steps(loop: Loop, time_step_s: float) -> list[int]:
@@ -152,5 +145,5 @@ class LoopAgenda:
 
 def _before(world: World, late: Sequence[int]) -> dict[int, Commands]:
     """Return the commands in time step 0 of the actuators that follow their first command later."""
-    first = [(actuator, target) for actuator, target in enumerate(first_targets(world)) if late[actuator]]
+    first = [(actuator, target) for actuator, target in enumerate(middles(world).tolist()) if late[actuator]]
     return {0: first} if first else {}

@@ -6,11 +6,10 @@ from copy import copy
 from types import ModuleType
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.controllers.actuation import middles
 from gaplab.services.core.world import World
-from gaplab.services.engines.agenda import delays, first_targets
+from gaplab.services.engines.agenda import delays
 from gaplab.services.engines.mujoco.model import compiled
 from gaplab.services.engines.mujoco.values import start, write
 
@@ -76,4 +75,4 @@ class Models:
 
 def _delays(world: World) -> Delays | None:
     steps = tuple(delays(world))
-    return Delays(steps, np.array(first_targets(world))) if any(steps) else None
+    return Delays(steps, middles(world)) if any(steps) else None
