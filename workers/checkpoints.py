@@ -24,8 +24,8 @@ CHECKPOINT_S = 10.0
 
 It limits the work that a crash loses, and the time that a repetition needs to stop."""
 
-SHARE = 4
-"""Number of calls between two checkpoints, at least; longer calls are split."""
+CALLS_PER_CHECKPOINT = 4
+"""Least number of calls between two checkpoints; longer calls are split."""
 
 PULSE_S = 5.0
 """Seconds without a delivery after which a worker gives a sign of life."""
@@ -127,7 +127,7 @@ class StepRecorder:
         self._called = perf_counter()
         if not self._rollout_s:
             return 1
-        return max(1, int(self._every_s / SHARE / (self._rollout_s * simulators)))
+        return max(1, int(self._every_s / CALLS_PER_CHECKPOINT / (self._rollout_s * simulators)))
 
     def record(self, answers: Sequence[Answer], rollouts: int) -> None:
         """Keep the answers of a call that has just ended, and emit a checkpoint if it is time."""

@@ -15,7 +15,7 @@ from gaplab.services.core.arrays import Genome
 from gaplab.services.core.ports import Reality
 from gaplab.services.core.types import Outcome
 
-SHARE = 0.8
+PERMIT_SHARE = 0.8
 """Part of a lease for which a permit holds: the hardware stops before others may take it."""
 
 POLL_S = 0.25

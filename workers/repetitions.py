@@ -19,7 +19,7 @@ from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
 from gaplab.workers.patience import Patience
-from gaplab.workers.permits import SHARE, Handle, permits_here
+from gaplab.workers.permits import PERMIT_SHARE, Handle, permits_here
 from gaplab.workers.plugins import Plugins
 from gaplab.workers.run import Run
 
@@ -215,7 +215,7 @@ class Repetitions:
         if self._permits is not None:
             able = (run for run in self.runs if run.permits is not None and run not in but)
             keys = [(run.claim.id, run.claim.epoch, run.measuring) for run in able if run.measuring is not None]
-            self._permits.renew.remote(keys, self._renewed + SHARE * self._lease_s)
+            self._permits.renew.remote(keys, self._renewed + PERMIT_SHARE * self._lease_s)
 
     def _stop(self, runs: Collection[Run]) -> None:
         """End the tasks of these runs; one that may be moving hardware may stop it first."""

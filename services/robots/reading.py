@@ -27,7 +27,7 @@ class Source:
         is_urdf: true for a URDF, false for MJCF.
         name: name of the robot in the file.
         masses_kg: mass of each body as the file says it, before anything was changed.
-        speeds: largest speed of each joint that has one.
+        speeds: speed limits by joint, rad/s or m/s.
         fixed: whether the base never moves.
         keyframes: starts that an MJCF has; the first is the usual one.
     """

@@ -48,7 +48,10 @@ def end(session: Session, owner: str) -> None:
 
 
 def release(store: Store, owner: str, reason: str) -> int:
-    """Queue the work of a supervisor again whose process has ended, forget it, and return the pieces of work."""
+    """Requeue a dead supervisor's work, forget the supervisor, and return the number of pieces of work.
+
+    Work that holds hardware stays until its lease runs out.
+    """
     released = execution.release_all(store, owner, reason) + sensitivity.release_all(store, owner, reason)
     end(store, owner)
     return released

@@ -438,7 +438,12 @@ def test_a_permit_is_for_one_measurement_and_comes_after_its_beginning_is_stored
     permitted: list[Any] = []
     handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: permitted.append(keys)))
     held, moving = measuring(handle)
-    monkeypatch.setattr(execution, "note_measuring", lambda store, claims: permitted.append("noted") or claims)
+
+    def note(_: Any, claims: Any) -> Any:
+        permitted.append("noted")
+        return claims
+
+    monkeypatch.setattr(execution, "note_measuring", note)
 
     for batch in ((Pulse(3, True, 0.0, 0.0),), (TimedStep(Measured(1, Sample(np.zeros(1), 1.0)), 1.0),),
                   (Pulse(8, True, 0.0, 0.0),), (TimedStep(Probed(1, 1.0, 1.0), 1.0),)):  # fmt: skip
@@ -449,7 +454,7 @@ def test_a_permit_is_for_one_measurement_and_comes_after_its_beginning_is_stored
     assert permitted == [[], "noted", [(7, 1, 3)], [], [], "noted", [(7, 1, 8)], []]
 
 
-def measuring(handle: Any) -> tuple[Repetitions, Run]:
+def measuring(handle: Any) -> "tuple[Repetitions, LastAnswers]":
     """A supervisor with one run, which permits hardware."""
     repetitions, claim = Repetitions(None, "here", None), Claim(7, 1, "x", 0, None)  # type: ignore[arg-type]
     run = LastAnswers(claim, None, permits=handle)  # type: ignore[arg-type]

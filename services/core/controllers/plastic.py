@@ -25,8 +25,8 @@ SMALL = 0.1
 AT_REST = 0.5
 """Activity of a neuron without input, and of all neurons at first."""
 
-NEVER, PLAIN_RULE, SLOWEST_RATE = 0.25, 0.125, 0.375
-"""Genes of the known genome: negative sign, plain Hebb rule, a third as rate."""
+NEGATIVE_SIGN, PLAIN_RULE, RATE_OF_A_THIRD = 0.25, 0.125, 0.375
+"""Genes of each neuron of the known genome."""
 
 
 class PlasticOptions(Frozen):
@@ -86,7 +86,7 @@ class Plastic(Controller):
         others = 3 * self._neurons + self._scaled.size
         wraps = self._pulses.wraps if self._pulses else []
         self.space = Space.box([0.0] * (first + others), [1.0] * (first + others), [*wraps, *[False] * others])
-        of_neurons = [NEVER, PLAIN_RULE, SLOWEST_RATE] * self._neurons
+        of_neurons = [NEGATIVE_SIGN, PLAIN_RULE, RATE_OF_A_THIRD] * self._neurons
         of_pulses = self._pulses.known.tolist() if self._pulses else []
         self.known = frozen([*of_pulses, *of_neurons, *[1.0] * self._scaled.size])
         self._middles, self._swings = middles(world), swings(world, options.gain)

@@ -63,7 +63,7 @@ class CmaEs(Optimizer):
 
     @property
     def least_evaluations(self) -> int:
-        """Return the number of members."""
+        """Return the larger of the members and the set population; a default population counts as 4."""
         return max(self.options.population or 4, self.options.members)
 
     def ask(self, state: Population, rng: Generator) -> Genomes:

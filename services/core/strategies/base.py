@@ -96,7 +96,7 @@ class Strategy(Plugin):
         return self.ensemble
 
     def later_selection_simulators(self, tunables: int) -> int:
-        """Return the same for selections after the first sample, when weights differ; by default as many."""
+        """Return the same maximum once a sample makes weights differ; by default it is unchanged."""
         return self.selection_simulators(tunables)
 
     def transfer_simulators(self, tunables: int) -> int:  # noqa: ARG002 - for those that need it

@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
@@ -93,7 +94,7 @@ class EstimationExploration(Strategy):
         )
 
 
-def _tried(genomes: Genomes, belief: Belief) -> FloatArray:
+def _tried(genomes: Genomes, belief: Belief) -> NDArray[np.bool_]:
     """Return whether each genome is a sample, `(n,)`."""
     samples = {sample.genome.tobytes() for sample in belief.samples}
     return np.array([genome.tobytes() in samples for genome in genomes])

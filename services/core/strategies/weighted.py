@@ -72,7 +72,7 @@ class Weighted(Diverse):
         return self._needed(self._compared(self.ensemble), tunables)
 
     def later_selection_simulators(self, tunables: int) -> int:
-        """Return the same for those of most weight."""
+        """Return the number of simulators once weights differ, so that only those of most weight count."""
         return self._needed(self._compared(self.options.counted), tunables)
 
     def _compared(self, simulators: int) -> int:

@@ -52,9 +52,9 @@ class GaussNewton(Tuner):
     differences between two simulators, but regressions over a box of them. The scatter around the lines counts as
     noise. The next box surrounds the estimate.
 
-    An interval comes from the errors of the same estimate of each simulator of the box, left out of the regression. It
-    is as wide as the bounds where the samples say nothing about a tunable. An ensemble is the estimate and draws from
-    its error, all equally probable.
+    An interval comes from leave-one-out errors: each simulator of the box is estimated from the others. It is as wide
+    as the bounds where the samples say nothing about a tunable. An ensemble is the estimate and draws from its error,
+    all equally probable.
     """
 
     name = "gauss_newton"
@@ -93,7 +93,7 @@ class LocalEstimate:
 
     Attributes:
         place: `(p,)`, from 0 to 1.
-        errors: `(n, p)`: errors of the same estimate of n simulators that are known.
+        errors: `(n, p)`: leave-one-out errors of n simulators.
     """
 
     place: FloatArray
