@@ -28,9 +28,7 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        found = sorted(
-            tunings.best_simulators(session, experiment_id), key=lambda each: (each.repetition, each.iteration)
-        )
+        found = tunings.best_simulators(session, experiment_id)
         measured = tunings.measured(session, row)
     spec = spec_of(row.spec)
     space = parameters_of(spec.tunables)

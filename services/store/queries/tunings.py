@@ -37,7 +37,7 @@ class BestSimulator:
 
 
 def best_simulators(session: Session, experiment: str) -> tuple[BestSimulator, ...]:
-    """Return the best simulator of every iteration of every repetition."""
+    """Return the best simulator of every iteration of every repetition, ordered by repetition, then iteration."""
     row, found, probe = IterationRow, SimulatorRow, MeasurementRow
     errors = found.squared_error, found.held_out_error
     columns = found.parameters, *errors, found.lower, found.upper, row.simulated_fitness, probe.fitness
