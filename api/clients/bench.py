@@ -75,6 +75,11 @@ class Bench:
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": wait_s, "limit": PAGE}
         return tuple(self._connection.items(Page[RequestRead], "/requests", **parameters))
 
+    def history(self, experiment: str | None = None, *, bench: str | None = None) -> tuple[RequestRead, ...]:
+        """Return all requests, also those that are measured, failed or withdrawn, the oldest first."""
+        parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "pending": "false", "limit": PAGE}
+        return tuple(self._connection.items(Page[RequestRead], "/requests", **parameters))
+
     def request(self, id: str) -> RequestRead:
         """Return a request with its answers."""
         return self._connection.get(RequestRead, f"/requests/{segment(id)}")

@@ -5,14 +5,14 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.markup import escape
 
+from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import BENCH, AsJson, Url, app, connect
 from gaplab.api.commands.json_output import print_json, print_result
-from gaplab.api.commands.measured_values import ValuesCommand
-from gaplab.api.commands.tables import table
+from gaplab.api.commands.measured_values import ValuesCommand, numbers
+from gaplab.api.commands.request_words import print_safety, request_table, request_words, stored_words
 from gaplab.schemas.corrections import Consequences
 from gaplab.schemas.measurements import RequestRead
 from gaplab.schemas.traces import TracesRead
@@ -20,10 +20,10 @@ from gaplab.schemas.traces import TracesRead
 RequestId = Annotated[str, typer.Argument(metavar="REQUEST", help="a request, as `gaplab requests` lists it")]
 AnswerId = Annotated[str, typer.Argument(metavar="MEASUREMENT", help="a measurement, as `gaplab requests ID` lists it")]
 _VALUES = typer.Argument(metavar="VALUE", help="fitness of each repeat", show_default=False)
-Numbers = Annotated[list[float] | None, _VALUES]
+Numbers = Annotated[list[str] | None, _VALUES]
 Failed = Annotated[str | None, typer.Option("--failed", help="why there are no values", show_default=False)]
 Reason = Annotated[str, typer.Option("--reason", help="why")]
-_STORED = "Measurement {0.id} is stored: {0.state.value}."
+Operator = Annotated[str | None, typer.Option("--operator", help="person who measured", show_default=False)]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="only say what would follow")]
 
 
@@ -36,6 +36,7 @@ def requests(
     bench: Annotated[
         str | None, typer.Option("--bench", help="only requests of this bench", show_default=False)
     ] = None,
+    all_: Annotated[bool, typer.Option("--all", help="also requests that are measured, failed or withdrawn")] = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
@@ -44,25 +45,15 @@ def requests(
         if id is not None and (found := _one(client.bench.request, id)) is not None:
             _print_request(found, as_json=as_json)
             return
-        items = client.bench.pending(id, bench=bench)
+        read = client.bench.history if all_ else client.bench.pending
+        items = read(id, bench=bench)
+        if not items and not as_json:
+            typer.echo(_nothing(client, id, bench, all_=all_))
+            return
     if as_json:
         print_json([each.model_dump(mode="json") for each in items])
-    elif not items:
-        typer.echo("Nothing is to be measured.")
     else:
-        rows = [
-            (
-                each.id,
-                escape(each.experiment_name),
-                f"{each.repetition}",
-                f"{each.iteration} ({each.kind.value})",
-                f"{each.repeats}",
-                escape(each.bench),
-                each.state.value + (f" by {escape(each.taken_by)}" if each.taken_by else ""),
-            )
-            for each in items
-        ]
-        console().print(table(("request", "experiment", "repetition", "iteration", "repeats", "bench", "state"), rows))
+        console().print(request_table(items, with_answers=all_))
 
 
 @app.command(rich_help_panel=BENCH)
@@ -78,41 +69,46 @@ def motion(
 
 
 @app.command("measured", cls=ValuesCommand, rich_help_panel=BENCH)
-def measured(
+def measured(  # noqa: PLR0913, PLR0917 - each is an option of the command
     id: RequestId,
     values: Numbers = None,
     failed: Failed = None,
     note: Annotated[str | None, typer.Option("--note", show_default=False)] = None,
+    operator: Operator = None,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Answer a request by hand: with the fitness of each repeat, or --failed and why."""
-    details = {"failed": failed, "note": note}
+    measured, details = numbers(values), {"failed": failed, "note": note, "operator": operator}
     with connect(url) as client:
-        found = client.bench.answer(id, values or None, **{name: each for name, each in details.items() if each})  # type: ignore[arg-type]
-    print_result(found, _STORED.format(found), as_json=as_json)
+        found = client.bench.answer(id, measured, **{name: each for name, each in details.items() if each})  # type: ignore[arg-type]
+    print_result(found, stored_words(found), as_json=as_json)
 
 
 @app.command("traces", rich_help_panel=BENCH)
-def traces(
+def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
     id: RequestId,
     files: Annotated[list[Path], typer.Argument(help="recorded motion of the base, CSV or MCAP; one for each repeat")],
     topic: Annotated[
         str | None, typer.Option("--topic", help="topic of the base's pose in MCAP", show_default=False)
     ] = None,
     answer: Annotated[bool, typer.Option("--answer", help="answer the request with them")] = False,
+    operator: Operator = None,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Compute fitness and readings from recordings of a motion, and answer its request with --answer."""
+    if operator and not answer:
+        raise typer.BadParameter("an operator is of an answer; add --answer", param_hint="--operator")
     with connect(url) as client:
         stored = [client.bench.attach_trace(file, topic).id for file in files]
         said = client.bench.traces(id, stored)
         if not answer:
             print_result(said, _words_of(said), as_json=as_json)
             return
-        found = client.bench.answer(id, traces=stored)
-    print_result(found, f"{_words_of(said)}\n{_STORED.format(found)}", as_json=as_json)
+        named = {"operator": operator} if operator else {}
+        found = client.bench.answer(id, traces=stored, **named)  # type: ignore[arg-type]
+    print_result(found, f"{_words_of(said)}\n{stored_words(found)}", as_json=as_json)
 
 
 @app.command("correct", cls=ValuesCommand, rich_help_panel=BENCH)
@@ -126,9 +122,9 @@ def correct(  # noqa: PLR0913, PLR0917 - each is an option of the command
     url: Url = None,
 ) -> None:
     """Replace the values of a measurement; what was computed from them is computed again."""
-    kept = {"failed": failed} if failed else {}
+    right, kept = numbers(values), {"failed": failed} if failed else {}
     with connect(url) as client:
-        found = client.bench.correct(id, values or None, reason=reason, dry_run=dry_run, **kept)  # type: ignore[arg-type]
+        found = client.bench.correct(id, right, reason=reason, dry_run=dry_run, **kept)  # type: ignore[arg-type]
     _print_consequences(found, dry_run=dry_run, as_json=as_json)
 
 
@@ -191,11 +187,22 @@ def _print_request(found: RequestRead, *, as_json: bool) -> None:
     if as_json:
         print_json(found)
         return
-    place = f"{found.kind.value} of iteration {found.iteration}, repetition {found.repetition}"
-    typer.echo(f"{found.id} is {found.state.value}: {place} of {found.experiment_name} ({found.experiment})")
-    for answer in found.answers:
-        values = ", ".join(f"{value:.6g}" for value in answer.values or ()) or f"failed: {answer.failed}"
-        typer.echo(f"  {answer.id} {answer.state.value}: {values} {found.unit} by {answer.operator}")
+    typer.echo("\n".join(request_words(found)))
+    print_safety(found)
+
+
+def _nothing(client: Client, experiment: str | None, bench: str | None, *, all_: bool) -> str:
+    """Return why a list of requests is empty, and what would be listed."""
+    place = "" if bench is None else f" on the bench {bench!r}"
+    if bench is not None:
+        asked = {each.bench for each in client.bench.history(experiment)}
+        if bench not in asked:
+            names = f"; benches with requests: {', '.join(sorted(asked))}" if asked else ""
+            return f"Nothing was asked for{place}{names}."
+    if all_:
+        return f"Nothing was asked for{place} yet."
+    command = f"gaplab requests {experiment or ''}".rstrip()
+    return f"Nothing is to be measured{place}; `{command} --all` lists what was."
 
 
 def _print_consequences(found: Consequences, *, dry_run: bool, as_json: bool) -> None:

@@ -10,10 +10,12 @@ import typer
 from gaplab.api.clients.drivers import DriverBroken, load, measure
 from gaplab.api.commands.app import BENCH, ExperimentId, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.request_words import print_safety
+from gaplab.schemas.measurements import RequestRead
 
 
 @app.command(rich_help_panel=BENCH)
-def drive(
+def drive(  # noqa: PLR0913, PLR0917 - each is an option of the command
     id: ExperimentId,
     driver: Annotated[Path, typer.Option("--driver", help="Python file with the class Driver: connect, run, stop")],
     journal: Annotated[
@@ -24,6 +26,9 @@ def drive(
     lease_s: Annotated[
         float, typer.Option("--lease-s", min=1, help="seconds of silence before others may take over")
     ] = 60.0,
+    within_limits: Annotated[
+        bool, typer.Option("--within-limits", help="end before a controller that is expected to exceed a limit")
+    ] = False,
     url: Url = None,
 ) -> None:
     """Measure what an experiment asks for with a driver, until the experiment has ended."""
@@ -36,9 +41,7 @@ def drive(
             robot.connect()
             try:
                 for task in client.requests(id, lease_s=lease_s, journal=kept):
-                    request = task.request
-                    place = f"repetition {request.repetition}, iteration {request.iteration}, {request.kind.value}"
-                    typer.echo(f"{request.id}: {place}")
+                    _announce(task.request, within_limits=within_limits)
                     measure(task, robot, limit_s, lambda sentence: typer.echo(f"  {sentence}"))
             finally:
                 with suppress(Exception):
@@ -46,3 +49,17 @@ def drive(
     except DriverBroken as error:
         raise CommandError(str(error), Exit.FAILED) from error
     typer.echo("The experiment has ended.")
+
+
+def _announce(request: RequestRead, *, within_limits: bool) -> None:
+    """Print what is to be measured, with warnings about its safety.
+
+    Raises:
+        CommandError: it is expected to exceed a limit, and must stay within them.
+    """
+    place = f"repetition {request.repetition}, iteration {request.iteration}, {request.kind.value}"
+    typer.echo(f"{request.id}: {place}")
+    print_safety(request)
+    if within_limits and request.safety and request.safety.beyond:
+        msg = f"request {request.id} is beyond its limits, so it was not measured; without --within-limits it is"
+        raise CommandError(msg, Exit.CONFLICT)

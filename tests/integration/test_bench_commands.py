@@ -20,6 +20,7 @@ from tests.commands import Gaplab
 from tests.experiments import toy
 from tests.integration.test_bench import compute, measure, pending
 from tests.integration.test_bench_http import traces_of
+from tests.integration.test_bench_safety import BEYOND, ask, safety, submit
 
 PHYSICAL = {"kind": "physical", "probes": "never"}
 
@@ -44,6 +45,101 @@ def test_a_request_is_read_moved_answered_and_corrected(sqlite_store: Store, gap
     read = gaplab("requests", request.id).out
     assert f"{answer} replaced: 4.4" in read
     assert "counted: 0.44" in read
+
+
+def test_a_request_says_what_to_run_how_often_and_in_which_unit(sqlite_store: Store, gaplab: Gaplab) -> None:
+    request = asked(sqlite_store, iterations=1, reality=PHYSICAL | {"repeats": 3})
+
+    read = gaplab("requests", request.id).out
+
+    assert f"repeats: 3, fitness in {request.unit}\n" in read
+    assert f"genome: {json.dumps(request.genome)}\n" in read
+
+
+def test_a_failure_has_its_reason_and_its_operator_and_no_unit(sqlite_store: Store, gaplab: Gaplab) -> None:
+    request = asked(sqlite_store, iterations=1)
+
+    answer = json.loads(gaplab("measured", request.id, "--failed", "it fell", "--operator", "Ada", "--json").out)
+
+    assert f"  {answer['id']} counted: failed, by Ada: it fell\n" in gaplab("requests", request.id).out
+
+
+def test_a_second_answer_says_how_a_person_decides(sqlite_store: Store, gaplab: Gaplab) -> None:
+    request = asked(sqlite_store, iterations=1)
+    gaplab("measured", request.id, "0.3")
+
+    said = gaplab("measured", request.id, "0.4", "--operator", "Eve").out
+    decision = said.partition("`gaplab ")[2].partition("`")[0].replace("WHY", "why").split()
+
+    assert "is stored: conflict." in said
+    assert "Done" in gaplab(*decision).out
+    assert "counted: 0.4 " in gaplab("requests", request.id).out
+
+
+def test_what_was_measured_is_found_again_with_its_measurements(sqlite_store: Store, gaplab: Gaplab) -> None:
+    request = asked(sqlite_store, iterations=1)
+    answer = json.loads(gaplab("measured", request.id, "0.3", "--json").out)["id"]
+
+    waiting = gaplab("requests", request.experiment).out
+    listed = gaplab("requests", request.experiment, "--all").out
+
+    assert waiting == f"Nothing is to be measured; `gaplab requests {request.experiment} --all` lists what was.\n"
+    assert request.id in listed
+    assert f"{answer} counted: 0.3" in listed
+
+
+def test_an_unknown_bench_is_answered_with_those_that_have_requests(sqlite_store: Store, gaplab: Gaplab) -> None:
+    assert gaplab("requests", "--bench", "tabel").out == "Nothing was asked for on the bench 'tabel'.\n"
+    asked(sqlite_store, iterations=1, reality=PHYSICAL | {"bench": "table"})
+
+    said = gaplab("requests", "--bench", "tabel").out
+
+    assert said == "Nothing was asked for on the bench 'tabel'; benches with requests: table.\n"
+
+
+def test_an_expected_excess_of_a_limit_is_told_before_a_person_or_a_driver_measures(
+    sqlite_store: Store, gaplab: Gaplab, tmp_path: Path
+) -> None:
+    id_ = submit(sqlite_store, "warn")
+    ask(sqlite_store, safety=safety(BEYOND) | {"unknown": ["torque is not told"]})
+    warnings = f"warning: {BEYOND}\nwarning: torque is not told\n"
+    (request,) = pending(sqlite_store)
+    driver = tmp_path / "driver.py"
+    driver.write_text(
+        "class Driver:\n"
+        "    def connect(self): pass\n"
+        "    def run(self, motion): raise RuntimeError('it ran')\n"
+        "    def stop(self): pass\n"
+    )
+
+    driven = gaplab("drive", id_, "--driver", str(driver))
+    within = gaplab("drive", id_, "--driver", str(driver), "--within-limits")
+
+    assert "open, beyond its limits" in gaplab("requests").out
+    assert gaplab("requests", request.id).err == warnings
+    assert driven.err.startswith(warnings)
+    assert "it ran" in driven.err
+    assert (within.code, "it ran" in within.err) == (Exit.CONFLICT, False)
+    assert within.err.startswith(warnings)
+    assert f"request {request.id} is beyond its limits" in within.err
+    assert pending(sqlite_store)[0].state == "open"
+
+
+@pytest.mark.parametrize(("values", "wrong"), [(["0.2", "0.3", "nan"], "nan"), (["0.2", "-0.3", "abc"], "abc")])
+def test_a_value_that_is_no_number_is_named_with_its_place(
+    sqlite_store: Store, gaplab: Gaplab, values: list[str], wrong: str
+) -> None:
+    for command in (("measured", "r1"), ("correct", "m1", "--reason", "why")):
+        said = gaplab(*command, *values)
+
+        assert said.code == Exit.USAGE
+        assert f"value 3: '{wrong}' is not a finite number" in said.err
+
+
+def test_an_operator_without_an_answer_is_refused(gaplab: Gaplab, tmp_path: Path) -> None:
+    said = gaplab("traces", "r1", str(tmp_path / "x.csv"), "--operator", "Ada")
+
+    assert (said.code, "add --answer" in said.err) == (Exit.USAGE, True)
 
 
 def test_a_measurement_is_voided_and_one_in_conflict_is_decided_about(sqlite_store: Store, gaplab: Gaplab) -> None:
@@ -75,7 +171,8 @@ def test_traces_are_computed_and_stored_as_an_answer(sqlite_store: Store, gaplab
     computed = gaplab("traces", request.id, *files).out
     assert computed.count("m/s; the motion begins at") == 2
     assert pending(sqlite_store)[0].answers == ()
-    assert "is stored: counted" in gaplab("traces", request.id, *files, "--answer").out
+    assert "is stored: counted" in gaplab("traces", request.id, *files, "--answer", "--operator", "Ada").out
+    assert " by Ada\n" in gaplab("requests", request.id).out
 
 
 def test_what_one_takes_home_is_saved_as_a_zip_or_a_page(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> None:
