@@ -1,16 +1,34 @@
 """The `gaplab` command, and the arguments that its parts share."""
 
 from importlib.metadata import version
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from pydantic import ValidationError
+from typer.core import TyperGroup
 
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands import completion
 from gaplab.api.commands.exit_codes import Exit
+from gaplab.schemas.mistakes import sentence
+
+
+class Commands(TyperGroup):
+    """The commands. A wrong argument is refused in the words of the service: what is permitted, and what was given."""
+
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - in a private module of Typer
+        """Parse the arguments of a command, and run it."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            if isinstance(error.__cause__, ValidationError):
+                error.message = sentence(dict(error.__cause__.errors()[0]), ())
+            raise
+
 
 app = typer.Typer(
+    cls=Commands,
     help="Close the reality gap: tune a robot simulator from a few real-world evaluations.",
     epilog=f"Exit codes: {'; '.join(f'{code.value} {code.meaning}' for code in Exit)}.",
     no_args_is_help=True,

@@ -361,6 +361,24 @@ def test_wrong_use_of_the_command_ends_with_2_and_help_tells_the_codes(gaplab: G
     assert "Exit codes" in gaplab("--help").out
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("list", "--limit", "-1"), 'it must be at least 1, not "-1"'),
+        (("list", "--limit", "abc"), 'it must be a whole number, not "abc"'),
+        (("watch", "e1", "--every", "abc"), 'it must be a finite number, not "abc"'),
+        (("compare", "e1", "--format", "xml"), "'--format': 'xml' is not one of 'table',"),
+        (("views", "save", "mine", "--shows", "xml"), "'--shows': 'xml' is not one of 'all',"),
+    ],
+)
+def test_a_wrong_argument_is_named_with_what_is_permitted(
+    gaplab: Gaplab, arguments: tuple[str, ...], message: str
+) -> None:
+    said = gaplab(*arguments)
+
+    assert (said.code, message in said.err) == (Exit.USAGE, True)
+
+
 def test_a_port_that_is_no_number_in_the_environment_is_a_sentence(
     gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
