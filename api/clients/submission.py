@@ -42,14 +42,14 @@ class Submission:
         if not yes and can_ask():
             confirm(self.estimate(spec), input)
         body = _body(spec)
-        if _is_experiment(body):
+        if is_experiment(body):
             return self._connection.post(ExperimentRead, "/experiments", body)
         return self._connection.post(StudyRead, "/studies", body)
 
     def estimate(self, spec: Spec) -> EstimateRead:
         """Return the rollouts, the duration and the resolved specs of an experiment or a study; nothing is stored."""
         body = _body(spec)
-        return self._connection.post(EstimateRead, f"/{_KINDS[_is_experiment(body)]}/estimate", body)
+        return self._connection.post(EstimateRead, f"/{_KINDS[is_experiment(body)]}/estimate", body)
 
     def check(self, spec: Spec | SensitivitySpec, *, every_s: float = 0.5) -> SensitivityRead:
         """Return the effect of the tunables of a spec on fitness; the service computes it if it is not known yet.
@@ -70,5 +70,6 @@ def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:
     return spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
 
 
-def _is_experiment(body: Mapping[str, Any]) -> bool:
+def is_experiment(body: Mapping[str, Any]) -> bool:
+    """Return whether a spec is that of an experiment, and not of a study."""
     return "strategy" in body and "strategies" not in body

@@ -16,7 +16,7 @@ from gaplab.api.commands import archives, reruns, catalogue, plugins, robots, to
 # isort: on
 from gaplab.api.commands.app import app as app
 from gaplab.api.commands.exit_codes import CommandError, Exit, code_of
-from gaplab.services.core.errors import GaplabError, NotFound
+from gaplab.services.core.errors import GaplabError
 
 
 def main() -> None:
@@ -25,10 +25,10 @@ def main() -> None:
         app(prog_name="gaplab")
     except NotSubmitted as error:
         _exit([str(error)], Exit.INTERRUPTED)
-    except (ServiceError, ServiceUnreachable, CommandError) as error:
+    except (ServiceError, ServiceUnreachable, CommandError, GaplabError) as error:
         _exit(lines_of(error.problem) if isinstance(error, ServiceError) else [str(error)], code_of(error))
-    except (ExperimentFailed, ExtraMissing, GaplabError, ValueError) as error:
-        _exit([str(error)], Exit.NOT_FOUND if isinstance(error, NotFound) else Exit.FAILED)
+    except (ExperimentFailed, ExtraMissing, ValueError) as error:
+        _exit([str(error)], Exit.FAILED)
     except OSError as error:
         _exit([f"{error.filename}: {error.strerror}" if error.filename else str(error)], Exit.FILE)
 

@@ -5,6 +5,7 @@ from typing import Self
 
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.process.errors import CommandError as CommandError
+from gaplab.services.core.errors import GaplabError, InvalidArchive, InvalidSpec, NotFound
 
 
 class Exit(IntEnum):
@@ -38,11 +39,15 @@ BY_STATUS = (
     | dict.fromkeys((413, 415, 422, 428), Exit.INVALID)
 )
 
+BY_ERROR = {NotFound: Exit.NOT_FOUND, InvalidSpec: Exit.INVALID, InvalidArchive: Exit.INVALID}
 
-def code_of(error: ServiceError | ServiceUnreachable | CommandError) -> int:
-    """Return the exit code for an error."""
+
+def code_of(error: ServiceError | ServiceUnreachable | CommandError | GaplabError) -> int:
+    """Return the exit code for an error of the service, or of what a command does without it."""
     if isinstance(error, CommandError):
         return error.code
     if isinstance(error, ServiceUnreachable):
         return Exit.UNREACHABLE
+    if isinstance(error, GaplabError):
+        return next((code for kind, code in BY_ERROR.items() if isinstance(error, kind)), Exit.FAILED)
     return BY_STATUS.get(error.problem.status, Exit.FAILED)

@@ -1,7 +1,9 @@
 """The command that computes an archive again."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import IO, Annotated
 
 import typer
 from rich.markup import escape
@@ -12,6 +14,7 @@ from gaplab.api.commands.exit_codes import Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.submission import submit_confirmed
 from gaplab.schemas.reruns import RepetitionRerun, RerunRead
+from gaplab.services.core.errors import InvalidArchive
 
 COLORS = {"same": "green", "different": "bold red", "not computed": "yellow"}
 
@@ -38,7 +41,7 @@ def rerun(
         return
     from gaplab.services.archives.rerunning import submitted_spec
 
-    with file.open("rb") as source:
+    with _opened(file) as source:
         spec = submitted_spec(source)
     with connect(url) as client:
         record = submit_confirmed(client, spec, yes=yes)
@@ -53,7 +56,7 @@ def _verify(file: Path, repetitions: int | None, *, as_json: bool) -> None:
     def show(result: RepetitionRerun) -> None:
         screen.print(_line(result), soft_wrap=True)
 
-    with file.open("rb") as source:
+    with _opened(file) as source:
         found = recompute(source, most=repetitions, computed=show)
     if as_json:
         print_json(found)
@@ -61,6 +64,16 @@ def _verify(file: Path, repetitions: int | None, *, as_json: bool) -> None:
         screen.print(*_summary(found), sep="\n", soft_wrap=True, markup=False)
     if found.different or not found.same:
         raise typer.Exit(Exit.FAILED)
+
+
+@contextmanager
+def _opened(file: Path) -> Iterator[IO[bytes]]:
+    """Yield an open archive; an error that it is none names the file."""
+    with file.open("rb") as source:
+        try:
+            yield source
+        except InvalidArchive as error:
+            raise InvalidArchive(f"{file} is not an archive of gaplab: {error}") from error
 
 
 def _line(result: RepetitionRerun) -> str:

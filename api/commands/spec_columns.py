@@ -3,12 +3,18 @@
 import json
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile
 
 from pydantic import ValidationError
 
+from gaplab.api.clients.submission import is_experiment
 from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.submission import read_spec
+from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.archives.members import member_of
+from gaplab.services.archives.opening import readable_zip
+from gaplab.services.core.errors import InvalidArchive, InvalidSpec
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins import folders
 from gaplab.services.specs.differences import SpecColumn
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
@@ -16,40 +22,52 @@ from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 MOST_BYTES = 50_000_000
 """Size of the specs in an archive; a spec has about two thousand bytes."""
 
+_MEMBER = member_of("experiment")
+
+_BROKEN_SPECS = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
+
 
 def column_of(file: Path) -> SpecColumn:
     """Return the specs of an archive, or the completed specs of a JSON file, for which no service is needed.
 
     Raises:
-        CommandError: the file cannot be read, or is neither of the two.
-        InvalidSpec: the spec is invalid.
+        CommandError: the file cannot be read, is damaged, or has an invalid spec.
     """
     try:
         if file.suffix == ".zip":
             return SpecColumn(file.name, file.stem, _archived(file))
-        spec = json.loads(file.read_text("utf-8"))
+        spec = read_spec(str(file))
         folders.find()
         return SpecColumn(file.name, spec.get("name") or file.stem, _completed(spec))
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror or error}", Exit.FILE) from error
     except ValidationError as error:
-        mistakes = (f"/{'/'.join(map(str, wrong['loc']))}: {wrong['msg']}" for wrong in error.errors())
+        mistakes = (f"/{'/'.join(map(str, wrong['loc']))}: {sentence(dict(wrong))}" for wrong in error.errors())
         raise CommandError(f"{file} is not a valid spec: {'; '.join(mistakes)}", Exit.INVALID) from error
-    except (ValueError, KeyError, AttributeError, BadZipFile, RecursionError) as error:
-        msg = f"{file} is neither an archive of gaplab (.zip) nor a spec (.json): {error}"
-        raise CommandError(msg, Exit.FILE) from error
+    except InvalidSpec as error:
+        raise CommandError(f"{file} is not a valid spec: {error}", Exit.INVALID) from error
+    except InvalidArchive as error:
+        raise CommandError(f"{file} is not an archive of gaplab: {error}", Exit.INVALID) from error
 
 
 def _archived(file: Path) -> tuple[dict[str, Any], ...]:
-    with ZipFile(file) as archive, archive.open("experiment.jsonl") as rows:
-        text = rows.read(MOST_BYTES + 1)
+    with readable_zip(file) as archive:
+        if _MEMBER not in archive.namelist():
+            raise InvalidArchive(f"it has no {_MEMBER}")
+        with archive.open(_MEMBER) as rows:
+            text = rows.read(MOST_BYTES + 1)
     if len(text) > MOST_BYTES:
-        raise ValueError(f"its specs have more than {MOST_BYTES:,} bytes")
-    return tuple(json.loads(row)["spec"] for row in text.splitlines())
+        raise InvalidArchive(f"its specs have more than {MOST_BYTES:,} bytes")
+    try:
+        specs = tuple(json.loads(row)["spec"] for row in text.splitlines())
+        for spec in specs:
+            spec_of(spec)
+    except _BROKEN_SPECS as error:
+        raise InvalidArchive(f"a spec in its {_MEMBER} is damaged") from error
+    return specs
 
 
 def _completed(spec: dict[str, Any]) -> tuple[dict[str, Any], ...]:
-    is_experiment = "strategy" in spec and "strategies" not in spec
-    resolved = [resolve_experiment(ExperimentSpec.model_validate(spec))] if is_experiment else None
+    resolved = [resolve_experiment(ExperimentSpec.model_validate(spec))] if is_experiment(spec) else None
     studied = resolved or resolve_study(StudySpec.model_validate(spec))
     return tuple(each.model_dump(mode="json") for each in studied)

@@ -8,6 +8,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from errno import EINVAL
 from hashlib import sha256
@@ -67,25 +68,37 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive
     Raises:
         InvalidArchive: the file is damaged, harmful, not an archive, or written by a later version.
     """
+    with readable_zip(file) as archive:
+        members = _members(archive)
+        manifest = _manifest(archive, members)
+        _refuse_too_many_rows(manifest, most_rows)
+        files = {
+            name: _unpack(archive, info, manifest.members[name], folder / name)
+            for name, info in members.items()
+            if name != MANIFEST
+        }
+    _read_parquet({file: manifest.members[name].rows for name, file in files.items() if name.endswith(".parquet")})
+    tables = {table: _lines_of(files[member_of(table)]) for table in EXPORTED if member_of(table) in files}
+    return OpenedArchive(manifest, tables)
+
+
+@contextmanager
+def readable_zip(file: IO[bytes] | Path) -> Iterator[ZipFile]:
+    """Yield a zip that is open for reading.
+
+    Raises:
+        InvalidArchive: it, or what is read of it meanwhile, is damaged, encrypted or no zip.
+        OSError: the file cannot be read.
+    """
     try:
         with ZipFile(file) as archive:
-            members = _members(archive)
-            manifest = _manifest(archive, members)
-            _refuse_too_many_rows(manifest, most_rows)
-            files = {
-                name: _unpack(archive, info, manifest.members[name], folder / name)
-                for name, info in members.items()
-                if name != MANIFEST
-            }
+            yield archive
     except (BadZipFile, ZlibError, EOFError, NotImplementedError, RuntimeError, ValueError, OverflowError) as error:
         raise InvalidArchive(f"it is not a readable zip: {type(error).__name__}") from error
     except OSError as error:
         if error.errno != EINVAL:  # a place before the file's beginning
             raise
         raise InvalidArchive("it is not a readable zip: its directory points outside of it") from error
-    _read_parquet({file: manifest.members[name].rows for name, file in files.items() if name.endswith(".parquet")})
-    tables = {table: _lines_of(files[member_of(table)]) for table in EXPORTED if member_of(table) in files}
-    return OpenedArchive(manifest, tables)
 
 
 def _members(archive: ZipFile) -> dict[str, ZipInfo]:

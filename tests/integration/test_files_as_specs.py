@@ -1,0 +1,99 @@
+"""Commands that read specs and archives from files, without a service: what a wrong file is answered with."""
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from gaplab.api.commands.exit_codes import Exit
+from tests.commands import Gaplab
+
+GOOD = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
+
+
+@pytest.fixture
+def good(tmp_path: Path) -> str:
+    file = tmp_path / "good.json"
+    file.write_text(json.dumps(GOOD))
+    return str(file)
+
+
+def zipped(file: Path, text: str, member: str = "experiment.jsonl") -> bytearray:
+    """Write a zip with a member of this text, and return its bytes."""
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(member, text)
+    return bytearray(file.read_bytes())
+
+
+def test_a_spec_with_an_unknown_name_is_invalid_and_its_file_is_named(
+    gaplab: Gaplab, good: str, tmp_path: Path
+) -> None:
+    bad = tmp_path / "bad.json"
+    bad.write_text(json.dumps(GOOD | {"robot": "nope"}))
+
+    said = gaplab("diff", str(bad), good)
+
+    assert said.code == Exit.INVALID
+    assert said.err.startswith(f"gaplab: {bad} is not a valid spec: /robot: unknown robot 'nope'")
+
+
+@pytest.mark.parametrize("text", ['{"seed": NaN}', "[1]", "{"])
+def test_a_file_that_is_no_spec_is_told_like_by_submit(gaplab: Gaplab, good: str, tmp_path: Path, text: str) -> None:
+    file = tmp_path / "spec.json"
+    file.write_text(text)
+
+    submitted, compared = gaplab("submit", str(file)), gaplab("diff", str(file), good)
+
+    assert (compared.code, compared.err) == (Exit.FILE, submitted.err)
+
+
+def test_a_wrong_value_in_a_spec_is_told_with_what_is_permitted(gaplab: Gaplab, good: str, tmp_path: Path) -> None:
+    file = tmp_path / "spec.json"
+    file.write_text(json.dumps(GOOD | {"seed": "x"}))
+
+    said = gaplab("diff", str(file), good)
+
+    assert said.err == f'gaplab: {file} is not a valid spec: /seed: seed must be a whole number, not "x"\n'
+
+
+def test_a_damaged_an_encrypted_and_a_foreign_zip_are_sentences(gaplab: Gaplab, good: str, tmp_path: Path) -> None:
+    file = tmp_path / "a.zip"
+    content = zipped(file, "x" * 1000)
+    damaged, encrypted, truncated = content.copy(), content.copy(), content.copy()
+    damaged[30 + len("experiment.jsonl")] = 0xFF
+    for header, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        encrypted[encrypted.index(header) + flags] |= 1
+    del truncated[-30:]
+
+    for bytes_, reason in ((damaged, "error"), (encrypted, "RuntimeError"), (truncated, "BadZipFile")):
+        file.write_bytes(bytes_)
+        said = gaplab("diff", str(file), good)
+        assert said.code == Exit.INVALID
+        assert said.err == f"gaplab: {file} is not an archive of gaplab: it is not a readable zip: {reason}\n"
+    zipped(file, "{}", "other.jsonl")
+    assert "it has no experiment.jsonl" in gaplab("diff", str(file), good).err
+
+
+@pytest.mark.parametrize("row", ['{"spec": 3}', '{"spec": {}}', "{}", "[1]", "{", '{"spec": {"reality": 1}}'])
+def test_an_archive_with_a_spec_that_is_none_is_a_sentence(gaplab: Gaplab, good: str, tmp_path: Path, row: str) -> None:
+    file = tmp_path / "a.zip"
+    zipped(file, row)
+
+    said = gaplab("diff", str(file), good)
+
+    assert said.code == Exit.INVALID
+    assert said.err == f"gaplab: {file} is not an archive of gaplab: a spec in its experiment.jsonl is damaged\n"
+
+
+@pytest.mark.parametrize("options", [(), ("--verify",)])
+def test_a_file_that_is_no_archive_cannot_be_computed_again(
+    gaplab: Gaplab, tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    file = tmp_path / "a.zip"
+    file.write_bytes(b"text")
+
+    said = gaplab("rerun", str(file), *options)
+
+    assert said.code == Exit.INVALID
+    assert said.err == f"gaplab: {file} is not an archive of gaplab: it is not a readable zip: BadZipFile\n"
