@@ -74,7 +74,7 @@ class Figures:
         self._connection = connection
         self._records = records
 
-    def draw(self, *ids: str, of: str = "curves", **options: str | float | bool | None) -> Figure:
+    def draw(self, /, *ids: str, of: str = "curves", **options: str | float | bool | None) -> Figure:
         """Return a figure of experiments and studies; the service draws it when it is shown or saved.
 
         Args:

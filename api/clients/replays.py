@@ -14,7 +14,7 @@ class Replays:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def replay(self, id: str, **choice: int | str | None) -> Replay:
+    def replay(self, id: str, /, **choice: int | str | None) -> Replay:
         """Return the motion of a controller in its simulator and in reality.
 
         Args:
@@ -23,7 +23,7 @@ class Replays:
         """
         return self._connection.get(Replay, f"/experiments/{segment(id)}/replay", **choice)
 
-    def video(self, id: str, file: str | Path, **choice: int | str | None) -> Path:
+    def video(self, id: str, file: str | Path, /, **choice: int | str | None) -> Path:
         """Write a replay into a file with the suffix .gif, .webp or .mp4.
 
         Args:

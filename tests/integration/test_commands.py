@@ -267,6 +267,7 @@ def test_a_figure_is_drawn_into_as_many_files_as_one_names(
         (["curves", "STUDY", "-o", "a.docx"], Exit.USAGE, "has no suffix of a figure"),
         (["curves", "STUDY", "-o", "a.svg", "--set", "band"], Exit.USAGE, "NAME=VALUE"),
         (["curves", "STUDY", "-o", "a.svg", "--set", "band=wide"], Exit.INVALID, "band"),
+        (["curves", "STUDY", "-o", "a.svg", "--set", "self=1"], Exit.INVALID, "unknown parameter 'self'"),
         (["portrait", "STUDY", "-o", "a.svg"], Exit.NOT_FOUND, "portrait"),
         (["curves", "nope", "-o", "a.svg"], Exit.NOT_FOUND, "nope"),
     ],
@@ -287,6 +288,19 @@ def test_a_figure_that_cannot_be_drawn_is_a_sentence_and_no_file(  # noqa: PLR09
     assert said.code == code
     assert says in said.err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["id", "self", "file"])
+def test_an_option_that_no_replay_has_is_refused_by_its_name(
+    gaplab: Gaplab, url: str, study: str, tmp_path: Path, name: str
+) -> None:
+    with Client(url) as client:
+        experiment = client.study(study).experiments[0].id
+
+    said = gaplab("replay", experiment, "-o", str(tmp_path / "a.gif"), "-s", "iteration=1", "-s", f"{name}=2")
+
+    assert said.code == Exit.INVALID
+    assert f"unknown parameter '{name}'" in said.err
 
 
 def test_all_about_one_plug_in(gaplab: Gaplab) -> None:
