@@ -29,9 +29,11 @@ Priority = Annotated[int, Field(strict=True, ge=-10, le=10)]
 Label = Annotated[str, Field(min_length=1, max_length=200)]
 """A name that a person gives to a study or an experiment."""
 
+TAG_PATTERN = r"^[^\W_][\w.:/+-]*$"
+
 Tag = Annotated[
     str,
-    StringConstraints(strip_whitespace=True, to_lower=True, max_length=50, pattern=r"^[^\W_][\w.:/+-]*$"),
+    StringConstraints(strip_whitespace=True, to_lower=True, max_length=50, pattern=TAG_PATTERN),
     Field(examples=["gait"]),
 ]
 """A tag, in lower case: letters, digits and `_ . : / + -`; the first is a letter or a digit."""

@@ -5,6 +5,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from gaplab.schemas.base import TAG_PATTERN
+
 LONGEST_VALUE = 60
 """Most characters of a value in a sentence."""
 
@@ -36,6 +38,9 @@ PERMITTED = {
 }
 """What is permitted, by pydantic's type of error."""
 
+PATTERNS = {TAG_PATTERN: "letters, digits and _ . : / + -, the first a letter or a digit"}
+"""What is permitted, by the pattern that a text must match."""
+
 LENGTHS = {
     "too_short": ("at least", "min_length", "item"),
     "too_long": ("at most", "max_length", "item"),
@@ -50,6 +55,8 @@ def permitted_by(error: Mapping[str, Any]) -> tuple[str, ...] | str | None:
     context = error.get("ctx", {})
     if error["type"] in {"literal_error", "enum"}:
         return tuple(re.findall(r"'([^']*)'", context["expected"]))
+    if error["type"] == "string_pattern_mismatch":
+        return PATTERNS.get(context["pattern"])
     template = PERMITTED.get(error["type"])
     return template.format(**context) if template else None
 
@@ -69,9 +76,9 @@ def sentence(error: Mapping[str, Any], place: Sequence[str | int] | None = None)
         bound, limit, unit = LENGTHS[kind]
         items = f"{context[limit]} {unit}{'' if context[limit] == 1 else 's'}"
         return f"{subject} must have {bound} {items}{_not_length(error)}"
-    if kind == "string_pattern_mismatch":
-        return f"{subject} must match {context['pattern']}{_not(error)}"
     permitted = permitted_by(error)
+    if permitted is None and kind == "string_pattern_mismatch":
+        return f"{subject} must match {context['pattern']}{_not(error)}"
     if permitted is None:
         return str(error["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
     return f"{subject} must be {permitted if isinstance(permitted, str) else _one_of(permitted)}{_not(error)}"

@@ -7,7 +7,6 @@ import httpx2
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.errors import ServiceError
 from gaplab.api.clients.records import Record, Records, path_of
-from gaplab.schemas.editing import Edit
 from gaplab.schemas.keeping import DeletionRead
 from gaplab.schemas.notifications import WebhookRead
 from gaplab.schemas.records import ExperimentRead, StudyRead
@@ -23,11 +22,11 @@ class Keeping:
 
     def tag(self, id: str, *tags: str) -> ExperimentRead | StudyRead:
         """Add tags to a study or an experiment, and return it."""
-        return self._records.edit(id, Edit(add_tags=_each(tags)))
+        return self._records.patch(id, {"add_tags": _each(tags)})
 
     def untag(self, id: str, *tags: str) -> ExperimentRead | StudyRead:
         """Remove tags from a study or an experiment, and return it."""
-        return self._records.edit(id, Edit(remove_tags=_each(tags)))
+        return self._records.patch(id, {"remove_tags": _each(tags)})
 
     def archive(self, id: str) -> ExperimentRead | StudyRead:
         """Leave a study or an experiment that has ended out of lists, and return it."""

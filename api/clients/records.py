@@ -1,7 +1,7 @@
 """Studies and experiments, and what the service stores of them."""
 
-from collections.abc import Iterable
-from typing import TypeAlias
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeAlias
 
 import httpx2
 
@@ -75,8 +75,12 @@ class Records:
 
     def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:
         """Change the name, the notes or the tags of a study or an experiment, and return it."""
+        return self.patch(id, edit.model_dump(exclude_unset=True))
+
+    def patch(self, id: str, body: Mapping[str, Any]) -> ExperimentRead | StudyRead:
+        """Change fields of a study or an experiment, which the service validates, and return it."""
         record = self.find(id)
-        body, headers = edit.model_dump(exclude_unset=True), {"If-Match": "*"}
+        headers = {"If-Match": "*"}
         return self._connection.change(type(record), "PATCH", path_of(record), json=body, headers=headers)
 
     def reveal(self, id: str) -> ExperimentRead:
