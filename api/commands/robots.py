@@ -12,8 +12,9 @@ from rich.table import Table
 
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
-from gaplab.api.commands.exit_codes import Exit
+from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.tables import minute
 from gaplab.schemas.mistakes import sentence
 from gaplab.services.core.errors import InvalidRobot
 
@@ -26,6 +27,8 @@ OTHERS = (
     "kp, kd, max_torque, position_gain, motored, turn, keyframe, vertices, visuals, static_friction, dynamic_friction, "
     "observed, controller or task; repeatable"
 )
+_IMPORTED = {b"<robot": "a URDF", b"<mujoco": "an MJCF"}
+"""Roots of files that `gaplab robot import` reads."""
 
 robot = typer.Typer(help="Import robots from URDF and MJCF, and store them.", no_args_is_help=True)
 app.add_typer(robot, name="robot", rich_help_panel=PLUGINS)
@@ -150,10 +153,26 @@ def add(
     url: Url = None,
 ) -> None:
     """Store a robot file in the service, so that specs can name its robot."""
+    _check_that_it_is_json(file)
     with connect(url) as client:
         found = client.add_robot(file)
     text = f"Stored the robot {found.name}, sha256 {found.sha256}. A spec names it: {json.dumps({'robot': found.name})}"
     print_result(found, text, as_json=as_json)
+
+
+def _check_that_it_is_json(file: Path) -> None:
+    """Refuse a file that the service could not read as a robot file.
+
+    Raises:
+        CommandError: it is a URDF or an MJCF, which is imported first, or not JSON.
+    """
+    content = file.read_bytes()
+    try:
+        json.loads(content)
+    except (ValueError, RecursionError) as error:
+        kind = next((kind for root, kind in _IMPORTED.items() if root in content), None)
+        reason = f"is no robot file but {kind}; first: gaplab robot import {file}" if kind else f"is not JSON: {error}"
+        raise CommandError(f"{file} {reason}", Exit.FILE) from error
 
 
 @robot.command("list")
@@ -167,5 +186,5 @@ def list_(as_json: AsJson = False, url: Url = None) -> None:
     table = Table("name", "sha256", "bodies", "actuators", "kg", "file", "stored", box=None)
     for each in found:
         size = str(each.bodies), str(each.actuators), f"{each.mass_kg:.4g}"
-        table.add_row(escape(each.name), each.sha256[:12], *size, escape(each.file or "-"), f"{each.created_at:%F %R}")
+        table.add_row(escape(each.name), each.sha256[:12], *size, escape(each.file or "-"), minute(each.created_at))
     console().print(table if found else "No robot is stored; `gaplab robot add FILE` stores one.")

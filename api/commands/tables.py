@@ -1,6 +1,7 @@
 """Tables and sentences for what the service answers."""
 
 from collections.abc import Iterable, Sequence
+from datetime import datetime
 
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
@@ -101,13 +102,17 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     return made
 
 
+def minute(moment: datetime | None) -> str:
+    """Return a moment in local time, to the minute; nothing for None."""
+    return moment.astimezone().strftime("%Y-%m-%d %H:%M") if moment else ""
+
+
 def _record(record: Record) -> tuple[str, ...]:
     many = f" ({len(record.experiments)})" if isinstance(record, StudyRead) else ""
-    created = record.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
     unknown = "not known yet" if record.state is State.RUNNING else "-"
     progress = (fitness(record), percent(record.progress), time_left(record) or unknown)
     tags = f" [dim]{escape(' '.join(record.tags))}[/]" if record.tags else ""
-    return record.id, escape(record.name) + many + tags, standing(record), *progress, created
+    return record.id, escape(record.name) + many + tags, standing(record), *progress, minute(record.created_at)
 
 
 def _repetition(found: RepetitionRead, iterations: int) -> tuple[str, ...]:

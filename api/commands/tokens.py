@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import datetime
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,7 +10,7 @@ from rich.markup import escape
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import OTHERS, AsJson, app
 from gaplab.api.commands.json_output import print_json, print_result
-from gaplab.api.commands.tables import table
+from gaplab.api.commands.tables import minute, table
 from gaplab.schemas.access import Role, TokenRead
 from gaplab.services.settings import Settings
 
@@ -87,8 +86,4 @@ def _store() -> Iterator["Store"]:
 
 def _row(token: TokenRead) -> tuple[str, ...]:
     moments = (token.created_at, token.last_used_at, token.revoked_at)
-    return token.id, escape(token.name), token.role.value, *map(_minute, moments)
-
-
-def _minute(moment: datetime | None) -> str:
-    return moment.astimezone().strftime("%Y-%m-%d %H:%M") if moment else ""
+    return token.id, escape(token.name), token.role.value, *map(minute, moments)

@@ -1,13 +1,16 @@
 """`gaplab robot import`, and `gaplab simulator` on a service in a thread."""
 
 import json
+import time
 from collections.abc import Iterator
 from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.robot_files import read_robot_file
@@ -205,6 +208,48 @@ def test_a_tuned_robot_can_be_added_beside_the_one_that_it_was(gaplab: Gaplab, t
     assert "Inertia" not in said.out
     assert json.loads(added.out)["name"] == "a1_tuned"
     assert [each["name"] for each in json.loads(gaplab("robot", "list", "--json").out)] == ["a1", "a1_tuned"]
+
+
+@pytest.fixture
+def in_tokyo(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    with monkeypatch.context() as patch:
+        patch.setenv("TZ", "Asia/Tokyo")
+        time.tzset()
+        yield
+    time.tzset()
+
+
+@pytest.mark.usefixtures("in_tokyo")
+def test_robots_are_listed_with_the_local_time_of_their_storing(gaplab: Gaplab, tmp_path: Path) -> None:
+    source, output = tmp_path / "m.xml", tmp_path / "m.json"
+    source.write_text(MJCF)
+    gaplab("robot", "import", str(source), "-o", str(output))
+    stored = json.loads(gaplab("robot", "add", str(output), "--json").out)["created_at"]
+
+    listed = gaplab("robot", "list").out
+
+    tokyo = datetime.fromisoformat(stored) + timedelta(hours=9)
+    assert f"{tokyo:%Y-%m-%d %H:%M}" in listed
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "<robot name='a1'/>",
+            "{0} is no robot file but a URDF; first: gaplab robot import {0}",
+        ),
+        (MJCF, "{0} is no robot file but an MJCF; first: gaplab robot import {0}"),
+        ("{", "{0} is not JSON: Expecting property name enclosed in double quotes: line 1 column 2 (char 1)"),
+    ],
+)
+def test_a_file_that_is_no_robot_file_is_not_sent(gaplab: Gaplab, tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "a1.urdf"
+    file.write_text(text)
+
+    said = gaplab("robot", "add", str(file))
+
+    assert (said.code, said.err) == (Exit.FILE, f"gaplab: {message.format(file)}\n")
 
 
 def test_another_urdf_than_that_of_the_robot_is_refused(gaplab: Gaplab, tuned_a1: str, tmp_path: Path) -> None:
