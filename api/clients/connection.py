@@ -181,5 +181,11 @@ def _without_scheme(url: str) -> str:
 
 
 def segment(id: str) -> str:
-    """Return any id as one segment of a path; servers decode a slash before they split the path."""
+    """Return any id or name as one segment of a path; servers decode a slash before they split the path.
+
+    Raises:
+        TypeError: it is no text.
+    """
+    if not isinstance(id, str):
+        raise TypeError(f"an id or a name is a text, not {id!r:.100}")
     return quote(id.replace("/", "%2F"), safe="", errors="replace").replace(".", "%2E") or "%20"

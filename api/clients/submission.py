@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
@@ -67,7 +68,17 @@ class Submission:
 
 
 def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:
-    return spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
+    """Return a spec as JSON.
+
+    Raises:
+        TypeError: it is neither a mapping nor a model, like the name of a file.
+    """
+    if isinstance(spec, BaseModel):
+        return spec.model_dump(mode="json", exclude_unset=True)
+    if not isinstance(spec, Mapping):
+        hint = "; read a file with json.loads(Path(…).read_text())" if isinstance(spec, str | Path) else ""
+        raise TypeError(f"a spec is a dict, an ExperimentSpec or a StudySpec, not {spec!r:.100}{hint}")
+    return dict(spec)
 
 
 def is_experiment(body: Mapping[str, Any]) -> bool:

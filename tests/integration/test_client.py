@@ -98,6 +98,28 @@ def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, 
     assert values.groupby(["experiment", "evaluations"])["fitness"].mean().notna().all()
 
 
+@pytest.mark.parametrize(
+    ("spec", "said"),
+    [
+        ("examples/smoke.json", "not 'examples/smoke.json'; read a file with json.loads"),
+        (Path("smoke.json"), "smoke.json'.; read a file with json.loads"),
+        ([], r"a spec is a dict, an ExperimentSpec or a StudySpec, not \[\]$"),
+        (None, "not None$"),
+    ],
+)
+def test_what_is_no_spec_is_not_sent(client: Client, network: InProcess, spec: Any, said: str) -> None:
+    for send in (client.submit, client.estimate, client.check):
+        with pytest.raises(TypeError, match=said):
+            send(spec)
+
+    assert network.asked == []
+
+
+def test_an_id_that_is_no_text_is_named(client: Client) -> None:
+    with pytest.raises(TypeError, match="an id or a name is a text, not 5"):
+        client.experiment(5)  # type: ignore[arg-type]
+
+
 def test_samples_come_whole_however_many_pages_they_are(
     client: Client, finish: Callable[[], None], network: InProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
