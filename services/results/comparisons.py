@@ -57,8 +57,8 @@ def compare(
 
     Raises:
         NotFound: an experiment does not exist.
-        InvalidSpec: fewer than two experiments, an experiment twice, a range that is empty or negative, or a share
-            of direct without one direct baseline.
+        InvalidSpec: fewer than two experiments, an experiment twice, a range that is empty, negative or beyond
+            all experiments, or a share of direct without one direct baseline.
     """
     if len(set(experiment_ids)) < max(2, len(experiment_ids)):
         message = f"a comparison needs two or more experiments, each once, not {len(experiment_ids)}"
@@ -72,8 +72,23 @@ def compare(
         message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
         raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
     compared = [_compared(row, values[row.id]) for row in rows]
+    if to_evaluations is not None:
+        _check_the_end(compared, to_evaluations)
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
     return compare_all(compared, first, final, margin=within, intervals=with_intervals)
+
+
+def _check_the_end(compared: Sequence[Compared], last: int) -> None:
+    """Refuse a last number of evaluations that no experiment with samples has: nothing would be compared.
+
+    Raises:
+        InvalidSpec: it is beyond all of them.
+    """
+    counts = [each.recorded.shape[1] for each in compared if not each.level]
+    most = max(1, *counts) - 1 if counts else last
+    if last > most:
+        message = f"no experiment has {last} real-world evaluations; permitted: 0 to {most}"
+        raise InvalidSpec([Violation("to_evaluations", last, message, f"0 to {most}")])
 
 
 def _compared(row: ExperimentRow, recorded: FloatArray) -> Compared:

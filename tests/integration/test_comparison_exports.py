@@ -144,6 +144,14 @@ def test_a_margin_is_given_once_and_is_above_0(ids: list[str], gaplab: Gaplab, s
         assert "is no margin above 0" in wrong.err.replace("\n│ ", "")
 
 
+def test_a_number_that_no_experiment_has_is_refused_with_those_they_have(ids: list[str], gaplab: Gaplab) -> None:
+    said = gaplab("compare", *ids, "--at", "50")
+
+    assert said.code == Exit.INVALID
+    assert said.err == "gaplab: to: no experiment has 50 real-world evaluations; permitted: 0 to 2\n"
+    assert gaplab("compare", *ids, "--at", "2").code == 0
+
+
 def test_a_range_that_is_none_is_refused_in_words(ids: list[str], gaplab: Gaplab) -> None:
     wrong, backwards, alone = (
         gaplab("compare", *ids, "--at", "late"), gaplab("compare", *ids, "--at", "2-1"), gaplab("compare", ids[0])
