@@ -32,4 +32,4 @@ def catalogue(
     elif name is None:
         console().print(*tables.catalogue(found), *tables.ignored(found), soft_wrap=True)
     else:
-        console().print(*tables.plugin(plugins[name]), soft_wrap=True)
+        console().print(*tables.plugin(plugins[name]), sep="\n", soft_wrap=True)

@@ -1,7 +1,8 @@
 """Tables and sentences for what the service answers."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
@@ -71,7 +72,7 @@ def plugin(found: PluginRead) -> list[Table | str]:
     """Return all that is known of a plug-in: summary, source, details and options."""
     lines = [f"[bold]{escape(found.name)}[/]", escape(found.summary), f"source: {escape(found.source)}"]
     lines += [escape(found.note)] if found.note else []
-    lines += [f"{name}: {escape(str(value))}" for name, value in found.details.items()]
+    lines += [f"{name}: {escape(_in_words(value))}" for name, value in found.details.items()]
     options = [
         (name, escape(str(schema.get("default", "-"))), escape(schema.get("description", "")))
         for name, schema in found.options.get("properties", {}).items()
@@ -126,6 +127,24 @@ def _repetition(found: RepetitionRead, iterations: int) -> tuple[str, ...]:
 def _plugin(found: PluginRead) -> tuple[str, ...]:
     name = found.name if found.available else f"{found.name} (not available)"
     return escape(name), escape(found.summary or found.note or ""), ", ".join(found.options.get("properties", {}))
+
+
+def _in_words(value: Any) -> str:  # noqa: ANN401 - JSON
+    """Return a detail of a plug-in without the signs of JSON: its name alone, other fields with their names."""
+    if isinstance(value, dict):
+        return ", ".join(each if name == "name" else f"{name} {each}" for name, each in _parts(value))
+    if isinstance(value, list):
+        return ("; " if any(isinstance(each, dict) for each in value) else ", ").join(map(_in_words, value)) or "none"
+    if value is None or isinstance(value, bool):
+        return {None: "none", True: "yes", False: "no"}[value]
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _parts(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield names and values in words; those of an inner object are in parentheses, and an empty one is left out."""
+    for name, value in fields.items():
+        if value != {}:
+            yield name, f"({_in_words(value)})" if isinstance(value, dict) else _in_words(value)
 
 
 def _effect(found: Sensitivity) -> tuple[str, ...]:

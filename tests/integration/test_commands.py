@@ -311,6 +311,17 @@ def test_all_about_one_plug_in(gaplab: Gaplab) -> None:
     assert "did you mean 'random'" in gaplab("catalogue", "randon").err
 
 
+def test_each_detail_of_a_plug_in_has_a_line_in_words(gaplab: Gaplab) -> None:
+    lines = gaplab("catalogue", "quadruped").out.splitlines()
+
+    assert lines[0] == "quadruped"
+    assert "controller: square_pulses, options (period_s 0.5)" in lines
+    assert "tunables: none" in lines
+    assert "function: no" in lines
+    assert any(line.startswith("sensors: roll, unit rad, noise 0.02; pitch, unit rad") for line in lines)
+    assert any(line.startswith("reading_times_s: 0.75, 1, 1.25") for line in lines)
+
+
 def test_ids_and_plug_ins_are_completed(url: str, study: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GAPLAB_URL", url)
     monkeypatch.setattr(completion, "PATIENCE_S", 60.0)
