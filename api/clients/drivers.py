@@ -44,10 +44,12 @@ def load(file: Path) -> Driver:
     """Return the driver of a file.
 
     Raises:
+        OSError: the file cannot be read.
         DriverBroken: the file cannot be imported, or has no complete class `Driver`.
     """
+    file.read_bytes()
     spec = importlib.util.spec_from_file_location(file.stem, file)
-    if spec is None or spec.loader is None or not file.exists():
+    if spec is None or spec.loader is None:
         raise DriverBroken(f"{file} is not a Python file")
     module = importlib.util.module_from_spec(spec)
     try:

@@ -125,6 +125,23 @@ def test_an_expected_excess_of_a_limit_is_told_before_a_person_or_a_driver_measu
     assert pending(sqlite_store)[0].state == "open"
 
 
+@pytest.mark.parametrize(
+    ("file", "code", "said"),
+    [
+        ("no.py", Exit.FILE, "no.py: No such file or directory"),
+        ("notes.txt", Exit.FAILED, "notes.txt is not a Python file"),
+    ],
+)
+def test_a_driver_that_is_no_file_is_told_like_other_missing_files(
+    gaplab: Gaplab, tmp_path: Path, file: str, code: Exit, said: str
+) -> None:
+    (tmp_path / "notes.txt").write_text("text")
+
+    answer = gaplab("drive", "e1", "--driver", str(tmp_path / file))
+
+    assert (answer.code, answer.err) == (code, f"gaplab: {tmp_path}/{said}\n")
+
+
 @pytest.mark.parametrize(("values", "wrong"), [(["0.2", "0.3", "nan"], "nan"), (["0.2", "-0.3", "abc"], "abc")])
 def test_a_value_that_is_no_number_is_named_with_its_place(
     sqlite_store: Store, gaplab: Gaplab, values: list[str], wrong: str
