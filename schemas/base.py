@@ -1,9 +1,11 @@
 """The base of every schema, and the bounded numbers they share."""
 
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic_core import PydanticCustomError
 
 SEED_LIMIT = 2**64
 
@@ -12,6 +14,19 @@ class Frozen(BaseModel):
     """Immutable data that refuses unknown fields, infinities and nan."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def from_name(value: object, field: str) -> object:
+    """Return a value where an object may be written as a name alone: the object, with the name in this field.
+
+    Raises:
+        PydanticCustomError: it is neither.
+    """
+    if isinstance(value, str):
+        return {field: value}
+    if not isinstance(value, Mapping | BaseModel):
+        raise PydanticCustomError("name_type", "Input should be a name or an object")
+    return value
 
 
 Count = Annotated[int, Field(strict=True, ge=1, le=10_000_000)]

@@ -23,6 +23,7 @@ PERMITTED = {
     "bool_type": "true or false",
     "dict_type": "an object",
     "model_type": "an object",
+    "name_type": "a name or an object",
     "dataclass_type": "an object",
     "model_attributes_type": "an object",
     "tuple_type": "a list",

@@ -7,7 +7,7 @@ from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from gaplab.schemas.base import Frozen, Real
+from gaplab.schemas.base import Frozen, Real, from_name
 
 LONGEST_NAME = 100
 """Largest number of characters of a plug-in's name."""
@@ -33,7 +33,7 @@ class Named(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _accept_a_bare_name(cls, value: object) -> object:
-        return {"name": value} if isinstance(value, str) else value
+        return from_name(value, "name")
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Seed
+from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Seed, from_name
 from gaplab.schemas.measurements import KnownSample
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.safety import Beyond, LimitsSpec
@@ -47,7 +47,7 @@ class BudgetSpec(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _accept_a_bare_preset(cls, value: object) -> object:
-        return {"preset": value} if isinstance(value, str) else value
+        return from_name(value, "preset")
 
 
 RealityKind = Literal["simulated", "physical"]
