@@ -65,7 +65,10 @@ def write_skeleton(kind: str, name: str, folder: Path) -> Path:
 
 
 def check_file(file: Path) -> Iterator[CheckedPlugin]:
-    """Import a file as if its folder were a plug-in folder, and yield each of its plug-ins, checked.
+    """Import a file, and yield each of its plug-ins, checked.
+
+    The file can import others of its folder and of the plug-in folders. Outside the plug-in folders, no other file is
+    imported.
 
     Args:
         file: a module, or the folder of a package.
@@ -78,7 +81,11 @@ def check_file(file: Path) -> Iterator[CheckedPlugin]:
     if not path.exists():
         raise FileNotFoundError(2, "there is no such file", str(file))
     module = f"{path.name}/" if path.is_dir() else path.name
-    external_plugins.set_folders((path.parent, *(each for each in external_plugins.folders() if each != path.parent)))
+    others = external_plugins.folders()
+    if path.parent in others:
+        external_plugins.set_folders(others)
+    else:
+        external_plugins.set_folders((path.parent, *others), only=path.name.removesuffix(".py"))
     found = False
     for kind, registry in REGISTRIES.items():
         own = [plugin for plugin in registry.values() if (external_plugins.file_of(plugin) or "").startswith(module)]

@@ -35,13 +35,29 @@ class Loaded:
     unusable: tuple[Unusable, ...] = ()
 
 
-def set_folders(folders: tuple[Path, ...]) -> None:
-    """Set the plug-in folders; their modules are imported again when they are next needed."""
+class _Package(ModuleType):
+    """The package of external plug-ins.
+
+    Attributes:
+        only: name of the only module that is imported, from the first folder; None: all are imported, from all.
+    """
+
+    def __init__(self, folders: tuple[Path, ...], only: str | None) -> None:
+        super().__init__(PACKAGE, "External plug-ins.")
+        self.__path__ = [str(folder) for folder in folders]
+        self.only = only
+
+
+def set_folders(folders: tuple[Path, ...], only: str | None = None) -> None:
+    """Set the plug-in folders; their modules are imported again when they are next needed.
+
+    Args:
+        folders: the folders.
+        only: name of a module of the first folder; the others are imported only if this one imports them.
+    """
     for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
         del sys.modules[name]
-    package = ModuleType(PACKAGE, "External plug-ins.")
-    package.__path__ = [str(folder) for folder in folders]
-    sys.modules[PACKAGE] = package
+    sys.modules[PACKAGE] = _Package(folders, only)
     _load.cache_clear()
     invalidate_caches()
 
@@ -96,21 +112,29 @@ def file_of(plugin: type) -> str | None:
 
 
 @lru_cache(maxsize=1)
-def _load(_package: ModuleType | None) -> Loaded:
-    places: dict[str, list[Path]] = {}
-    for folder in folders():
-        for info in iter_modules([str(folder)]):
-            places.setdefault(info.name, []).append(
-                folder / info.name / "__init__.py" if info.ispkg else folder / f"{info.name}.py"
-            )
+def _load(package: ModuleType | None) -> Loaded:
+    only = package.only if isinstance(package, _Package) else None
     modules, unusable = list[ModuleType](), list[Unusable]()
-    for name, paths in sorted(places.items()):
+    for name, paths in sorted(_places(only).items()):
         try:
             modules += _imported(name, paths)
         except PluginBroken as error:
             file = f"{name}/__init__.py" if paths[0].name == "__init__.py" else f"{name}.py"
             unusable += from_file(paths[0], file, str(error))
+    if only is not None:
+        modules = [module for name, module in list(sys.modules.items()) if name.rpartition(".")[0] == PACKAGE]
     return Loaded(tuple(modules), tuple(unusable))
+
+
+def _places(only: str | None) -> dict[str, list[Path]]:
+    """Return the files of each module to import, by its name; without `only`, a name may be in several folders."""
+    places: dict[str, list[Path]] = {}
+    for folder in folders() if only is None else folders()[:1]:
+        for info in iter_modules([str(folder)]):
+            if only in {None, info.name}:
+                file = folder / info.name / "__init__.py" if info.ispkg else folder / f"{info.name}.py"
+                places.setdefault(info.name, []).append(file)
+    return places
 
 
 def _imported(name: str, paths: list[Path]) -> Iterator[ModuleType]:

@@ -125,6 +125,33 @@ def test_a_file_that_cannot_be_used_says_why(tmp_path: Path) -> None:
         list(check_file(tmp_path / "absent.py"))
 
 
+@pytest.mark.usefixtures("restored")
+def test_a_check_runs_no_file_that_the_checked_one_does_not_import(tmp_path: Path) -> None:
+    plugins, drafts = tmp_path / "plugins", tmp_path / "drafts"
+    file = write_skeleton("strategy", "my_strategy", drafts)
+    write_skeleton("strategy", "my_strategy", plugins)
+    file.write_text(f"{file.read_text()}\nfrom gaplab_plugins.beside import X  # noqa\n")
+    (drafts / "beside.py").write_text("X = 1\n")
+    (drafts / "analysis.py").write_text(f"open({str(tmp_path / 'moved')!r}, 'w').write('the robot')\n")
+    external_plugins.set_folders((plugins,))
+
+    (found,) = check_file(file)
+
+    assert found.name == "my_strategy"
+    assert found.passes
+    assert not (tmp_path / "moved").exists()
+
+
+@pytest.mark.usefixtures("restored")
+def test_a_check_knows_the_plug_ins_of_the_files_that_the_checked_one_imports(tmp_path: Path) -> None:
+    robot = write_skeleton("robot", "my_robot", tmp_path)
+    write_skeleton("controller", "my_controller", tmp_path)
+    robot.write_text(f"{robot.read_text()}\nfrom gaplab_plugins import my_controller  # noqa\n")
+
+    assert [found.name for found in check_file(robot)] == ["my_robot"]
+    assert "my_controller" in REGISTRIES["controller"]
+
+
 def test_a_tuner_that_divides_its_evaluations_by_nothing_is_told() -> None:
     class Careless(SearchTuner):
         """A tuner."""
