@@ -2,13 +2,8 @@
 
 from numpy.random import default_rng
 
-from gaplab.api.clients.motions import DriverMotion
-from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.arrays import frozen
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.robots import robots
-from gaplab.services.specs.assembly import engine_of
-from gaplab.services.specs.default_engines import default_engine
+from gaplab import DriverMotion
+from gaplab.plugins import Motion, PluginRef, engines, frozen, robots
 
 
 class Driver:
@@ -17,7 +12,7 @@ class Driver:
     def connect(self) -> None:
         """Connect once, before the first run: here, to a simulation in place of a serial port."""
         self.robot = robots.create(PluginRef(name="quadruped"))
-        self.engine = engine_of(PluginRef(name=default_engine(self.robot)))
+        self.engine = engines["pybullet" if engines["pybullet"].available() else "mujoco"]()
         self.noise = default_rng()
 
     def run(self, motion: DriverMotion) -> float:
@@ -26,6 +21,9 @@ class Driver:
         `motion.times_s` has the times at which targets change, `motion.targets` a row of targets for each: one for
         each name in `motion.actuators`, in its unit in `motion.units`. The run ends at `motion.observe_s[-1]`.
         """
+        expected = tuple(joint.name for joint in self.robot.world.actuators)
+        if motion.actuators != expected:
+            raise ValueError(f"the motion is for {motion.actuators}, but the {self.robot.name} has {expected}")
         sent = Motion(frozen(motion.times_s), frozen(motion.targets), frozen(motion.observe_s))
         path = self.engine.rollouts([self.robot.world], [sent])
         return float(self.robot.fitness(path)[0, 0]) + self.noise.normal(0, 0.005)

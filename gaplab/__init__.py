@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from gaplab.api.clients.errors import ServiceError as ServiceError
     from gaplab.api.clients.errors import ServiceUnreachable as ServiceUnreachable
     from gaplab.api.clients.figures import Figure as Figure
+    from gaplab.api.clients.motions import DriverMotion as DriverMotion
     from gaplab.api.process.errors import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
     from gaplab.samples import InvalidSamples as InvalidSamples
@@ -39,6 +40,7 @@ _MODULES = {
     "Client": "gaplab.api.clients.client",
     "Comparisons": "gaplab.api.clients.comparisons",
     "CommandError": "gaplab.api.process.errors",
+    "DriverMotion": "gaplab.api.clients.motions",
     "ExperimentFailed": "gaplab.api.clients.errors",
     "ExtraMissing": "gaplab.api.clients.errors",
     "Figure": "gaplab.api.clients.figures",

@@ -24,6 +24,7 @@ from gaplab.services.core.motions import Motion as Motion
 from gaplab.services.core.motions import Trajectory as Trajectory
 from gaplab.services.core.optimizers.base import Optimizer as Optimizer
 from gaplab.services.core.optimizers.base import Population as Population
+from gaplab.services.core.robots import robots as robots
 from gaplab.services.core.robots.base import Robot as Robot
 from gaplab.services.core.robots.base import Sensors as Sensors
 from gaplab.services.core.scoring import scaled_uniqueness_penalty as scaled_uniqueness_penalty
@@ -60,4 +61,5 @@ from gaplab.services.core.world import Motor as Motor
 from gaplab.services.core.world import Noise as Noise
 from gaplab.services.core.world import PDMotor as PDMotor
 from gaplab.services.core.world import World as World
+from gaplab.services.engines import engines as engines
 from gaplab.services.engines.base import Engine as Engine

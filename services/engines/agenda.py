@@ -7,6 +7,7 @@ import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.controllers.actuation import middles
+from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.motions import Loop, Motion
 from gaplab.services.core.world import PDMotor, World
 
@@ -29,6 +30,18 @@ def steps_at(times_s: FloatArray, time_step_s: float) -> list[int]:
     """Return the time steps at which times `(k,)` are."""
     steps: list[int] = np.rint(times_s / time_step_s).astype(int).tolist()
     return steps
+
+
+def check_targets(motion: Motion, world: World) -> None:
+    """Refuse a motion that has not one target for each actuator; a world without actuators ignores targets.
+
+    Raises:
+        PluginBroken: the motion is of another robot.
+    """
+    columns, names = motion.targets.shape[1], [joint.name for joint in world.actuators]
+    if names and columns != len(names):
+        msg = f"the motion has {columns} targets at a time, but the robot has {len(names)} actuators: "
+        raise PluginBroken(f"{msg}{', '.join(names)}; give one target for each, in this order")
 
 
 def delays(world: World) -> list[int]:
@@ -88,9 +101,13 @@ class MotionAgenda:
     Args:
         motion: motion.
         world: world that it runs in.
+
+    Raises:
+        PluginBroken: its targets are not those of the world's actuators.
     """
 
     def __init__(self, motion: Motion, world: World) -> None:
+        check_targets(motion, world)
         changed = np.vstack([np.ones_like(motion.targets[:1], bool), motion.targets[1:] != motion.targets[:-1]])
         rows, actuators = np.nonzero(changed)
         steps = steps_at(motion.times_s[rows], world.time_step_s)

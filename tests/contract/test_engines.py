@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.motions import Motion, Trajectory, open_loop
 from gaplab.services.core.noise import disturbed
 from gaplab.services.core.robot_library import IMPORTED
@@ -301,6 +302,16 @@ def test_physics_that_blows_up_is_nan_and_harms_no_later_rollout(embodied: Pair,
 
     assert np.all(np.isnan(blown_up))
     assert np.array_equal(embodied.roll(), expected)
+
+
+def test_a_motion_of_another_robot_is_refused_with_the_names_of_the_actuators(embodied: Pair) -> None:
+    world = embodied.robot.world
+    motion = open_loop(embodied.robot.motion(embodied.robot.known))
+    names = ", ".join(joint.name for joint in world.actuators)
+
+    for targets in (motion.targets[:, :1], np.hstack([motion.targets, motion.targets])):
+        with pytest.raises(PluginBroken, match=f"has {targets.shape[1]} targets at a time, but .*: {names}; give"):
+            embodied.engine.rollouts([world], [replace(motion, targets=targets)])
 
 
 def test_targets_that_are_no_numbers_give_nan_and_harm_no_later_rollout(embodied: Pair) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.world import World
+from gaplab.services.engines.agenda import check_targets
 from gaplab.services.engines.mujoco.model import Structure
 from gaplab.services.engines.mujoco.models import Delays
 from gaplab.services.engines.stepping import consecutive
@@ -27,17 +28,21 @@ class Controls:
         joints = [world.joints.index(joint) for joint in world.actuators]
         self._dofs = consecutive(structure.dofs[joints].tolist())
         self.width = int(structure.model.nv)
-        self._step_s = world.time_step_s
+        self._world = world
         self._memory = np.zeros(0)
 
     def of(self, motions: Sequence[Motion], steps: int, delays: Sequence[Delays | None]) -> FloatArray:
         """Return `(n · m, steps, degrees of freedom)`: the targets of n motions in each step, in m worlds.
 
         They are in the memory of the last call if it is large enough; what no motor drives stays zero in it.
+
+        Raises:
+            PluginBroken: the targets of a motion are not those of the actuators.
         """
         controls, now = self.room(len(motions) * len(delays), steps), np.arange(steps)
         for motion, each in zip(motions, controls.reshape(len(motions), len(delays), steps, self.width), strict=True):
-            at = np.rint(motion.times_s / self._step_s).astype(int)
+            check_targets(motion, self._world)
+            at = np.rint(motion.times_s / self._world.time_step_s).astype(int)
             for late, columns in grouped(delays):
                 targets = held(at, motion.targets, now, late)
                 for column in columns:
