@@ -47,6 +47,9 @@ class SensorsRead(Frozen):
         description="standard deviation of each sensor's noise, in its unit", examples=[(0.02, 0.005)]
     )
     times_s: tuple[float, ...] = Field(description="seconds from the start of a rollout", examples=[(0.75, 1.0)])
+    needed: bool = Field(
+        default=False, description="true: an answer without readings is refused, since the experiment tunes on them"
+    )
 
 
 class SimulatorRead(Frozen):

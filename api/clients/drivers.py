@@ -17,6 +17,7 @@ from typing import Any, Protocol
 
 from gaplab.api.clients.driving import TakenRequest
 from gaplab.api.clients.motions import DriverMotion
+from gaplab.schemas.records import SensorsRead
 
 
 class MeasurementFailed(Exception):
@@ -34,7 +35,11 @@ class Driver(Protocol):
         """Connect to the robot."""
 
     def run(self, motion: DriverMotion) -> float | tuple[float, Any]:
-        """Run a motion once; return the fitness in the robot's unit, or fitness and readings (times × sensors)."""
+        """Run a motion once; return the fitness in the robot's unit, or `(fitness, readings)`.
+
+        Readings have a row for each time at which the sensors are read, and a column for each sensor, in its unit; None
+        where it failed. `client.experiment(ID).sensors` has times, names and units in this order.
+        """
 
     def stop(self) -> None:
         """Stop the robot at once; called from another thread if a run takes too long."""
@@ -76,13 +81,14 @@ def measure(task: TakenRequest, driver: Driver, limit_s: float | None, tell: Cal
     Raises:
         DriverBroken: the driver hangs or answers nonsense; the request is released.
     """
-    limit_s = limit_s or 60.0 + 10.0 * task.motion.observe_s[-1]
+    limit_s, sensors = limit_s or 60.0 + 10.0 * task.motion.observe_s[-1], task.sensors
     found = list(task.known)
     if found:
         tell(f"{len(found)} of {task.repeats} repeats are in the journal already")
     try:
         while len(found) < task.repeats:
             value, readings = _checked(_limited(driver, task.motion, limit_s))
+            _check_readings(readings, sensors)
             task.note(value, readings)
             found.append((value, readings))
             tell(f"repeat {len(found)} of {task.repeats}: {value:.6g} {task.request.unit}")
@@ -138,3 +144,30 @@ def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a dri
     if not isfinite(value):
         raise DriverBroken(f"the driver's run returned {value}; raise MeasurementFailed if nothing was measured")
     return value, readings.tolist() if hasattr(readings, "tolist") else readings
+
+
+def _check_readings(readings: Any, sensors: SensorsRead | None) -> None:  # noqa: ANN401 - whatever a driver returns
+    """Refuse after the first repeat what the service would refuse after the last.
+
+    Raises:
+        DriverBroken: readings are missing though the experiment tunes on them, or have another shape than the sensors.
+    """
+    if sensors is None or (readings is None and not sensors.needed):
+        return
+    times_s, names = sensors.times_s, sensors.names
+    if not names:
+        raise DriverBroken("the driver's run returned readings, but the robot has no sensors: return the fitness alone")
+    rows = f"{len(times_s)} rows of {len(names)} numbers"
+    shape = f"{rows}: {', '.join(names)}, at {len(times_s)} times from {times_s[0]:g} to {times_s[-1]:g} s"
+    if readings is None:
+        msg = f"return (fitness, readings), {shape}; or answer with `gaplab traces REQUEST FILE --answer`"
+        raise DriverBroken(f"the driver's run returned no readings, but the experiment tunes on them: {msg}")
+    if not _has_shape(readings, len(times_s), len(names)):
+        raise DriverBroken(f"the driver's run returned readings of another shape than the sensors'; return {shape}")
+
+
+def _has_shape(readings: Any, rows: int, columns: int) -> bool:  # noqa: ANN401 - whatever a driver returns
+    try:
+        return len(readings) == rows and all(len(row) == columns for row in readings)
+    except TypeError:
+        return False

@@ -15,7 +15,7 @@ from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.motions import DriverMotion, motion_of
 from gaplab.api.clients.records import Records
 from gaplab.schemas.measurements import AnswerRead, RequestRead, RequestState
-from gaplab.schemas.records import Page
+from gaplab.schemas.records import Page, SensorsRead
 
 WAIT_S = 20.0
 """Longest wait of the service for a request; the driver then asks again."""
@@ -50,6 +50,15 @@ class TakenRequest:
             ServiceError: the controller observes while it acts, or the robot has no actuators: run the genome.
         """
         return self._driving.motion(self.request)
+
+    @cached_property
+    def sensors(self) -> SensorsRead | None:
+        """The sensors of the robot; None if the service does not know them.
+
+        Raises:
+            ServiceError: the experiment was deleted.
+        """
+        return self._driving.sensors(self.request)
 
     @property
     def id(self) -> str:
@@ -204,6 +213,10 @@ class Driving:
     def motion(self, request: RequestRead) -> DriverMotion:
         """Return the motion that a request asks for."""
         return motion_of(self._connection, request.id)
+
+    def sensors(self, request: RequestRead) -> SensorsRead | None:
+        """Return the sensors of the robot that a request is about."""
+        return self._records.experiment(request.experiment).sensors
 
     def _release(self, request: RequestRead) -> None:
         with suppress(ServiceError, ServiceUnreachable):

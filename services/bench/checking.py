@@ -13,6 +13,8 @@ from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.queries import attachments
 from gaplab.services.store.session import Session
 
+_REMEDY = "let the driver return (fitness, readings), or use `gaplab traces REQUEST FILE --answer`"
+
 
 def check_values(
     spec: ResolvedSpec,
@@ -34,7 +36,7 @@ def check_values(
         violations += readings_violations(readings, None if values is None else len(values), robot.sensors)
     if values is not None and not violations:
         discrepancy = discrepancy_of(spec.model_dump(include={"discrepancy"}))
-        violations += lack_violations(discrepancy, robot.sensors, values, readings)
+        violations += lack_violations(discrepancy, robot.sensors, values, readings, _REMEDY)
     if violations:
         raise InvalidSpec(violations)
 

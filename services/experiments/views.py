@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, Progress, RepetitionRead, StudyRead
+from gaplab.services.core.stored_specs import discrepancy_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.fitness import best_of, fitness_of
@@ -15,6 +16,7 @@ from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.progress import caveat_of, mean_best, progress_of, study_caveat_of
 from gaplab.services.experiments.time_left import Span
 from gaplab.services.plugins.refusals import tells_unavailable
+from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.robots import sensors
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries import attempts
@@ -42,7 +44,10 @@ def view_experiments(
 
 def with_sensors(experiment: ExperimentRead) -> ExperimentRead:
     """Return the experiment with the sensors of its robot."""
-    return experiment.model_copy(update={"sensors": sensors(checked(experiment.spec))})
+    found = sensors(checked(experiment.spec))
+    if found is not None:
+        found = found.model_copy(update={"needed": needs_readings(discrepancy_of(experiment.spec), found)})
+    return experiment.model_copy(update={"sensors": found})
 
 
 def view_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = False) -> tuple[StudyRead, ...]:

@@ -9,6 +9,8 @@ from gaplab.services.core.measured_values import sample_violations
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.specs.measured import lack_violations
 
+_REMEDY = "give the readings of each value in `readings`"
+
 
 def bench_violations(spec: ExperimentSpec, robot: Robot, discrepancy: Discrepancy) -> Iterator[Violation]:
     """Yield limits that nothing can check, a refusal without limits, and samples that cannot be, or teach nothing."""
@@ -17,7 +19,8 @@ def bench_violations(spec: ExperimentSpec, robot: Robot, discrepancy: Discrepanc
     yield from _limit_violations(spec, robot)
     for place, sample in enumerate(spec.reality.samples):
         found = list(sample_violations(sample, robot))
-        for violation in found or lack_violations(discrepancy, robot.sensors, sample.values, sample.readings):
+        lacks = lack_violations(discrepancy, robot.sensors, sample.values, sample.readings, _REMEDY)
+        for violation in found or lacks:
             yield violation.moved("", f"/reality/samples/{place}")
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.results import SensorsRead
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Readings, frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import Violation
@@ -32,15 +33,33 @@ def outcome_of(
     return Outcome(fitness, _standardised(sensors, readings)), repeats
 
 
+def needs_readings(discrepancy: Discrepancy, sensors: SensorsRead) -> bool:
+    """Return whether the discrepancy cannot compare a sample without readings."""
+    times_s = frozen(np.repeat(sensors.times_s, len(sensors.names)))
+    return discrepancy.senses and bool(times_s.size) and discrepancy.lack(times_s * np.nan, times_s) is not None
+
+
 def lack_violations(
-    discrepancy: Discrepancy, sensors: Sensors, values: Sequence[float], readings: Sequence[Any] | None
+    discrepancy: Discrepancy,
+    sensors: Sensors,
+    values: Sequence[float],
+    readings: Sequence[Any] | None,
+    remedy: str,
 ) -> Iterator[Violation]:
-    """Yield that measured values, as of `outcome_of`, lack what the discrepancy compares: every simulator would fit."""
+    """Yield that measured values, as of `outcome_of`, lack what the discrepancy compares: every simulator would fit.
+
+    Args:
+        discrepancy: of the experiment.
+        sensors: of the robot.
+        values: fitness of each repeat.
+        readings: `(r, times, sensors)`, or None.
+        remedy: what to do.
+    """
     if not (discrepancy.senses and sensors.size):
         return
     lack = discrepancy.lack(outcome_of(sensors, values, readings)[0].readings, sensors.reading_times_s)
     if lack is not None:
-        message = f"the discrepancy {discrepancy.name} compares nothing else, and there is none"
+        message = f"the discrepancy {discrepancy.name} compares nothing else, and there is none; {remedy}"
         yield Violation("/readings", None if readings is None else "without", f"{lack} is missing: {message}", lack)
 
 

@@ -57,7 +57,7 @@ def test_a_submitted_experiment_exists_at_its_location_with_every_default_filled
     assert answer.status_code == 202
     found = api.get(answer.headers["Location"])
     sensors = found.json()["sensors"]  # answers to changes do without
-    assert "roll" in sensors["names"]
+    assert ("roll" in sensors["names"], sensors["needed"]) == (True, False)
     assert found.json() == answer.json() | {"sensors": sensors}
     assert found.json()["state"] == "QUEUED"
     assert found.json()["spec"]["budget"]["controller_evaluations"] == 10_000

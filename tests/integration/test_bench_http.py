@@ -317,6 +317,16 @@ def test_errors_of_simulators_count_known_samples(client: Client) -> None:
     assert [point.error.n for point in client.misfit(experiment.id).points] == [1, 1, 1]
 
 
+def test_a_driver_is_told_before_the_first_run_that_readings_are_needed(client: Client, store: Store) -> None:
+    experiment = client.submit(SPEC | {"robot": "quadruped", "discrepancy": "readings", "reality": REALITY})
+    compute(store)
+
+    task = next(client.requests(experiment.id))
+
+    assert task.sensors is not None
+    assert (task.sensors.names[0], task.sensors.needed) == ("roll", True)
+
+
 def test_an_answer_may_be_computed_from_traces(client: Client, store: Store, tmp_path: Path) -> None:
     physical = {"kind": "physical", "probes": "each", "repeats": 2}
     spec = SPEC | {"robot": "quadruped", "engine": "pybullet", "strategy": "random", "reality": physical}

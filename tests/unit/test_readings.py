@@ -10,6 +10,7 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.bench.checking import check_values
 from gaplab.services.core.answers import Answers, pack
 from gaplab.services.core.arrays import frozen
+from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.readings import Readings, ReadingsOptions
 from gaplab.services.core.errors import InvalidSpec, PluginBroken
 from gaplab.services.core.loop import repetition
@@ -17,7 +18,9 @@ from gaplab.services.core.robots.base import Sensors
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Measured, Probed
 from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.specs.robots import sensors
 
 SENSORS = Sensors(("roll", "x"), ("rad", "m"), frozen([0.1, 2.0]), frozen([1.0, 2.0, 3.0]))
 
@@ -101,9 +104,9 @@ def test_what_lacks_the_readings_that_are_compared_is_refused(readings: Any) -> 
     """It would fit every simulator, so tuning would be random."""
     sample = {"genome": [0.5] * 24, "values": [0.4], "readings": readings}
 
-    with pytest.raises(InvalidSpec, match=f"^/reality/samples/0/readings: {TOLD}"):
+    with pytest.raises(InvalidSpec, match=f"^/reality/samples/0/readings: {TOLD}.*in `readings`$"):
         quadruped(discrepancy="readings", reality={"kind": "physical", "samples": [sample]})
-    with pytest.raises(InvalidSpec, match=f"^/readings: {TOLD}"):
+    with pytest.raises(InvalidSpec, match=f"^/readings: {TOLD}.*let the driver return .fitness, readings.*answer`$"):
         check_values(quadruped(discrepancy="readings", reality={"kind": "physical"}), (0.4,), readings, None)
 
     check_values(quadruped(reality={"kind": "physical", "samples": [sample]}), (0.4,), readings, None)
@@ -169,3 +172,12 @@ def test_answers_with_readings_go_through_checkpoints() -> None:
 
     assert np.array_equal(first, again)
     assert calls == [2, 1]
+
+
+@pytest.mark.parametrize(("discrepancy", "needed"), [("readings", True), ("squared_fitness", False)])
+def test_an_experiment_says_whether_its_answers_need_readings(discrepancy: str, needed: bool) -> None:
+    spec = quadruped(discrepancy=discrepancy, reality={"kind": "physical"})
+    found = sensors(spec)
+
+    assert found is not None
+    assert needs_readings(discrepancies.create(spec.discrepancy), found) is needed

@@ -680,6 +680,7 @@ declare namespace Api {
     units: Array<string>;
     noises: Array<number>;
     times_s: Array<number>;
+    needed: boolean;
   }
   interface SettingRead {
     pointer: string;

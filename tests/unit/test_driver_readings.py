@@ -1,0 +1,83 @@
+"""A driver's readings are checked after each repeat, before anything is journalled."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gaplab.api.clients.drivers import DriverBroken, measure
+from gaplab.schemas.records import SensorsRead
+
+SENSORS = SensorsRead(names=("roll", "height"), units=("rad", "m"), noises=(0.02, 0.005), times_s=(0.5, 1.0, 1.5))
+TABLE = [[0.1, 0.2], [0.1, None], [0.1, 0.2]]
+
+
+class Task(SimpleNamespace):
+    """A request for two repeats."""
+
+    def __init__(self, sensors: SensorsRead | None) -> None:
+        motion, request = SimpleNamespace(observe_s=(3.0,)), SimpleNamespace(unit="m/s")
+        super().__init__(repeats=2, known=[], motion=motion, request=request, sensors=sensors, noted=[], told=[])
+
+    def note(self, value: float, readings: Any) -> None:
+        self.noted.append((value, readings))
+
+    def tell(self, values: list[float], readings: Any) -> None:
+        self.told.append((values, readings))
+
+
+class Driver:
+    """Returns always the same."""
+
+    def __init__(self, answer: Any) -> None:
+        self.answer, self.runs = answer, 0
+
+    def connect(self) -> None:
+        """Do nothing."""
+
+    def run(self, motion: Any) -> Any:
+        self.runs += 1
+        return self.answer
+
+    def stop(self) -> None:
+        """Do nothing."""
+
+
+@pytest.mark.parametrize(
+    ("sensors", "answer", "said"),
+    [
+        (
+            SENSORS.model_copy(update={"needed": True}),
+            0.4,
+            "no readings, but the experiment tunes on them: return (fitness, readings), 3 rows of 2 numbers: roll, "
+            "height, at 3 times from 0.5 to 1.5 s; or answer with `gaplab traces REQUEST FILE --answer`",
+        ),
+        (SENSORS, (0.4, TABLE[:2]), "readings of another shape than the sensors'; return 3 rows of 2 numbers"),
+        (SENSORS, (0.4, [0.1, 0.2, 0.3]), "readings of another shape"),
+        (SENSORS.model_copy(update={"names": (), "times_s": ()}), (0.4, TABLE), "the robot has no sensors"),
+    ],
+)
+def test_a_wrong_answer_is_refused_after_the_first_run(sensors: SensorsRead, answer: Any, said: str) -> None:
+    task, driver = Task(sensors), Driver(answer)
+
+    with pytest.raises(DriverBroken) as refused:
+        measure(task, driver, None, lambda sentence: None)  # type: ignore[arg-type]
+
+    assert said in str(refused.value)
+    assert (driver.runs, task.noted, task.told) == (1, [], [])
+
+
+@pytest.mark.parametrize(
+    ("sensors", "answer", "told"),
+    [
+        (SENSORS.model_copy(update={"needed": True}), (0.4, TABLE), [([0.4, 0.4], [TABLE, TABLE])]),
+        (SENSORS, 0.4, [([0.4, 0.4], None)]),
+        (None, 0.4, [([0.4, 0.4], None)]),
+    ],
+)
+def test_what_fits_is_told_after_the_last_run(sensors: SensorsRead | None, answer: Any, told: Any) -> None:
+    task, driver = Task(sensors), Driver(answer)
+
+    measure(task, driver, None, lambda sentence: None)  # type: ignore[arg-type]
+
+    assert (driver.runs, task.told) == (2, told)
