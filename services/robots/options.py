@@ -63,4 +63,11 @@ class ImportOptions(Frozen):
     @field_validator("turn", mode="before")
     @classmethod
     def _split_a_text(cls, value: object) -> object:
-        return value.split(",") if isinstance(value, str) else value
+        if not isinstance(value, str):
+            return value
+        try:
+            roll, pitch, yaw = map(float, value.split(","))
+        except ValueError as error:
+            msg = f"turn must be three angles, roll,pitch,yaw in rad, like 1.5708,0,0, not {value}"
+            raise ValueError(msg) from error
+        return roll, pitch, yaw

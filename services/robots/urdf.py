@@ -15,6 +15,7 @@ from lxml import etree
 
 from gaplab.services.robots.notes import Notes
 from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.urdf_structure import check_structure
 from gaplab.services.robots.urdf_values import check_values
 from gaplab.services.robots.xml import Element, child, tree
 
@@ -53,6 +54,7 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
         InvalidRobot: a mesh is missing.
     """
     root = tree(text)
+    check_structure(root, notes)
     check_values(root, notes)
     notes.check()
     _lock(root, options.lock, notes)

@@ -21,11 +21,34 @@ _NUMBERS = {
 }
 """How many numbers an attribute has, by its element."""
 
-_AT_LEAST_0 = {("limit", "effort"), ("limit", "velocity"), ("dynamics", "damping"), ("dynamics", "friction")}
+_AT_LEAST_0 = {
+    ("mass", "value"),
+    ("inertia", "ixx"),
+    ("inertia", "iyy"),
+    ("inertia", "izz"),
+    ("limit", "effort"),
+    ("limit", "velocity"),
+    ("dynamics", "damping"),
+    ("dynamics", "friction"),
+}
+
+_MOVING = {"revolute", "continuous", "prismatic"}
+
+_ABOVE_0 = {
+    ("box", "size"),
+    ("sphere", "radius"),
+    ("cylinder", "radius"),
+    ("cylinder", "length"),
+    ("capsule", "radius"),
+    ("capsule", "length"),
+}
+"""Sizes of shapes that touch."""
+
+_REQUIRED = _ABOVE_0 | {("mass", "value"), *(("inertia", name) for name in _NUMBERS["inertia"])}
 
 
 def check_values(root: Element, notes: Notes) -> None:
-    """Refuse what is no finite number, negative efforts and frictions, and limits in the wrong order; name each line.
+    """Refuse what is missing, no finite number or out of its range, and limits in the wrong order; name each line.
 
     A joint whose limits are equal is free in MuJoCo, which is noted.
     """
@@ -34,16 +57,32 @@ def check_values(root: Element, notes: Notes) -> None:
             _check_limits(joint, limit, notes)
     for element in root.iter(*_NUMBERS):
         for name, count in _NUMBERS[element.tag].items():
-            given = element.get(name)
-            if given is not None and (reason := _wrong(element, name, given, count)):
-                notes.refuse(f"line {element.sourceline}: {_owner(element)}{element.tag} {name} {given!r} is {reason}")
+            if reason := _wrong(element, name, element.get(name), count):
+                notes.refuse(f"line {element.sourceline}: {_owner(element)}{element.tag} {reason}")
 
 
-def _wrong(element: Element, name: str, given: str, count: int) -> str | None:
+def _wrong(element: Element, name: str, given: str | None, count: int) -> str | None:
+    """Return what is wrong with an attribute, beginning with its name; None if nothing."""
+    what, is_used = (element.tag, name), _is_used(element)
+    if given is None:
+        return f"has no {name}" if what in _REQUIRED and is_used else None
     found = list(_parsed(given))
+    reason = None
     if len(found) != count or not all(map(math.isfinite, found)):
-        return f"not {count} finite numbers" if count > 1 else "no finite number"
-    return "below 0" if (element.tag, name) in _AT_LEAST_0 and found[0] < 0 else None
+        reason = f"not {count} finite numbers" if count > 1 else "no finite number"
+    elif what in _AT_LEAST_0 and found[0] < 0:
+        reason = "below 0"
+    elif what in _ABOVE_0 and is_used and min(found) <= 0:
+        reason = f"not {count} numbers above 0" if count > 1 else "not above 0"
+    elif what == ("axis", "xyz") and not any(found) and element.getparent().get("type") in _MOVING:
+        reason = "no direction; give one like '0 1 0'"
+    return reason and f"{name} {given!r} is {reason}"
+
+
+def _is_used(element: Element) -> bool:
+    """Return whether an element is of a link's inertial or collision, and not of an extension or of what is seen."""
+    around = {each.tag for each in element.iterancestors()}
+    return "link" in around and not around.isdisjoint({"inertial", "collision"}) and "gazebo" not in around
 
 
 def _parsed(given: str) -> Iterator[float]:

@@ -90,6 +90,8 @@ def test_a_refusal_names_every_reason_and_writes_nothing(gaplab: Gaplab, tmp_pat
     ).replace("│", "").replace("  ", " ")
     assert gaplab("robot", "import", "x", "-s", "colour=red").code == 2
     assert gaplab("robot", "import", "x", "--start", "knee").code == 2
+    turned = " ".join(gaplab("robot", "import", "x", "-s", "turn=1.57").err.replace("│", "").split())
+    assert "turn must be three angles, roll,pitch,yaw in rad, like 1.5708,0,0, not 1.57" in turned
     assert gaplab("robot", "import", str(tmp_path / "missing.urdf")).code == 7
 
 

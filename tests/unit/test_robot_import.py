@@ -516,6 +516,36 @@ def test_a_file_that_is_neither_is_refused(tmp_path: Path) -> None:
             "line 5: joint hinge has limits 2 to -1; the smaller is first",
         ),
         ('xyz="0 1 0"/>', 'xyz="0 1"/>', "line 4: joint hinge: axis xyz '0 1' is not 3 finite numbers"),
+        (
+            'xyz="0 1 0"/>',
+            'xyz="0 0 0"/>',
+            "line 4: joint hinge: axis xyz '0 0 0' is no direction; give one like '0 1 0'",
+        ),
+        ('mass value="1"', 'mass value="-1"', "line 1: link base: mass value '-1' is below 0"),
+        ('ixx=".1"', 'ixx="-.1"', "line 2: link base: inertia ixx '-.1' is below 0"),
+        ('mass value="1"', "mass", "line 1: link base: mass has no value"),
+        ('size=".1 .1 1"', 'size=".1 .1 -1"', "line 3: link arm: box size '.1 .1 -1' is not 3 numbers above 0"),
+        ('<box size=".1 .1 1"/>', '<sphere radius="0"/>', "line 3: link arm: sphere radius '0' is not above 0"),
+        (
+            'child link="arm"',
+            'child link="leg"',
+            "line 4: joint hinge: child link 'leg' is not in the file; links: base, arm",
+        ),
+        ('<parent link="base"/>', "", "line 4: joint hinge: no parent link is given; links: base, arm"),
+        ('child link="arm"', 'child link="base"', "line 4: joint hinge joins the link base to itself"),
+        (
+            'type="revolute"',
+            'type="revolut"',
+            "line 4: joint hinge has the type 'revolut'; permitted: revolute, continuous, prismatic, fixed",
+        ),
+        ('type="revolute"', "", "line 4: joint hinge has no type; permitted: revolute, continuous, prismatic, fixed"),
+        ('link name="arm"', 'link name="base"', "line 3: link base has the name of that in line 1; rename one of them"),
+        ('joint name="hinge"', "joint", "line 4: a joint has no name"),
+        (
+            "</robot>",
+            '<joint name="b" type="fixed"><parent link="base"/><child link="arm"/></joint></robot>',
+            "line 5: joint b: child link 'arm' is already that of joint hinge in line 4; a link has one parent",
+        ),
         ("</robot>", "<a>" * 300 + "</a>" * 300 + "</robot>", "Excessive depth"),
         ("</robot>", "<b></robot>", "mismatch: b line 5"),
     ],
@@ -529,6 +559,30 @@ def test_what_is_wrong_in_a_urdf_is_told_with_its_line(tmp_path: Path, before: s
         import_robot(file, ImportOptions())
 
     assert any(reason in each for each in raised.value.reasons)
+
+
+@pytest.mark.parametrize("mend", [False, True])
+def test_what_is_mended_is_no_slip_of_the_pen(tmp_path: Path, *, mend: bool) -> None:
+    two_links(tmp_path)
+    file = tmp_path / "two" / "urdf" / "two.urdf"
+    file.write_text(file.read_text().replace('mass value="1"', 'mass value="-2.0"'))
+
+    with pytest.raises(InvalidRobot) as raised:
+        import_robot(file, ImportOptions(mend=mend))
+
+    assert raised.value.reasons == ("line 1: link base: mass value '-2.0' is below 0",)
+
+
+def test_what_is_only_seen_or_of_an_extension_may_have_any_size(tmp_path: Path) -> None:
+    two_links(tmp_path)
+    file = tmp_path / "two" / "urdf" / "two.urdf"
+    seen = '<visual><geometry><sphere radius="0"/></geometry></visual></link>'
+    extension = (
+        "<gazebo><link><collision><geometry><box><size>1 1 1</size></box></geometry></collision></link></gazebo>"
+    )
+    file.write_text(file.read_text().replace("</link>", seen, 1).replace("</robot>", f"{extension}</robot>"))
+
+    assert [body.name for body in import_robot(file, ImportOptions()).robot.world.bodies] == ["base", "arm"]
 
 
 def test_a_file_that_is_neither_says_what_it_is(tmp_path: Path) -> None:
