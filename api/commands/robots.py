@@ -16,7 +16,7 @@ from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.tables import minute
 from gaplab.schemas.mistakes import sentence
-from gaplab.services.core.errors import InvalidRobot
+from gaplab.services.core.errors import InvalidRobot, InvalidSpec
 
 if TYPE_CHECKING:
     from gaplab.services.robots.importing import ImportedFile, MassRow
@@ -54,26 +54,47 @@ def import_file(  # noqa: PLR0913, PLR0917 - each is an option of the command
     ] = None,
     lock: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="joints to fix at zero; repeatable")] = None,
     settings: Annotated[list[str] | None, typer.Option("--set", "-s", metavar="NAME=VALUE", help=OTHERS)] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace the file that is written, if it exists")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Write a robot file from a URDF or an MJCF, and print what is lost or changed. Needs MuJoCo."""
-    from gaplab.services.robots.importing import import_robot
-
     flags = {"name": name, "fixed": fixed, "mend": mend, "motor": motor, "time_step_s": time_step, "lock": lock or []}
     chosen = _options({**flags, "start": _starts(start or []), **dict(map(_setting, settings or []))})
     try:
-        imported = import_robot(file, chosen)
+        imported = _imported(file, chosen)
     except InvalidRobot as error:
         typer.echo(f"gaplab: {file} cannot be imported:", err=True)
         for reason in error.reasons:
             typer.echo(f"  - {reason}", err=True)
         raise typer.Exit(Exit.INVALID) from error
     written = output or Path(f"{imported.robot.name}.json")
+    if written.exists() and not force:
+        raise FileExistsError(None, "a file of this name is there already; --force replaces it", str(written))
     written.write_text(json.dumps(imported.robot.content, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
     if as_json:
         print_json(_facts(imported, written))
     else:
         console().print(*_lines(imported, written), sep="\n", soft_wrap=True)
+
+
+def _imported(file: Path, options: "ImportOptions") -> "ImportedFile":
+    """Return the robot of a file, whose controller and task can drive and rate it.
+
+    Raises:
+        InvalidRobot: with every reason.
+    """
+    from gaplab.services.plugins import folders
+    from gaplab.services.robots.importing import import_robot
+    from gaplab.services.specs.robots import robot_of_file
+
+    folders.find()
+    imported = import_robot(file, options)
+    try:
+        robot_of_file(imported.robot)
+    except InvalidSpec as error:
+        reasons = (f"{each.pointer.removeprefix('/usual_')}: {each.message}" for each in error.violations)
+        raise InvalidRobot(reasons) from error
+    return imported
 
 
 def _options(given: dict[str, Any]) -> "ImportOptions":

@@ -9,16 +9,13 @@ from gaplab.schemas.plugin import PluginRead, PluginRef
 from gaplab.schemas.robots import RobotRead
 from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.spec import SharedSettings
-from gaplab.services.core import robot_library
-from gaplab.services.core.controllers import controllers
-from gaplab.services.core.errors import InvalidRobotFile, InvalidSpec, NotFound, Violation, gather, unknown_name
+from gaplab.services.core.errors import InvalidRobotFile, InvalidSpec, NotFound, Violation, unknown_name
 from gaplab.services.core.robot_files import RobotFile, read_robot_file, stored_robot_file
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.core.sample_tables import read_samples
-from gaplab.services.core.tasks import tasks
 from gaplab.services.specs.default_engines import default_engine
-from gaplab.services.specs.robots import Driven, robot_of
+from gaplab.services.specs.robots import Driven, ref_of_file, robot_of, robot_of_file
 from gaplab.services.store.models import RobotRow
 from gaplab.services.store.queries import robots as rows
 from gaplab.services.store.session import Session, Store, snapshot, transaction
@@ -48,12 +45,7 @@ def _checked(text: str | bytes) -> RobotFile:
     if file.name in robots:
         message = f"gaplab has a robot {file.name!r} already; choose another name"
         raise InvalidSpec([Violation("/name", file.name, message, "another name")])
-    gather(
-        lambda: controllers.create(file.usual_controller, "/usual_controller"),
-        lambda: tasks.create(file.usual_task, "/usual_task"),
-    )
-    robot_library.learn([file.text])
-    robots.create(_ref(file.sha256, file.name))
+    robot_of_file(file)
     return file
 
 
@@ -158,11 +150,7 @@ def _stored_names(session: Session) -> tuple[str, ...]:
 @snapshot
 def _newest(session: Session, name: str) -> PluginRef | None:
     row = rows.newest(session, storable(name))
-    return None if row is None else _ref(row.sha256, row.name)
-
-
-def _ref(sha256: str, name: str) -> PluginRef:
-    return PluginRef(name=IMPORTED, options={"sha256": sha256, "name": name})
+    return None if row is None else ref_of_file(row.sha256, row.name)
 
 
 def catalogued(found: Sequence[RobotRead]) -> tuple[PluginRead, ...]:
@@ -176,7 +164,7 @@ def _entry(found: RobotRead) -> PluginRead:
     summary = f"{found.bodies} bodies, {found.actuators} actuators, {found.mass_kg:.3g} kg."
     entry = PluginRead(name=found.name, summary=summary, source=source, options={}, details={"sha256": found.sha256})
     try:
-        robot = robots.create(_ref(found.sha256, found.name))
+        robot = robots.create(ref_of_file(found.sha256, found.name))
     except InvalidSpec as error:  # its usual controller or task is not installed here
         return entry.model_copy(update={"available": False, "note": str(error)})
     details = {**robots[IMPORTED].told(robot), "engine": default_engine(robot), **entry.details}

@@ -8,11 +8,18 @@ from gaplab.services.core import external_plugins
 from gaplab.services.plugins.contents import read
 from gaplab.services.plugins.external import REGISTRIES
 
-DESCRIPTIONS = {".urdf", ".xacro", ".mjcf", ".sdf", ".usd"}
+IMPORTED = {".urdf", ".mjcf"}
+"""Endings of descriptions of robots that `gaplab robot import` reads."""
+
+OTHERS = {".xacro", ".sdf", ".usd"}
 """Endings of descriptions of robots in other formats."""
 
 NOT_PYTHON = "it is no Python module; put data that a plug-in reads into its package"
-NOT_A_ROBOT = "it is no Python module; describe the robot as a class (docs/how-to/robot.md)"
+TO_IMPORT = "it is no Python module: gaplab robot import FILE, then gaplab robot add (docs/how-to/robot-file.md)"
+NOT_A_ROBOT = (
+    "it is no Python module, and no format that is imported: make a URDF or an MJCF of it, and import that "
+    "(docs/how-to/robot-file.md), or describe the robot as a class (docs/how-to/robot.md)"
+)
 NO_PACKAGE = "the folder has no __init__.py, so it is no package"
 NO_CLASS = "it has no class of a plug-in; if others import it, begin its name with _"
 
@@ -31,9 +38,16 @@ def _ignored(folder: Path) -> Iterator[IgnoredFile]:
             if not (path / "__init__.py").exists():
                 yield IgnoredFile(file=f"{path.name}/", why=NO_PACKAGE)
         elif path.suffix != ".py":
-            yield IgnoredFile(file=path.name, why=NOT_A_ROBOT if path.suffix in DESCRIPTIONS else NOT_PYTHON)
+            yield IgnoredFile(file=path.name, why=_why_not(path.suffix.lower()))
         elif path.stem not in useful:
             yield IgnoredFile(file=path.name, why=NO_CLASS)
+
+
+def _why_not(suffix: str) -> str:
+    """Return why a file with this ending is no plug-in."""
+    if suffix in IMPORTED:
+        return TO_IMPORT
+    return NOT_A_ROBOT if suffix in OTHERS else NOT_PYTHON
 
 
 def _useful() -> set[str]:

@@ -7,9 +7,10 @@ from typing import Protocol
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.results import SensorsRead
-from gaplab.services.core import external_plugins
+from gaplab.services.core import external_plugins, robot_library
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, gather
+from gaplab.services.core.robot_files import RobotFile
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.tasks import tasks
@@ -61,6 +62,25 @@ def robot_of(spec: NamesARobot) -> Robot:
     controller, task = gather(lambda: controllers.create(driving, "/controller"), lambda: tasks.create(rating, "/task"))
     robot.perform(controller, task)
     return robot
+
+
+def robot_of_file(file: RobotFile) -> Robot:
+    """Return the robot of a robot file that was checked, with its usual controller and task.
+
+    Raises:
+        InvalidSpec: the controller or the task cannot drive and rate it; pointers are places in the file.
+    """
+    gather(
+        lambda: controllers.create(file.usual_controller, "/usual_controller"),
+        lambda: tasks.create(file.usual_task, "/usual_task"),
+    )
+    robot_library.learn([file.text])
+    return robots.create(ref_of_file(file.sha256, file.name))
+
+
+def ref_of_file(sha256: str, name: str) -> PluginRef:
+    """Return how a stored spec names the robot of a file."""
+    return PluginRef(name=robot_library.IMPORTED, options={"sha256": sha256, "name": name})
 
 
 def installed_robot(spec: NamesARobot) -> Robot | None:

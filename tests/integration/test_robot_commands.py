@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -93,6 +93,52 @@ def test_a_refusal_names_every_reason_and_writes_nothing(gaplab: Gaplab, tmp_pat
     turned = " ".join(gaplab("robot", "import", "x", "-s", "turn=1.57").err.replace("│", "").split())
     assert "turn must be three angles, roll,pitch,yaw in rad, like 1.5708,0,0, not 1.57" in turned
     assert gaplab("robot", "import", str(tmp_path / "missing.urdf")).code == 7
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("controller=sin", "controller: unknown controller 'sin' (did you mean 'sine'?); permitted: "),
+        ("task=walkk", "task: unknown task 'walkk' (did you mean 'walk'?); permitted: "),
+    ],
+)
+def test_a_misspelt_controller_or_task_is_told_at_the_import(
+    gaplab: Gaplab, tmp_path: Path, setting: str, said: str
+) -> None:
+    (tmp_path / "m.xml").write_text(MJCF.format(""))
+
+    refused = gaplab("robot", "import", str(tmp_path / "m.xml"), "-o", str(tmp_path / "m.json"), "-s", setting)
+
+    assert (refused.code, said in refused.err) == (5, True), refused.err
+    assert not (tmp_path / "m.json").exists()
+
+
+def test_a_controller_of_the_plug_ins_folder_is_known_to_an_import(
+    gaplab: Gaplab, tmp_path: Path, put: Callable[..., Path]
+) -> None:
+    put(mine="from gaplab.services.core.controllers.sine import Sine\nclass Mine(Sine):\n    name = 'mine'\n")
+    (tmp_path / "m.xml").write_text(MJCF.format(""))
+
+    said = gaplab("robot", "import", str(tmp_path / "m.xml"), "-o", str(tmp_path / "m.json"), "-s", "controller=mine")
+
+    assert said.code == 0, said.err
+
+
+def test_an_import_replaces_a_file_only_if_it_is_told_to(gaplab: Gaplab, tmp_path: Path) -> None:
+    output = tmp_path / "m.json"
+    (tmp_path / "m.xml").write_text(MJCF.format(""))
+    output.write_text("by hand")
+    command = ("robot", "import", str(tmp_path / "m.xml"), "-o", str(output))
+
+    refused = gaplab(*command)
+    kept = output.read_text()
+    replaced = gaplab(*command, "--force")
+
+    assert refused.code == 7
+    assert refused.err == f"gaplab: {output}: a file of this name is there already; --force replaces it\n"
+    assert kept == "by hand"
+    assert replaced.code == 0
+    assert read_robot_file(output.read_bytes()).name == "m"
 
 
 def best_of(iteration: int) -> Simulator:

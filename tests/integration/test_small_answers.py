@@ -152,6 +152,7 @@ def test_a_plug_in_that_is_added_or_repaired_needs_no_restart(
 
 def test_a_file_that_is_no_plug_in_is_named(plugin_folder: Path, gaplab: Gaplab) -> None:
     (plugin_folder / "robot.urdf").write_text("<robot/>")
+    (plugin_folder / "robot.sdf").write_text("<sdf/>")
     (plugin_folder / "data").mkdir()
     (plugin_folder / "extra.py").write_text("X = 1\n")
     (plugin_folder / "_shared.py").write_text("X = 1\n")
@@ -162,6 +163,7 @@ def test_a_file_that_is_no_plug_in_is_named(plugin_folder: Path, gaplab: Gaplab)
 
     found = {each.file: each.why for each in ignored_files()}
 
-    assert set(found) == {"data/", "extra.py", "robot.urdf"}
-    assert "describe the robot as a class" in found["robot.urdf"]
+    assert set(found) == {"data/", "extra.py", "robot.sdf", "robot.urdf"}
+    assert "gaplab robot import FILE, then gaplab robot add (docs/how-to/robot-file.md)" in found["robot.urdf"]
+    assert "make a URDF or an MJCF of it" in found["robot.sdf"]
     assert "robot.urdf is not used: it is no Python module" in gaplab("catalogue").out
