@@ -5,8 +5,14 @@ from pathlib import Path
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.robot_files import read_robot_file
+from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sample_tables import read_samples as read_table
+from gaplab.services.plugins import folders
+from gaplab.services.specs.robots import robot_of_file
 
 
 class InvalidSamples(ValueError):
@@ -24,7 +30,7 @@ class InvalidSamples(ValueError):
         super().__init__("\n".join([*lines, *([f"and {more} more"] if more else [])]))
 
 
-def read_samples(path: str | Path, robot: str, options: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+def read_samples(path: str | Path, robot: str | Path, options: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
     """Return the samples of a CSV file, for `reality.samples` of a spec.
 
         spec["reality"] = {"kind": "physical", "samples": gaplab.read_samples("runs.csv", "quadruped")}
@@ -34,17 +40,38 @@ def read_samples(path: str | Path, robot: str, options: Mapping[str, Any] | None
 
     Args:
         path: the file.
-        robot: name of the robot that was measured.
-        options: its options; left out: their defaults.
+        robot: name of the robot that was measured: gaplab's own, or one of GAPLAB_PLUGINS; or its robot file, like
+            `"my_bot.json"`. `client.bench.check_samples` knows the robots that a service has, and other controllers.
+        options: its options, which one from a file does not have; left out: their defaults.
 
     Raises:
         InvalidSamples: the file has errors; all are named.
-        InvalidSpec: the robot does not exist.
+        InvalidSpec: the robot does not exist, or refuses its options.
     """
     file = Path(path)
-    found = read_table(
-        file.read_text("utf-8", "replace"), robots.create(PluginRef(name=robot, options=dict(options or {})))
-    )
+    found = read_table(file.read_text("utf-8", "replace"), _robot(robot, dict(options or {}), file))
     if found.errors:
         raise InvalidSamples(file, found.errors, found.more)
     return [sample.model_dump(mode="json", exclude_none=True) for sample in found.samples]
+
+
+def _robot(robot: str | Path, options: dict[str, Any], table: Path) -> Robot:
+    """Return the robot of a table.
+
+    Raises:
+        InvalidSpec: it does not exist, or refuses its options.
+    """
+    if isinstance(robot, Path) or robot.endswith(".json"):
+        if options:
+            message = f"the robot of {robot} comes from a file, which has no options"
+            raise InvalidSpec([Violation("/robot/options", options, message, "left out")])
+        return robot_of_file(read_robot_file(Path(robot).read_bytes()))
+    folders.find()
+    if robot in robots or robot in robots.unusable:
+        return robots.create(PluginRef(name=robot, options=options), "/robot")
+    known = [name for name in robots if name != IMPORTED]
+    message = (
+        f"unknown robot {robot!r}: read_samples needs no service, and knows {', '.join(known)}, and robot files like "
+        f"'{robot}.json'; for a robot of a service use client.bench.check_samples({str(table)!r}, {robot!r})"
+    )
+    raise InvalidSpec([Violation("/robot", robot, message, tuple(known))])

@@ -28,8 +28,11 @@ controller.json    genome and fitness of the best measured controller
 motion.*           its motion as CSV, JSON and a ROS 2 JointTrajectory; none if the controller observes while it acts
 simulator.json     the tuned simulator with its intervals, and the rest of the ensemble
 verdict.txt        what can be concluded, in sentences
-samples.csv        all measurements, as gaplab.read_samples reads them for `reality.samples` of another spec
-samples.json       the same with repetition, iteration, operator and time
+samples.csv        all measurements, for `reality.samples` of another spec. gaplab.read_samples("samples.csv", ROBOT)
+                   reads them for gaplab's own robots, those of GAPLAB_PLUGINS, and robot files; for all robots of a
+                   service client.bench.check_samples("samples.csv", ROBOT) does
+samples.json       the same for programs of yours, with repetition, iteration, operator and time, and with readings in
+                   units of noise; `reality.samples` takes samples.csv
 spec.json          the spec; `gaplab submit spec.json` runs it again
 provenance.json    versions of everything that computed it
 

@@ -88,6 +88,8 @@ def test_everything_is_in_the_zip_and_can_be_used(store: Store, client: Client, 
     assert client.estimate(json.loads(found["spec.json"])).rollouts > 0
     assert found["spec.json"].strip() in unescape(found["page.html"])
     assert found["verdict.txt"]
+    assert 'client.bench.check_samples("samples.csv", ROBOT)' in found["README.txt"]
+    assert "`reality.samples` takes samples.csv" in found["README.txt"]
 
 
 def test_the_samples_can_be_the_samples_of_another_spec(store: Store, client: Client, tmp_path: Path) -> None:

@@ -80,7 +80,10 @@ ARROWS = {
         {"typer", "rich", "httpx2", "pydantic"},
     ),
     "api": (("services", "api.process"), set()),
-    "gaplab": (("schemas", "services.core", "services.engines", "api", "samples"), set()),
+    "gaplab": (
+        ("schemas", "services.core", "services.engines", "services.plugins", "services.specs", "api", "samples"),
+        set(),
+    ),
     "migrations": (
         ("services.core.errors", "services.settings", "services.store", "migrations"),
         {"alembic", "sqlalchemy"},

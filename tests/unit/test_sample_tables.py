@@ -1,6 +1,7 @@
 """Tables of samples: what is read, and every error with its line and column."""
 
 import tracemalloc
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,9 +9,11 @@ from typing import Any
 import pytest
 
 import gaplab
+from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core import sample_tables
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
+from gaplab.services.core.robot_files import RobotFile
 from gaplab.services.core.robots.quadruped import Quadruped, QuadrupedOptions
 from gaplab.services.core.robots.toy_function import ToyFunction
 from gaplab.services.core.sample_tables import read_samples
@@ -167,6 +170,44 @@ def test_the_client_reads_a_file_for_a_spec(tmp_path: Path) -> None:
     file.write_text("gene_0,value\n2,3\n3,x\n")
     with pytest.raises(gaplab.InvalidSamples, match=r"runs.csv:2, gene_0: .*\nruns.csv:3, value: 'x' is no number"):
         gaplab.read_samples(file, "toy_function")
+
+
+def test_the_client_knows_robot_files_and_plug_ins(tmp_path: Path, put: Callable[..., Path]) -> None:
+    toy_module = "gaplab.services.core.robots.toy_function"
+    put(mine=f"from {toy_module} import ToyFunction\nclass Mine(ToyFunction):\n    name = 'mine'\n")
+    (tmp_path / "runs.csv").write_text("gene_0,value\n0.25,0.41\n")
+    quadruped, file = Quadruped(), tmp_path / "bot.json"
+    file.write_text(
+        RobotFile(
+            name="bot",
+            usual_controller=PluginRef(name="square_pulses"),
+            usual_task=PluginRef(name="walk"),
+            world=quadruped.world,
+        ).text
+    )
+    genes = quadruped.space.size
+    (tmp_path / "bot.csv").write_text(
+        ",".join([*(f"gene_{place}" for place in range(genes)), "value"]) + "\n" + "0.5," * genes + "0.4\n"
+    )
+
+    assert gaplab.read_samples(tmp_path / "runs.csv", "mine")[0]["values"] == [0.41]
+    assert gaplab.read_samples(tmp_path / "bot.csv", file) == gaplab.read_samples(tmp_path / "bot.csv", str(file))
+    assert gaplab.read_samples(tmp_path / "bot.csv", file)[0]["genome"] == [0.5] * genes
+    with pytest.raises(InvalidSpec, match="comes from a file, which has no options"):
+        gaplab.read_samples(tmp_path / "bot.csv", file, {"counted_s": 1.0})
+
+
+def test_the_client_says_which_robots_it_knows_and_what_knows_others(tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text("gene_0,value\n0.25,0.41\n")
+
+    with pytest.raises(InvalidSpec) as refused:
+        gaplab.read_samples(tmp_path / "runs.csv", "my_bot")
+
+    said = str(refused.value)
+    assert said.startswith("/robot: unknown robot 'my_bot': read_samples needs no service, and knows ")
+    assert "robot files like 'my_bot.json'" in said
+    assert said.endswith("runs.csv', 'my_bot')")
+    assert "robot_file" not in said
 
 
 def test_samples_of_a_spec_are_checked_with_pointers() -> None:
