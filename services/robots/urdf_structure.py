@@ -33,8 +33,10 @@ def _check_names(elements: Sequence[Element], notes: Notes) -> None:
         name = element.get("name")
         if not name:
             notes.refuse(f"line {element.sourceline}: a {element.tag} has no name")
-        elif first.setdefault(name, element) is not element:
+        elif name in first:
             notes.refuse(f"{_place(element)} has the name of that in line {first[name].sourceline}; rename one of them")
+        else:
+            first[name] = element
 
 
 def _end(joint: Element, role: str, links: Sequence[str], notes: Notes) -> str | None:
@@ -56,9 +58,11 @@ def _check_child(joint: Element, ends: Mapping[str, str | None], carried: dict[s
         return
     if child == ends["parent"]:
         notes.refuse(f"{_place(joint)} joins the link {child} to itself")
-    elif (other := carried.setdefault(child, joint)) is not joint:
-        where = f"joint {other.get('name', '')} in line {other.sourceline}"
+    elif child in carried:
+        where = f"joint {carried[child].get('name', '')} in line {carried[child].sourceline}"
         notes.refuse(f"{_place(joint)}: child link {child!r} is already that of {where}; a link has one parent")
+    else:
+        carried[child] = joint
 
 
 def _place(element: Element) -> str:
