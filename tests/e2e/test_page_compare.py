@@ -103,6 +103,16 @@ def test_the_address_holds_everything(archive: Any, ids: Any, visit: Any) -> Non
     assert fragment(other) == wanted
 
 
+def test_a_number_of_evaluations_that_no_experiment_has_is_refused_in_one_sentence(
+    archive: Any, ids: Any, visit: Any
+) -> None:
+    visit.forgive("422")
+    page = visit(address(archive, *ids, to="50"))
+    expect(page.get_by_text("no experiment has 50 real-world evaluations; permitted: 0 to 10")).to_have_count(1)
+    page.get_by_role("button", name="at 10", exact=True).click()
+    expect(page.locator("table.matrix")).to_be_visible()
+
+
 def test_what_differs_is_what_the_service_found(archive: Any, ids: Any, visit: Any) -> None:
     page = visit(address(archive, *ids, to="1"))
     matrix = page.locator("table.matrix")

@@ -37,7 +37,8 @@ export function failed(error, retry, heading = "h1") {
   if (!(error instanceof Problem)) return failure("It did not work", error.message, heading, retry);
   if (error.status === 401 || error.status === 403) return tokenForm(error, retry);
   if (error.status === 0) return away(error, retry, heading);
-  const items = error.errors.map(({ pointer, message }) => h("li", {}, pointer ? h("code", {}, pointer) : "", " ", message));
+  const several = error.errors.length > 1 ? error.errors : [];  // the message tells a single one
+  const items = several.map(({ pointer, message }) => h("li", {}, pointer ? h("code", {}, pointer) : "", " ", message));
   const home = heading === "h1" && error.status === 404 ? h("a", { class: "button quiet", href: "#/" }, "To the experiments") : null;
   return failure(error.title, error.message, heading, retry, items, home);
 }
