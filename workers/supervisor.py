@@ -84,7 +84,7 @@ class Supervisor:
 
         Raises:
             ClusterUnusable: a node would compute other numbers, or Ray died; this ends the work as well.
-            StoreChanged: the database was replaced, restored or migrated; nothing more is written to it.
+            StoreChanged: the database was replaced, restored or migrated; what its leases do not permit is not written.
         """
         self._pulse = pulse or self._pulse
         self._pulse.name(self._owner)
@@ -126,7 +126,7 @@ class Supervisor:
 
         Raises:
             StoreUnavailable: the database cannot be used; received deliveries are stored in a later round.
-            StoreChanged: it is not the database that this supervisor knows; what was received is void.
+            StoreChanged: it is not the database that this supervisor knows; deliveries need a valid lease there.
             ClusterUnusable: a node that joined has other versions; its deliveries are not stored.
         """
         self._pulse.beat()
