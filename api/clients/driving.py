@@ -215,7 +215,7 @@ class Driving:
         return motion_of(self._connection, request.id)
 
     def sensors(self, request: RequestRead) -> SensorsRead | None:
-        """Return the sensors of the robot that a request is about."""
+        """Return the sensors of the robot of a request; None if the service does not know them."""
         return self._records.experiment(request.experiment).sensors
 
     def _release(self, request: RequestRead) -> None:

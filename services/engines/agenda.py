@@ -33,7 +33,7 @@ def steps_at(times_s: FloatArray, time_step_s: float) -> list[int]:
 
 
 def check_targets(motion: Motion, world: World) -> None:
-    """Refuse a motion that has not one target for each actuator; a world without actuators ignores targets.
+    """Refuse a motion without exactly one target for each actuator; a world without actuators ignores targets.
 
     Raises:
         PluginBroken: the motion is of another robot.
@@ -57,7 +57,7 @@ def tick_steps(loop: Loop, time_step_s: float) -> list[int]:
 
 
 def sensed_steps(loop: Loop, time_step_s: float) -> list[int]:
-    """Return the time steps whose observations the controller has when it acts: earlier ones by its latency."""
+    """Return the time step of what the controller observes at each of its ticks: its latency before the tick."""
     late = round(loop.latency_s / time_step_s)
     return [max(0, step - late) for step in tick_steps(loop, time_step_s)]
 

@@ -57,7 +57,7 @@ def takehome_zip(store: Store, experiment_id: str, draw: Callable[[Callable[[], 
     Args:
         store: the database.
         experiment_id: id of the experiment.
-        draw: calls what draws figures, perhaps after waiting for a turn.
+        draw: calls a function that draws figures, perhaps after waiting for a turn.
 
     Raises:
         NotFound: no such experiment.

@@ -51,7 +51,7 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
     """Return a URDF that MuJoCo can read, and note what it would lose.
 
     Raises:
-        InvalidRobot: a mesh is missing.
+        InvalidRobot: a name, a link or a number is wrong, or a mesh is missing; with every reason.
     """
     root = tree(text)
     check_structure(root, notes)
