@@ -19,7 +19,7 @@ class Driver:
         """Run a motion once and return the fitness in m/s; raise gaplab.MeasurementFailed if there is none.
 
         A robot with sensors returns `(fitness, readings)`: a row for each time of reading and a column for each sensor,
-        in its unit, None where it failed. `client.experiment(ID).sensors` has their times, names and order.
+        in its unit, None or NaN where it failed. `client.experiment(ID).sensors` has their times, names and order.
 
         `motion.times_s` has the times at which targets change, `motion.targets` a row of targets for each: one for
         each name in `motion.actuators`, in its unit in `motion.units`. The run ends at `motion.observe_s[-1]`.

@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Unit
 from gaplab.schemas.measurements import MOST_VALUES, Table, Values
 
+_OPERATOR = "person who says so; the event names them"
+
 
 class Consequences(Frozen):
     """What follows from a correction or a void."""
@@ -36,7 +38,7 @@ class CorrectionSpec(Frozen):
     unit: Unit | None = None
     failed: Annotated[str, Field(min_length=1, max_length=2_000)] | None = None
     reason: Annotated[str, Field(min_length=1, max_length=2_000)] = Field(description="why it is corrected")
-    operator: Label | None = None
+    operator: Label | None = Field(default=None, description=_OPERATOR)
 
     @model_validator(mode="after")
     def _check_that_it_is_one(self) -> "CorrectionSpec":
@@ -53,7 +55,7 @@ class VoidSpec(Frozen):
     }
 
     reason: Annotated[str, Field(min_length=1, max_length=2_000)]
-    operator: Label | None = None
+    operator: Label | None = Field(default=None, description=_OPERATOR)
 
 
 class ConflictSpec(Frozen):
@@ -63,7 +65,7 @@ class ConflictSpec(Frozen):
 
     counts: Literal["this", "other"] = Field(description="`this` replaces what counted; `other` dismisses this one")
     reason: Annotated[str, Field(min_length=1, max_length=2_000)]
-    operator: Label | None = None
+    operator: Label | None = Field(default=None, description=_OPERATOR)
 
 
 class BranchRead(Frozen):

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypedDict, Unpack
 
+from gaplab.api.clients.bodies import readings_of
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.driving import Driving, TakenRequest
 from gaplab.api.clients.journal import Journal
@@ -97,8 +98,7 @@ class Bench:
             details: `failed`, `readings`, `unit`, `operator`, `note`, `attachments` (hashes) and `take`; in place of
                 values, `traces` (hashes, one for each repeat) and perhaps their `lags_s`.
         """
-        body = {"values": None if values is None else list(values)} | dict(details)
-        return self._connection.post(AnswerRead, f"/requests/{segment(id)}/measurements", _without_none(body))
+        return self._connection.post(AnswerRead, f"/requests/{segment(id)}/measurements", _body(values, details))
 
     def correct(
         self,
@@ -118,8 +118,7 @@ class Bench:
             dry_run: return what would follow, and change nothing.
             details: `failed`, `readings`, `unit` and `operator`.
         """
-        body = {"values": None if values is None else list(values), "reason": reason} | dict(details)
-        return self._after(answer, "corrections", body, dry_run=dry_run)
+        return self._after(answer, "corrections", _body(values, details) | {"reason": reason}, dry_run=dry_run)
 
     def void(self, answer: str, *, reason: str, operator: str | None = None, dry_run: bool = False) -> Consequences:
         """Void a measurement, whose controller is asked for again; return what follows.
@@ -173,8 +172,8 @@ class Bench:
                 `qw`.
             lags_s: when the motion began on the clock of each trace; None: found by cross-correlation.
         """
-        body = {"traces": list(traces), "lags_s": None if lags_s is None else list(lags_s)}
-        return self._connection.post(TracesRead, f"/requests/{segment(id)}/traces", _without_none(body))
+        body = _without_none({"traces": traces, "lags_s": lags_s})
+        return self._connection.post(TracesRead, f"/requests/{segment(id)}/traces", body)
 
     def check_samples(
         self,
@@ -221,6 +220,11 @@ class Bench:
         return self._connection.post(Consequences, path, _without_none(body))
 
 
-def _without_none(body: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(json.dumps({name: value for name, value in body.items() if value is not None}))
-    return found
+def _body(values: Sequence[float] | None, details: Details) -> dict[str, Any]:
+    """Return an answer or a correction as it is sent."""
+    body = _without_none({"values": values} | details)
+    return body | {"readings": readings_of(body["readings"])} if "readings" in body else body
+
+
+def _without_none(body: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in body.items() if value is not None}

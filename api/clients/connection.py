@@ -11,6 +11,7 @@ from uuid import uuid4
 import httpx2
 from pydantic import TypeAdapter, ValidationError
 
+from gaplab.api.clients.bodies import json_of
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, error_of
 from gaplab.schemas.records import Page
 from gaplab.services.settings import Settings
@@ -127,7 +128,14 @@ class Connection:
 
     @contextmanager
     def stream(self, method: str, path: str, **request: Unpack[Request]) -> Iterator[httpx2.Response]:
-        """Send a request whose answer is read in parts."""
+        """Send a request whose answer is read in parts.
+
+        Raises:
+            ValueError: a number of the body is not finite.
+            TypeError: JSON cannot hold a value of the body.
+        """
+        if "json" in request:
+            request["json"] = json_of(request["json"])
         try:
             with self._http.stream(method, path, **request) as answer:
                 if not answer.is_success:

@@ -15,6 +15,7 @@ from pathlib import Path
 from threading import Thread
 from typing import Any, Protocol
 
+from gaplab.api.clients.bodies import json_of, readings_of
 from gaplab.api.clients.driving import TakenRequest
 from gaplab.api.clients.motions import DriverMotion
 from gaplab.schemas.records import SensorsRead
@@ -38,7 +39,7 @@ class Driver(Protocol):
         """Run a motion once; return the fitness in the robot's unit, or `(fitness, readings)`.
 
         Readings have a row for each time at which the sensors are read, and a column for each sensor, in its unit; None
-        where it failed. `client.experiment(ID).sensors` has times, names and units in this order.
+        or NaN where it failed. `client.experiment(ID).sensors` has times, names and units in this order.
         """
 
     def stop(self) -> None:
@@ -134,7 +135,7 @@ def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a dri
     """Return fitness and readings.
 
     Raises:
-        DriverBroken: the fitness is not a finite number.
+        DriverBroken: the fitness is not a finite number, or readings are no numbers.
     """
     readings: Any
     fitness, readings = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
@@ -143,7 +144,10 @@ def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a dri
     value = float(fitness)
     if not isfinite(value):
         raise DriverBroken(f"the driver's run returned {value}; raise MeasurementFailed if nothing was measured")
-    return value, readings.tolist() if hasattr(readings, "tolist") else readings
+    try:
+        return value, json_of(readings_of(readings), "/readings")
+    except (TypeError, ValueError) as error:
+        raise DriverBroken(f"the driver's run returned readings that cannot be sent: {error}") from error
 
 
 def _check_readings(readings: Any, sensors: SensorsRead | None) -> None:  # noqa: ANN401 - whatever a driver returns

@@ -1,6 +1,5 @@
 """The loop of a driver: requests are taken one after the other, kept by heartbeats, and answered once."""
 
-import logging
 import socket
 import time
 from collections.abc import Iterator, Sequence
@@ -9,8 +8,10 @@ from functools import cached_property
 from threading import Event, Thread
 from typing import Any
 
+from gaplab.api.clients.bodies import json_of, readings_of
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, refuses_sender
+from gaplab.api.clients.deliveries import PAUSE_S, Deliveries, log
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.motions import DriverMotion, motion_of
 from gaplab.api.clients.records import Records
@@ -20,13 +21,8 @@ from gaplab.schemas.records import Page, SensorsRead
 WAIT_S = 20.0
 """Longest wait of the service for a request; the driver then asks again."""
 
-PAUSE_S = 2.0
-"""Pause after a request that the service could not serve."""
-
 _NOT_THIS_ONE = {404, 409, 429}
 """Statuses after which a driver tries the next request: it is deleted, somebody else was faster, or too many ask."""
-
-log = logging.getLogger("gaplab.driver")
 
 
 class TakenRequest:
@@ -78,16 +74,28 @@ class TakenRequest:
     @property
     def known(self) -> list[tuple[float, Any]]:
         """Repeats that an earlier run of the driver measured and journalled, with their readings."""
-        return self._driving.journal.repeats(self.id)[: self.repeats]
+        return self._driving.deliveries.journal.repeats(self.id)[: self.repeats]
 
     def note(self, value: float, readings: Any = None) -> None:  # noqa: ANN401 - JSON
-        """Journal one repeat, so that a power cut before the last one loses nothing."""
-        self._driving.journal.repeat(self.id, float(value), readings)
+        """Journal one repeat, so that a power cut before the last one loses nothing; its errors are those of `tell`."""
+        kept = json_of({"value": value, "readings": readings_of(readings)})
+        self._driving.deliveries.journal.repeat(self.id, kept["value"], kept["readings"])
 
     def tell(self, values: float | Sequence[float], readings: Any = None, note: str | None = None) -> AnswerRead:  # noqa: ANN401 - JSON
-        """Answer with the value, or the values of all repeats."""
-        told = [float(values)] if isinstance(values, int | float) else [float(value) for value in values]
-        return self._answer({"values": told, "readings": readings, "note": note})
+        """Answer with the value, or the values of all repeats.
+
+        Args:
+            values: fitness of each repeat; a single one may be a number.
+            readings: of each repeat, a row for each time and a column for each sensor; None or NaN where it failed.
+            note: what to keep beside it.
+
+        Raises:
+            ValueError: a value is not finite, or a reading is infinite; nothing is journalled.
+            TypeError: values or readings are no numbers.
+        """
+        told = json_of({"values": values, "readings": readings_of(readings), "note": note})
+        each = told["values"] if isinstance(told["values"], list) else [told["values"]]
+        return self._answer(told | {"values": each})
 
     def fail(self, reason: str) -> AnswerRead:
         """Answer that the measurement failed: the controller counts as tried, and teaches nothing."""
@@ -95,7 +103,7 @@ class TakenRequest:
 
     def _answer(self, answer: dict[str, Any]) -> AnswerRead:
         given = {name: value for name, value in answer.items() if value is not None}
-        self.answered = self._driving.send(self.request, given | {"take": self.request.takes})
+        self.answered = self._driving.deliveries.send(self.id, given | {"take": self.request.takes})
         return self.answered
 
 
@@ -113,13 +121,13 @@ class Driving:
     def __init__(
         self, connection: Connection, records: Records, journal: Journal, lease_s: float, operator: str | None
     ) -> None:
-        self.journal = journal
         self._connection, self._records = connection, records
         self._lease_s, self._operator = lease_s, operator or socket.gethostname()
+        self.deliveries = Deliveries(connection, journal, self._operator)
 
     def tasks(self, experiment: str | None, bench: str | None) -> Iterator[TakenRequest]:
         """Yield taken requests until the experiment has ended; send first what an earlier run left in the journal."""
-        self._send_leftovers()
+        self.deliveries.send_leftovers()
         while True:
             request = self._next(experiment, bench)
             if request is None:
@@ -134,47 +142,6 @@ class Driving:
                 finally:
                     if task is None or task.answered is None:
                         self._release(request)
-
-    def send(self, request: RequestRead, answer: dict[str, Any]) -> AnswerRead:
-        """Journal an answer, and send it until the service has it.
-
-        Raises:
-            ServiceError: the service refuses it.
-        """
-        return self._deliver(request.id, answer, self.journal.answer(request.id, answer))
-
-    def _send_leftovers(self) -> None:
-        """Send the answers that an earlier run left in the journal; one that is refused does not stop the others.
-
-        Raises:
-            ServiceError: the service refuses the token of the driver; the answers stay in the journal.
-        """
-        for request, answer, key in self.journal.unsent():
-            try:
-                self._deliver(request, answer, key)
-            except ServiceError as error:
-                if refuses_sender(error):
-                    raise
-                log.error("the answer %s in the journal, to request %s, is refused: %s", answer, request, error)
-
-    def _deliver(self, request: str, answer: dict[str, Any], key: str) -> AnswerRead:
-        path = f"/requests/{segment(request)}/measurements"
-        while True:
-            try:
-                given = self._connection.post(AnswerRead, path, answer | {"operator": self._operator}, key=key)
-            except ServiceUnreachable as error:
-                log.warning("not sent yet: %s", error)
-                time.sleep(PAUSE_S)
-            except ServiceError as error:
-                if error.problem.status < 500 and error.problem.status != 429:
-                    if not refuses_sender(error):
-                        self.journal.sent(key)
-                    raise
-                log.warning("not taken yet: %s", error)
-                time.sleep(PAUSE_S)
-            else:
-                self.journal.sent(key)
-                return given
 
     def _next(self, experiment: str | None, bench: str | None) -> RequestRead | None:
         """Take the oldest open request; None if there is none, or others have the bench.

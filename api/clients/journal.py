@@ -65,9 +65,10 @@ class Journal:
         return [(line["request"], line["answer"], line["key"]) for line in kept]
 
     def _write(self, line: dict[str, Any]) -> None:
+        text = json.dumps(line, allow_nan=False)
         self._lines.append(line)
         if self._file is not None:
-            self._file.write(json.dumps(line).encode() + b"\n")
+            self._file.write(text.encode() + b"\n")
             self._file.flush()
             os.fsync(self._file.fileno())
 
@@ -75,7 +76,7 @@ class Journal:
 def _lines(content: bytes) -> Iterator[dict[str, Any]]:
     for text in content.splitlines():
         try:
-            line = json.loads(text)
+            line = json.loads(text, parse_constant=lambda _: None)  # NaN, as older drivers wrote of failed sensors
         except ValueError:
             continue
         if isinstance(line, dict):

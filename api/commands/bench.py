@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import typer
 
+from gaplab.api.clients.bench import Details
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError
 from gaplab.api.clients.progress.text import console
@@ -24,6 +25,7 @@ Numbers = Annotated[list[str] | None, _VALUES]
 Failed = Annotated[str | None, typer.Option("--failed", help="why there are no values", show_default=False)]
 Reason = Annotated[str, typer.Option("--reason", help="why")]
 Operator = Annotated[str | None, typer.Option("--operator", help="person who measured", show_default=False)]
+By = Annotated[str | None, typer.Option("--operator", help="person who says so", show_default=False)]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="only say what would follow")]
 
 
@@ -79,9 +81,9 @@ def measured(  # noqa: PLR0913, PLR0917 - each is an option of the command
     url: Url = None,
 ) -> None:
     """Answer a request by hand: with the fitness of each repeat, or --failed and why."""
-    measured, details = numbers(values), {"failed": failed, "note": note, "operator": operator}
+    measured, details = numbers(values), _given(failed=failed, note=note, operator=operator)
     with connect(url) as client:
-        found = client.bench.answer(id, measured, **{name: each for name, each in details.items() if each})  # type: ignore[arg-type]
+        found = client.bench.answer(id, measured, **details)
     print_result(found, stored_words(found), as_json=as_json)
 
 
@@ -106,8 +108,7 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
         if not answer:
             print_result(said, _words_of(said), as_json=as_json)
             return
-        named = {"operator": operator} if operator else {}
-        found = client.bench.answer(id, traces=stored, **named)  # type: ignore[arg-type]
+        found = client.bench.answer(id, **_given(operator=operator) | {"traces": stored})
     print_result(found, f"{_words_of(said)}\n{stored_words(found)}", as_json=as_json)
 
 
@@ -117,14 +118,15 @@ def correct(  # noqa: PLR0913, PLR0917 - each is an option of the command
     reason: Reason,
     values: Numbers = None,
     failed: Failed = None,
+    operator: By = None,
     dry_run: DryRun = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Replace the values of a measurement; what was computed from them is computed again."""
-    right, kept = numbers(values), {"failed": failed} if failed else {}
+    right, details = numbers(values), _given(failed=failed, operator=operator)
     with connect(url) as client:
-        found = client.bench.correct(id, right, reason=reason, dry_run=dry_run, **kept)  # type: ignore[arg-type]
+        found = client.bench.correct(id, right, reason=reason, dry_run=dry_run, **details)
     _print_consequences(found, dry_run=dry_run, as_json=as_json)
 
 
@@ -132,13 +134,14 @@ def correct(  # noqa: PLR0913, PLR0917 - each is an option of the command
 def void(
     id: AnswerId,
     reason: Reason,
+    operator: By = None,
     dry_run: DryRun = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Say that a measurement is worth nothing; its controller is asked for again."""
     with connect(url) as client:
-        found = client.bench.void(id, reason=reason, dry_run=dry_run)
+        found = client.bench.void(id, reason=reason, operator=operator, dry_run=dry_run)
     _print_consequences(found, dry_run=dry_run, as_json=as_json)
 
 
@@ -147,12 +150,13 @@ def decide(
     id: AnswerId,
     counts: Annotated[Literal["this", "other"], typer.Argument(help="which of the two measurements counts")],
     reason: Reason,
+    operator: By = None,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Decide about a measurement in conflict: let it count in place of the other, or dismiss it."""
     with connect(url) as client:
-        found = client.bench.decide(id, counts, reason=reason)
+        found = client.bench.decide(id, counts, reason=reason, operator=operator)
     _print_consequences(found, dry_run=False, as_json=as_json)
 
 
@@ -162,6 +166,11 @@ def reopen(id: RequestId, as_json: AsJson = False, url: Url = None) -> None:
     with connect(url) as client:
         found = client.bench.reopen(id)
     print_result(found, f"Request {found.id} is {found.state.value}.", as_json=as_json)
+
+
+def _given(**details: str | None) -> Details:
+    """Return the details of an answer that were given."""
+    return cast("Details", {name: each for name, each in details.items() if each})
 
 
 def _words_of(found: TracesRead) -> str:

@@ -126,10 +126,17 @@ def settle_request(session: Session, row: RequestRow, given: AnswerRow) -> None:
 
 
 def note_answer(
-    session: Session, kind: EventKind, row: RequestRow, repetition: RepetitionRow, given: AnswerRow
+    session: Session,
+    kind: EventKind,
+    row: RequestRow,
+    repetition: RepetitionRow,
+    given: AnswerRow,
+    by: str | None = None,
 ) -> None:
-    """Add the event of an answer that does not count by itself, or no longer."""
+    """Add the event of an answer that does not count by itself, or no longer; `by` names the person who says so."""
     body = {"iteration": row.iteration, "request": row.id, "answer": given.id, "operator": given.operator}
+    if by:
+        body["by"] = storable(by)
     if given.reason:
         body["reason"] = given.reason
     note(session, kind, repetition.experiment_id, repetition.number, **body)

@@ -107,7 +107,7 @@ def _correct(session: Session, id_: str, spec: CorrectionSpec, token: str | None
     new = insert_answer(session, request, answer, AnswerState.COUNTED, token)
     new.replaces, new.attachments, new.note = row.id, row.attachments, row.note
     settle_request(session, request, new)
-    note_answer(session, EventKind.CORRECTED, request, repetition, row)
+    note_answer(session, EventKind.CORRECTED, request, repetition, row, spec.operator)
     branch = apply(session, request, repetition, new, spec.reason)
     return found.model_copy(update={"answer": new.id, "branch": branch})
 
@@ -116,7 +116,7 @@ def _void(session: Session, id_: str, spec: VoidSpec) -> Consequences:
     row, request, repetition = _locked_and_counted(session, id_)
     found = consequences(session, request, repetition, "void")
     judge(session, row, AnswerState.VOID, spec.reason)
-    note_answer(session, EventKind.VOIDED, request, repetition, row)
+    note_answer(session, EventKind.VOIDED, request, repetition, row, spec.operator)
     branch = None
     if places := places_of(session, request, repetition):
         first = min(places, key=lambda place: place.number)
@@ -140,14 +140,14 @@ def _decide(session: Session, id_: str, spec: ConflictSpec) -> Consequences:
     counted = requests.counted_answer(session, request)
     if spec.counts == "other":
         judge(session, row, AnswerState.DISMISSED, spec.reason)
-        note_answer(session, EventKind.DECIDED, request, repetition, row)
+        note_answer(session, EventKind.DECIDED, request, repetition, row, spec.operator)
         return nothing_follows(request, repetition, "the answer is dismissed; what counted still counts")
     if counted is not None:
         found = consequences(session, request, repetition, "correct")
         judge(session, counted, AnswerState.REPLACED, spec.reason)
         row.replaces = counted.id
         judge(session, row, AnswerState.COUNTED, spec.reason)
-        note_answer(session, EventKind.DECIDED, request, repetition, row)
+        note_answer(session, EventKind.DECIDED, request, repetition, row, spec.operator)
         settle_request(session, request, row)
         branch = apply(session, request, repetition, row, spec.reason)
         return found.model_copy(update={"answer": row.id, "branch": branch})
@@ -155,7 +155,7 @@ def _decide(session: Session, id_: str, spec: ConflictSpec) -> Consequences:
         raise Conflict(f"request {request.id} is wanted no more")
     judge(session, row, AnswerState.COUNTED, spec.reason)
     settle_request(session, request, row)
-    note_answer(session, EventKind.DECIDED, request, repetition, row)
+    note_answer(session, EventKind.DECIDED, request, repetition, row, spec.operator)
     record_answer(session, request, row)
     return nothing_follows(request, repetition, "the answer counts, and the repetition goes on").model_copy(
         update={"answer": row.id}

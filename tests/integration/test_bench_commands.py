@@ -15,6 +15,7 @@ from gaplab.api.clients.progress import log
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.store.models import EventRow
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import toy
@@ -32,6 +33,12 @@ def asked(store: Store, **changes: Any) -> Any:
     return pending(store)[0]
 
 
+def persons(store: Store) -> dict[str, str]:
+    """Who corrected, voided or decided, by the kind of event."""
+    with store.reading() as session:
+        return {event.kind: event.body["by"] for event in session.query(EventRow) if "by" in event.body}
+
+
 def test_a_request_is_read_moved_answered_and_corrected(sqlite_store: Store, gaplab: Gaplab) -> None:
     request = asked(sqlite_store, iterations=1)
 
@@ -41,7 +48,8 @@ def test_a_request_is_read_moved_answered_and_corrected(sqlite_store: Store, gap
     said = gaplab("measured", request.id, "4.4", "--note", "cold", "--json")
     answer = json.loads(said.out)["id"]
     assert "would be done" in gaplab("correct", answer, "0.44", "--reason", "4.4 was 0.44", "--dry-run").out
-    assert "Done" in gaplab("correct", answer, "0.44", "--reason", "4.4 was 0.44").out
+    assert "Done" in gaplab("correct", answer, "0.44", "--reason", "4.4 was 0.44", "--operator", "Bea").out
+    assert persons(sqlite_store) == {"corrected": "Bea"}
     read = gaplab("requests", request.id).out
     assert f"{answer} replaced: 4.4" in read
     assert "counted: 0.44" in read
@@ -164,8 +172,10 @@ def test_a_measurement_is_voided_and_one_in_conflict_is_decided_about(sqlite_sto
     measure(sqlite_store, request, 0.3)
     other = measure(sqlite_store, request, 0.4)
 
-    assert "Done" in gaplab("decide", other.id, "this", "--reason", "the first was of another robot").out
-    assert "Done" in gaplab("void", other.id, "--reason", "the floor was wet").out
+    other_robot = "--reason", "the first was of another robot", "--operator", "Bea"
+    assert "Done" in gaplab("decide", other.id, "this", *other_robot).out
+    assert "Done" in gaplab("void", other.id, "--reason", "the floor was wet", "--operator", "Cy").out
+    assert persons(sqlite_store) == {"decided": "Bea", "voided": "Cy"}
     assert gaplab("decide", other.id, "that").code == 2
     assert pending(sqlite_store)[0].id == request.id
 

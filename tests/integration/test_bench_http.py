@@ -6,6 +6,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -325,6 +326,38 @@ def test_a_driver_is_told_before_the_first_run_that_readings_are_needed(client: 
 
     assert task.sensors is not None
     assert (task.sensors.names[0], task.sensors.needed) == ("roll", True)
+
+
+def test_readings_of_numpy_are_stored_with_null_where_a_sensor_failed(
+    client: Client, store: Store, tmp_path: Path
+) -> None:
+    reality = REALITY | {"repeats": 2}
+    experiment = client.submit(SPEC | {"robot": "quadruped", "discrepancy": "readings", "reality": reality})
+    compute(store)
+    journal = tmp_path / "journal"
+    loop = client.requests(experiment.id, journal=journal)
+    task = next(loop)
+    assert task.sensors is not None
+    table = np.full((len(task.sensors.times_s), len(task.sensors.names)), 0.25, dtype=np.float32)
+
+    for wrong, place in (((np.inf, table), "/value"), ((0.5, table * np.inf), "/readings/0/0")):
+        with pytest.raises(ValueError, match=f"^{place}: must be a finite number, not inf"):
+            task.note(*wrong)
+    assert journal.read_bytes() == b""
+    table[1] = np.nan
+    half: Any = np.float32(0.5)
+    task.note(half, table)
+    del loop  # the driver dies
+    with journal.open("a") as file:  # as a driver of before wrote it
+        file.write(json.dumps({"request": task.id, "repeat": 0.25, "readings": table.tolist()}) + "\n")
+    loop = client.requests(experiment.id, journal=journal)
+    task = next(loop)
+    answer = task.tell([value for value, _ in task.known], [readings for _, readings in task.known])
+
+    assert (answer.state, answer.values) == ("counted", (0.5, 0.25))
+    assert answer.readings is not None
+    assert [set(row) for row in answer.readings[0]] == [set(row) for row in answer.readings[1]]
+    assert (set(answer.readings[0][0]), set(answer.readings[0][1])) == ({0.25}, {None})
 
 
 def test_an_answer_may_be_computed_from_traces(client: Client, store: Store, tmp_path: Path) -> None:

@@ -27,6 +27,10 @@ test("events are sentences, and a kind that is newer than the page has its name"
   assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: failed in reality");
   assert.equal(eventText({ kind: "requested", repetition: 0, body: { iteration: 2, kind: "probe" } }), "Repetition 0, iteration 2: a measurement of the transferred controller is requested");
   assert.equal(eventText({ kind: "voided", repetition: 0, body: { iteration: 2, operator: "Ada", reason: "the floor was wet" } }), "Repetition 0, iteration 2: the measurement by Ada is void: the floor was wet");
+  const judged = (kind) => eventText({ kind, repetition: 0, body: { iteration: 2, operator: "Ada", by: "Bea", reason: "it was wet" } });
+  assert.equal(judged("voided"), "Repetition 0, iteration 2: the measurement by Ada is void, says Bea: it was wet");
+  assert.equal(judged("corrected"), "Repetition 0, iteration 2: the measurement by Ada was corrected by Bea: it was wet");
+  assert.equal(judged("decided"), "Repetition 0, iteration 2: Bea decided about the answer by Ada: it was wet");
   assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: 0.5 } }), "Repetition 0, iteration 2: the controller reaches 0.5 in reality");
   assert.equal(eventText({ kind: "transferred", repetition: 0, body: { iteration: 2, simulated_fitness: null } }), "Repetition 0, iteration 2: controller evolved, the physics failed in simulation");
   assert.match(eventText({ kind: "tuned", repetition: 0, body: { iteration: 1, squared_error: 0.00001 } }), /sum of squared errors 1\.0e-5$/);

@@ -55,6 +55,7 @@ class Driver:
         (SENSORS, (0.4, TABLE[:2]), "readings of another shape than the sensors'; return 3 rows of 2 numbers"),
         (SENSORS, (0.4, [0.1, 0.2, 0.3]), "readings of another shape"),
         (SENSORS.model_copy(update={"names": (), "times_s": ()}), (0.4, TABLE), "the robot has no sensors"),
+        (SENSORS, (0.4, [[0.1, float("inf")]] * 3), "cannot be sent: /readings/0/1: must be a finite number, not inf"),
     ],
 )
 def test_a_wrong_answer_is_refused_after_the_first_run(sensors: SensorsRead, answer: Any, said: str) -> None:
