@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from gaplab.api.process.local_service import local_service as local_service
     from gaplab.samples import InvalidSamples as InvalidSamples
     from gaplab.samples import read_samples as read_samples
+    from gaplab.services.core.errors import InvalidSpec as InvalidSpec
 
 _MODULES = {
     "Client": "gaplab.api.clients.client",
@@ -45,6 +46,7 @@ _MODULES = {
     "ExtraMissing": "gaplab.api.clients.errors",
     "Figure": "gaplab.api.clients.figures",
     "InvalidSamples": "gaplab.samples",
+    "InvalidSpec": "gaplab.services.core.errors",
     "MeasurementFailed": "gaplab.api.clients.drivers",
     "NotSubmitted": "gaplab.api.clients.confirmation",
     "ServiceError": "gaplab.api.clients.errors",

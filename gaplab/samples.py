@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.errors import InvalidSpec, Violation
@@ -24,10 +24,15 @@ class InvalidSamples(ValueError):
 
     def __init__(self, path: Path, errors: tuple[Any, ...], more: int) -> None:
         self.errors = errors
+        self._made_of = path, errors, more
         lines = [
             f"{path.name}:{each.line}{f', {each.column}' if each.column else ''}: {each.message}" for each in errors
         ]
         super().__init__("\n".join([*lines, *([f"and {more} more"] if more else [])]))
+
+    def __reduce__(self) -> tuple[type[Self], tuple[Path, tuple[Any, ...], int]]:
+        """Return what a process that unpickles the error creates it of."""
+        return type(self), self._made_of
 
 
 def read_samples(path: str | Path, robot: str | Path, options: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
@@ -47,7 +52,10 @@ def read_samples(path: str | Path, robot: str | Path, options: Mapping[str, Any]
     Raises:
         InvalidSamples: the file has errors; all are named.
         InvalidSpec: the robot does not exist, or refuses its options.
+        TypeError: the robot is neither a name nor a file.
     """
+    if not isinstance(robot, str | Path):
+        raise TypeError(f"a robot is its name or its file, not {robot!r:.100}; give its options as `options`")
     file = Path(path)
     found = read_table(file.read_text("utf-8", "replace"), _robot(robot, dict(options or {}), file))
     if found.errors:

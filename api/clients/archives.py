@@ -1,6 +1,9 @@
 """Archives of studies and experiments, sent and received in parts of bounded size."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from typing import IO
 
 from gaplab.api.clients.connection import Connection
@@ -17,13 +20,39 @@ class Archives:
         self._connection = connection
         self._records = records
 
-    def export(self, id: str, file: IO[bytes]) -> None:
-        """Write a study or an experiment into an open file, as one archive."""
+    def export(self, id: str, file: str | Path | IO[bytes]) -> None:
+        """Write a study or an experiment into a file, as one archive.
+
+        Args:
+            id: id of the study or the experiment.
+            file: new file, or an open one.
+
+        Raises:
+            OSError: the file exists already, or cannot be written.
+        """
+        if isinstance(file, str | Path):
+            with _new(Path(file)) as target:
+                self.export(id, target)
+            return
         with self._connection.stream("GET", f"{path_of(self._records.find(id))}/export") as answer:
             for chunk in answer.iter_bytes():
                 file.write(chunk)
 
-    def import_(self, file: IO[bytes]) -> ImportRead:
-        """Store the content of an archive; the answer has its ids."""
+    def import_(self, file: str | Path | IO[bytes]) -> ImportRead:
+        """Store the content of an archive, a file or an open one; the answer has its ids."""
+        if isinstance(file, str | Path):
+            with Path(file).open("rb") as source:
+                return self.import_(source)
         headers, content = {"Content-Type": "application/zip"}, iter(partial(file.read, _CHUNK), b"")
         return self._connection.change(ImportRead, "POST", "/import", content=content, headers=headers)
+
+
+@contextmanager
+def _new(path: Path) -> Iterator[IO[bytes]]:
+    """Open a new file to write into; remove it if that fails."""
+    with path.open("xb") as file:
+        try:
+            yield file
+        except BaseException:
+            path.unlink()
+            raise

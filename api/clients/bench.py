@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypedDict, Unpack
 
-from gaplab.api.clients.bodies import readings_of
+from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.driving import Driving, TakenRequest
 from gaplab.api.clients.journal import Journal
@@ -172,7 +172,7 @@ class Bench:
                 `qw`.
             lags_s: when the motion began on the clock of each trace; None: found by cross-correlation.
         """
-        body = _without_none({"traces": traces, "lags_s": lags_s})
+        body = _without_none({"traces": list(traces), "lags_s": lags_s})
         return self._connection.post(TracesRead, f"/requests/{segment(id)}/traces", body)
 
     def check_samples(
@@ -193,7 +193,9 @@ class Bench:
             task: its task, likewise.
         """
         given = {"options": dict(options or {}), "controller": controller, "task": task}
-        query = "".join(f"&{name}={segment(json.dumps(value))}" for name, value in given.items() if value is not None)
+        query = "".join(
+            f"&{name}={segment(json.dumps(json_of(value)))}" for name, value in given.items() if value is not None
+        )
         return self._connection.change(
             SamplesRead,
             "POST",
@@ -222,7 +224,7 @@ class Bench:
 
 def _body(values: Sequence[float] | None, details: Details) -> dict[str, Any]:
     """Return an answer or a correction as it is sent."""
-    body = _without_none({"values": values} | details)
+    body = _without_none({"values": None if values is None else numbers_of(values, "/values")} | details)
     return body | {"readings": readings_of(body["readings"])} if "readings" in body else body
 
 

@@ -27,6 +27,10 @@ class Comparisons(tuple[Comparison, ...]):
         made._formatted = formatted
         return made
 
+    def __reduce__(self) -> tuple[type[Self], tuple[tuple[Comparison, ...], Callable[[str], str]]]:
+        """Return what a copy is made of, also in another process; it has no service that would format it."""
+        return type(self), (tuple(self), _refused)
+
     def frame(self) -> "pandas.DataFrame":
         """Return a row for each pair, with a column for each number, named as in CSV; an undefined number is nan.
 
@@ -36,9 +40,17 @@ class Comparisons(tuple[Comparison, ...]):
         return frame([row(pair) for pair in self], COLUMNS, NUMBERS)
 
     def csv(self) -> str:
-        """Return the same rows as CSV."""
+        """Return the same rows as CSV.
+
+        Raises:
+            RuntimeError: it is a copy.
+        """
         return self._formatted("csv")
 
     def latex(self) -> str:
         """Return tables for a paper, with p before and after Holm's correction; LaTeX needs the package booktabs."""
         return self._formatted("latex")
+
+
+def _refused(format: str) -> str:  # noqa: A002 - as the API says
+    raise RuntimeError(f"a copy of a comparison has no {format}, which the service writes; call `compare` again")

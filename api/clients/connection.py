@@ -9,7 +9,7 @@ from urllib.parse import quote
 from uuid import uuid4
 
 import httpx2
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from gaplab.api.clients.bodies import json_of
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, error_of
@@ -132,8 +132,12 @@ class Connection:
 
         Raises:
             ValueError: a number of the body is not finite.
-            TypeError: JSON cannot hold a value of the body.
+            TypeError: JSON cannot hold a value of the body, or a parameter is a record in place of its id.
         """
+        for name, value in request.get("params", {}).items():
+            for each in value if isinstance(value, list | tuple) else (value,):
+                if isinstance(each, BaseModel):
+                    raise TypeError(f"{name}: an id is a text, not {each!r:.100}; give its `.id`")
         if "json" in request:
             request["json"] = json_of(request["json"])
         try:
@@ -195,5 +199,6 @@ def segment(id: str) -> str:
         TypeError: it is no text.
     """
     if not isinstance(id, str):
-        raise TypeError(f"an id or a name is a text, not {id!r:.100}")
+        hint = "; give its `.id`" if isinstance(id, BaseModel) else ""
+        raise TypeError(f"an id or a name is a text, not {id!r:.100}{hint}")
     return quote(id.replace("/", "%2F"), safe="", errors="replace").replace(".", "%2E") or "%20"

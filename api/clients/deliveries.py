@@ -12,6 +12,9 @@ from gaplab.schemas.measurements import AnswerRead
 PAUSE_S = 2.0
 """Pause after a request that the service could not serve."""
 
+INVALID = 422
+"""Status of an answer with a mistake, like too few values: what was measured is still good."""
+
 log = logging.getLogger("gaplab.driver")
 
 
@@ -64,7 +67,9 @@ class Deliveries:
                 time.sleep(PAUSE_S)
             except ServiceError as error:
                 if error.problem.status < 500 and error.problem.status != 429:
-                    if not refuses_sender(error):
+                    if error.problem.status == INVALID:
+                        self.journal.refused(key)
+                    elif not refuses_sender(error):
                         self.journal.sent(key)
                     raise
                 log.warning("not taken yet: %s", error)

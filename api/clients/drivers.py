@@ -83,7 +83,7 @@ def measure(task: TakenRequest, driver: Driver, limit_s: float | None, tell: Cal
         DriverBroken: the driver hangs or answers nonsense; the request is released.
     """
     limit_s, sensors = limit_s or 60.0 + 10.0 * task.motion.observe_s[-1], task.sensors
-    found = list(task.known)
+    found = [(value, readings) for value, readings in task.known if _fit(readings, sensors)]
     if found:
         tell(f"{len(found)} of {task.repeats} repeats are in the journal already")
     try:
@@ -141,7 +141,12 @@ def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a dri
     fitness, readings = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
     if isinstance(fitness, bool) or (not isinstance(fitness, int | float) and not hasattr(fitness, "__float__")):
         raise DriverBroken(f"the driver's run returned {answer!r:.100}; it must return the fitness, a number")
-    value = float(fitness)
+    try:
+        value = float(fitness)
+    except (TypeError, ValueError) as error:
+        raise DriverBroken(
+            f"the driver's run returned {answer!r:.100}; it must return the fitness, a number"
+        ) from error
     if not isfinite(value):
         raise DriverBroken(f"the driver's run returned {value}; raise MeasurementFailed if nothing was measured")
     try:
@@ -168,6 +173,14 @@ def _check_readings(readings: Any, sensors: SensorsRead | None) -> None:  # noqa
         raise DriverBroken(f"the driver's run returned no readings, but the experiment tunes on them: {msg}")
     if not _has_shape(readings, len(times_s), len(names)):
         raise DriverBroken(f"the driver's run returned readings of another shape than the sensors'; return {shape}")
+
+
+def _fit(readings: Any, sensors: SensorsRead | None) -> bool:  # noqa: ANN401 - whatever a journal has
+    try:
+        _check_readings(readings, sensors)
+    except DriverBroken:
+        return False
+    return True
 
 
 def _has_shape(readings: Any, rows: int, columns: int) -> bool:  # noqa: ANN401 - whatever a driver returns

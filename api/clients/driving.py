@@ -8,10 +8,10 @@ from functools import cached_property
 from threading import Event, Thread
 from typing import Any
 
-from gaplab.api.clients.bodies import json_of, readings_of
+from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.deliveries import PAUSE_S, Deliveries, log
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
 from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.motions import DriverMotion, motion_of
 from gaplab.api.clients.records import Records
@@ -31,11 +31,13 @@ class TakenRequest:
     Attributes:
         request: the request, as it was taken.
         answered: the service's answer, once it is told.
+        over: whether it is answered or released, so that no sign of life is due.
     """
 
     def __init__(self, driving: "Driving", request: RequestRead) -> None:
         self.request = request
         self.answered: AnswerRead | None = None
+        self.over = Event()
         self._driving = driving
 
     @cached_property
@@ -78,8 +80,8 @@ class TakenRequest:
 
     def note(self, value: float, readings: Any = None) -> None:  # noqa: ANN401 - JSON
         """Journal one repeat, so that a power cut before the last one loses nothing; its errors are those of `tell`."""
-        kept = json_of({"value": value, "readings": readings_of(readings)})
-        self._driving.deliveries.journal.repeat(self.id, kept["value"], kept["readings"])
+        (number,) = numbers_of([value], "/values")
+        self._driving.deliveries.journal.repeat(self.id, number, json_of(readings_of(readings), "/readings"))
 
     def tell(self, values: float | Sequence[float], readings: Any = None, note: str | None = None) -> AnswerRead:  # noqa: ANN401 - JSON
         """Answer with the value, or the values of all repeats.
@@ -91,19 +93,20 @@ class TakenRequest:
 
         Raises:
             ValueError: a value is not finite, or a reading is infinite; nothing is journalled.
-            TypeError: values or readings are no numbers.
+            TypeError: a value is no number, or JSON cannot hold a reading; nothing is journalled.
+            ServiceError: the service refuses the answer; repeats that were noted stay `known`.
         """
-        told = json_of({"values": values, "readings": readings_of(readings), "note": note})
-        each = told["values"] if isinstance(told["values"], list) else [told["values"]]
-        return self._answer(told | {"values": each})
+        told = {"values": numbers_of(values, "/values"), "readings": json_of(readings_of(readings), "/readings")}
+        return self._answer(told | {"note": note})
 
-    def fail(self, reason: str) -> AnswerRead:
+    def fail(self, reason: str | Exception) -> AnswerRead:
         """Answer that the measurement failed: the controller counts as tried, and teaches nothing."""
-        return self._answer({"failed": reason})
+        return self._answer({"failed": str(reason) or type(reason).__name__})
 
     def _answer(self, answer: dict[str, Any]) -> AnswerRead:
         given = {name: value for name, value in answer.items() if value is not None}
         self.answered = self._driving.deliveries.send(self.id, given | {"take": self.request.takes})
+        self.over.set()
         return self.answered
 
 
@@ -134,13 +137,12 @@ class Driving:
                 if experiment is not None and self._ended(experiment):
                     return
                 continue
-            with self._held(request):
-                task = None
+            task = TakenRequest(self, request)
+            with self._held(task):
                 try:
-                    task = TakenRequest(self, request)
                     yield task
                 finally:
-                    if task is None or task.answered is None:
+                    if task.answered is None:
                         self._release(request)
 
     def _next(self, experiment: str | None, bench: str | None) -> RequestRead | None:
@@ -148,6 +150,7 @@ class Driving:
 
         Raises:
             ServiceError: the service refuses the token of the driver, or what it asks for.
+            UnknownService: what answers is no gaplab of this version.
         """
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": WAIT_S}
         request = None
@@ -157,7 +160,7 @@ class Driving:
                 if is_free and (taken := self._take(request)):
                     return taken
         except (ServiceUnreachable, ServiceError) as error:
-            if isinstance(error, ServiceError) and error.problem.status < 500:
+            if is_final(error):
                 raise
             log.warning("no answer: %s", error)
             time.sleep(PAUSE_S)
@@ -197,21 +200,20 @@ class Driving:
             return False
 
     @contextmanager
-    def _held(self, request: RequestRead) -> Iterator[None]:
-        """Show signs of life for a request from another thread."""
-        over = Event()
-        thread = Thread(target=self._beat, args=(request, over), name="heartbeat", daemon=True)
+    def _held(self, task: TakenRequest) -> Iterator[None]:
+        """Show signs of life for a request from another thread, until it is answered."""
+        thread = Thread(target=self._beat, args=(task,), name="heartbeat", daemon=True)
         thread.start()
         try:
             yield
         finally:
-            over.set()
+            task.over.set()
             thread.join()
 
-    def _beat(self, request: RequestRead, over: Event) -> None:
-        path = f"/requests/{segment(request.id)}/heartbeat"
-        while not over.wait(self._lease_s / 3):
+    def _beat(self, task: TakenRequest) -> None:
+        path = f"/requests/{segment(task.id)}/heartbeat"
+        while not task.over.wait(self._lease_s / 3):
             try:
-                self._connection.change(RequestRead, "POST", path, json={"take": request.takes})
+                self._connection.change(RequestRead, "POST", path, json={"take": task.request.takes})
             except (ServiceError, ServiceUnreachable) as error:
                 log.warning("no heartbeat: %s", error)

@@ -1,5 +1,7 @@
 """Errors between a client and the service."""
 
+from typing import Self
+
 import httpx2
 from pydantic import ValidationError
 
@@ -19,6 +21,10 @@ class ServiceError(Exception):
         self.retry_after_s = retry_after_s
         super().__init__("\n".join(lines_of(problem)) if len(problem.errors) > 1 else problem.detail)
 
+    def __reduce__(self) -> tuple[type[Self], tuple[Problem, float | None]]:
+        """Return what a process that unpickles the error creates it of."""
+        return type(self), (self.problem, self.retry_after_s)
+
 
 class ServiceUnreachable(Exception):
     """No service answers at the address, or none in time."""
@@ -37,17 +43,28 @@ class ExperimentFailed(Exception):
         reasons = sorted({reason for experiment in experiments for reason in experiment.reasons})
         super().__init__("; ".join([f"{ended.name} ({ended.id}) ended as {ended.state}", *reasons]))
 
+    def __reduce__(self) -> tuple[type[Self], tuple[ExperimentRead | StudyRead]]:
+        """Return what a process that unpickles the error creates it of."""
+        return type(self), (self.ended,)
+
 
 class ExtraMissing(ImportError):
     """A library of an optional extra is not installed; the message has the command that installs it."""
 
     def __init__(self, library: str, extra: str) -> None:
+        self.extra = extra
         super().__init__(f"this needs {library}, which is not installed: pip install 'gaplab[{extra}]'", name=library)
+
+    def __reduce__(self) -> tuple[type[Self], tuple[str, str]]:
+        """Return what a process that unpickles the error creates it of."""
+        return type(self), (str(self.name), self.extra)
 
 
 def is_final(error: Exception) -> bool:
     """Return whether a repeated request would fail the same way."""
-    return isinstance(error, ServiceError) and error.problem.status < 500
+    if isinstance(error, ServiceError):
+        return error.problem.status < 500
+    return isinstance(error, UnknownService)
 
 
 def refuses_sender(error: ServiceError) -> bool:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator, Sequence
 
 from gaplab.api.clients.connection import Connection, Parameter
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, is_final
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
 from gaplab.schemas.events import EventPage, EventRead
 
 RETRY_S = 1.0
@@ -51,7 +51,7 @@ class EventLog:
             except (ServiceError, ServiceUnreachable) as error:
                 now = time.monotonic()
                 away_since = now if away_since is None else away_since
-                if isinstance(error, UnknownService) or is_final(error) or now - away_since > patience_s:
+                if is_final(error) or now - away_since > patience_s:
                     raise
             time.sleep(RETRY_S)
 

@@ -84,7 +84,11 @@ class Figures:
 
         Raises:
             ServiceError: an id is unknown. An unknown kind or option raises when the figure is drawn.
+            TypeError: an option would change the format or the experiments.
         """
+        if wrong := sorted({"format", "study", "experiment"} & options.keys()):
+            msg = "give ids first, and the format as the suffix of the file that you save"
+            raise TypeError(f"{', '.join(wrong)}: no option of a figure; {msg}")
         records = [self._records.find(id) for id in ids]
         drawn = split(records)
 

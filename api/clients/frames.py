@@ -22,9 +22,24 @@ def pandas_library() -> Any:  # noqa: ANN401 - a module that may be missing
         raise ExtraMissing("pandas", "notebook") from error
 
 
-def frame(rows: Sequence[Sequence[object]], columns: Sequence[str], numeric: Sequence[str]) -> "pandas.DataFrame":
-    """Return a frame whose numeric columns have nan for null, even if every value is null."""
-    made = pandas_library().DataFrame(rows, columns=columns)
+def frame(
+    rows: Sequence[Sequence[object]],
+    columns: Sequence[str],
+    numeric: Sequence[str],
+    whole: Sequence[str] = (),
+) -> "pandas.DataFrame":
+    """Return a frame whose columns have the same types with and without rows.
+
+    Args:
+        rows: values by column.
+        columns: names of the columns.
+        numeric: columns of numbers, with nan for null, even if every value is null.
+        whole: those of them that are whole numbers, and never null.
+    """
+    pandas = pandas_library()
+    made = pandas.DataFrame(rows, columns=columns)
+    if made.empty:
+        return made.astype({name: "int64" if name in whole else "float64" for name in numeric})
     for name in numeric:
-        made[name] = pandas_library().to_numeric(made[name])
+        made[name] = pandas.to_numeric(made[name])
     return made

@@ -41,11 +41,16 @@ class Journal:
         self._write({"request": request, "repeat": value, "readings": readings})
 
     def repeats(self, request: str) -> list[tuple[float, Any]]:
-        """Return the repeats of a request that has no answer yet; those of an answered one were used."""
+        """Return the repeats of a request that no answer has used; an answer that was refused has used none."""
+        refused = {line["sent"] for line in self._lines if line.get("refused")}
         found: list[tuple[float, Any]] = []
         for line in self._lines:
-            if line.get("request") == request:
-                found = [] if "answer" in line else [*found, (line["repeat"], line.get("readings"))]
+            if line.get("request") != request:
+                continue
+            if "repeat" in line:
+                found.append((line["repeat"], line.get("readings")))
+            elif line["key"] not in refused:
+                found = []
         return found
 
     def answer(self, request: str, answer: dict[str, Any]) -> str:
@@ -55,8 +60,12 @@ class Journal:
         return key
 
     def sent(self, key: str) -> None:
-        """Note that the service has an answer, or has refused it for good."""
+        """Note that the service has an answer, or does not want it any more."""
         self._write({"sent": key})
+
+    def refused(self, key: str) -> None:
+        """Note that an answer has a mistake, so that it is not sent again; its repeats may be in another."""
+        self._write({"sent": key, "refused": True})
 
     def unsent(self) -> list[tuple[str, dict[str, Any], str]]:
         """Return the requests, answers and keys that the service may not have."""

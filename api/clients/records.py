@@ -61,21 +61,27 @@ class Records:
         return self._connection.get(SpecRead, f"{path_of(self.find(id))}/spec")
 
     def studies(self, *, query: str | None = None, **filters: str | int | None) -> Page[StudyRead]:
-        """Return studies, newest first.
+        """Return a page of studies, newest first: `items`, and `next`, the cursor of the next page or None.
 
         Args:
             query: like `strategy = informative and fitness > 0.5`, or words; archived ones need `archived = true`.
-            filters: as in the API: limit, cursor, state, strategy, text, sort.
+            filters: as in the API: limit (50 if left out, 500 at most), cursor, state, strategy, text, sort.
         """
         return self._connection.get(Page[StudyRead], "/studies", q=query, **filters)
 
     def experiments(self, *, query: str | None = None, **filters: str | int | None) -> Page[ExperimentRead]:
-        """Return experiments, newest first; the query and the filters are those of `studies`, and study."""
+        """Return a page of experiments, newest first; the query and the filters are those of `studies`, and study."""
         return self._connection.get(Page[ExperimentRead], "/experiments", q=query, **filters)
 
-    def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:
-        """Change the name, the notes or the tags of a study or an experiment, and return it."""
-        return self.patch(id, edit.model_dump(exclude_unset=True))
+    def edit(self, id: str, edit: Edit | Mapping[str, Any]) -> ExperimentRead | StudyRead:
+        """Change the name, the notes or the tags of a study or an experiment, and return it.
+
+        Args:
+            id: id of the study or the experiment.
+            edit: what changes, like `{"notes": "the floor was wet", "add_tags": ["wet"]}`; permitted: name, notes,
+                tags, add_tags and remove_tags.
+        """
+        return self.patch(id, edit.model_dump(exclude_unset=True) if isinstance(edit, Edit) else edit)
 
     def patch(self, id: str, body: Mapping[str, Any]) -> ExperimentRead | StudyRead:
         """Change fields of a study or an experiment, which the service validates, and return it."""

@@ -49,6 +49,8 @@ class Replays:
             width: width in pixels; the height is three quarters of it.
         """
         path = Path(file)
+        if path.suffix.lower() != ".png":
+            raise ValueError(f"{path} has no suffix of a picture; permitted: .png")
         content = self._connection.get_bytes(f"/catalogue/robots/{segment(name)}/picture", theme=theme, width=width)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)

@@ -73,14 +73,14 @@ class Results:
         whose p are too small.
 
         Args:
-            experiments: ids of experiments, or of studies for all of their experiments.
+            experiments: ids of experiments, or of studies for all of their experiments; or a single id.
             first: first number of real-world evaluations; left out: `last`.
             last: last number; left out: the last that all experiments have.
             margin: difference in the unit of fitness; `equivalence` of a pair says whether it differs by less.
             margin_of_direct: the same margin as a share of the direct baseline's mean fitness, like 0.03.
             intervals: with bootstrap intervals; left out: for up to 20 experiments.
         """
-        records = [each for id in experiments for each in experiments_of(self._records.find(id))]
+        records = [each for id in _several(experiments) for each in experiments_of(self._records.find(id))]
         query: dict[str, Parameter] = {"experiment": [each.id for each in records], "from": first, "to": last}
         query |= {"margin": margin, "margin_of_direct": margin_of_direct, "intervals": intervals}
         pairs = self._connection.get(tuple[Comparison, ...], "/comparisons", **query)
@@ -104,7 +104,12 @@ class Results:
         return self._connection.get_bytes(f"/experiments/{segment(id)}/misfit", format="csv").decode()
 
     def _experiments(self, ids: Sequence[str]) -> list[str]:
-        return [experiment.id for id in ids for experiment in experiments_of(self._records.find(id))]
+        return [experiment.id for id in _several(ids) for experiment in experiments_of(self._records.find(id))]
+
+
+def _several(ids: Sequence[str]) -> Sequence[str]:
+    """Return ids; a single one, which is a sequence of letters, as a list."""
+    return [ids] if isinstance(ids, str) else ids
 
 
 def _hundreds(experiments: Sequence[str]) -> Iterator[list[str]]:

@@ -9,13 +9,16 @@ from gaplab.api.clients.frames import frame, pandas_library
 from gaplab.api.clients.results import Results
 from gaplab.schemas.curves import CurvePoint
 from gaplab.schemas.predictions import Prediction, Predictions
-from gaplab.schemas.records import ExperimentRead, MeasurementKind, Page, SampleRead, SensorsRead, SimulatorRead
+from gaplab.schemas.records import ExperimentRead, Page, SampleRead, SensorsRead, SimulatorRead
 
 if TYPE_CHECKING:
     import pandas
 
 PAGE = 5_000
 """Items of a page: the most that the service permits."""
+
+WHOLE = ("repetition", "iteration", "rank", "evaluations", "n", "repeats")
+"""Columns of whole numbers, in whatever table."""
 
 STATISTICS = ("evaluations", "n", "mean", "sd", "lower", "upper")
 
@@ -41,12 +44,13 @@ class Tables:
             for point in curve.points
             for row in _rows(point, each=each)
         ]
-        return frame(rows, ("experiment", "name", "strategy", *numbers), numbers)
+        return frame(rows, ("experiment", "name", "strategy", *numbers), numbers, WHOLE)
 
     def samples(self, id: str, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
         """Return the real-world evaluations of an experiment, with a column for each gene.
 
-        `repeats` is the number of values whose mean is the fitness. `standard_error` is nan without repeats.
+        `repeats` is the number of values whose mean is the fitness, 0 if the measurement failed. `standard_error` is
+        nan without repeats. Without evaluations there are no columns of genes.
 
         Args:
             id: id of the experiment.
@@ -55,9 +59,10 @@ class Tables:
         """
         samples = self._samples(id, repetition, kind)
         columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at", "standard_error")
-        rows = [[*(getattr(sample, name) for name in columns), len(sample.repeats or (0,))] for sample in samples]
-        table = frame(rows, (*columns, "repeats"), ("fitness", "standard_error"))
-        table["kind"] = table["kind"].astype(str)
+        rows = [[*(getattr(sample, name) for name in columns), _repeats(sample)] for sample in samples]
+        numbers = ("repetition", "iteration", "fitness", "standard_error", "repeats")
+        table = frame(rows, (*columns, "repeats"), numbers, WHOLE)
+        table = table.astype({"kind": str, "measured_by": str, "measured_at": "datetime64[us, UTC]"})
         genes = pandas_library().DataFrame([sample.genome for sample in samples], index=table.index)
         return table.join(genes.rename(columns=lambda gene: f"gene_{gene}"))
 
@@ -85,13 +90,16 @@ class Tables:
             if sample.readings is not None
             for time_s, *values in _values(sample.readings, sensors)
         ]
-        return frame(rows, ("repetition", "iteration", "kind", "time_s", *names), ("time_s", *names))
+        numbers = ("repetition", "iteration", "time_s", *names)
+        return frame(rows, ("repetition", "iteration", "kind", "time_s", *names), numbers, WHOLE).astype({"kind": str})
 
     def simulators(self, id: str, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
         """Return the tuned simulators of an experiment, with a column for each tunable; rank 0 is an iteration's best.
 
         `squared_error` is a sum over samples and grows with them; `error` is per sample, in the unit of the
-        discrepancy; by default the root mean square.
+        discrepancy; by default the root mean square. A tuner that gives 95 % intervals has the columns `NAME_lower` and
+        `NAME_upper` of each tunable, and one that gives shares of the posterior probability the column `weight`.
+        Without simulators there are no columns of tunables.
 
         Args:
             id: id of the experiment.
@@ -102,8 +110,8 @@ class Tables:
         filters = {"limit": PAGE, "repetition": repetition, "iteration": iteration}
         simulators = list(self._connection.items(Page[SimulatorRead], path, **filters))
         columns = ("repetition", "iteration", "rank", "squared_error", "error")
-        table = frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns)
-        return table.join(pandas_library().DataFrame([row.parameters for row in simulators], index=table.index))
+        table = frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns, WHOLE)
+        return table.join(pandas_library().DataFrame([_tuned(row) for row in simulators], index=table.index))
 
     def predictions(self, id: str, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":
         """Return the fitness of each sample in reality, and in simulation before and after it was measured.
@@ -127,11 +135,24 @@ class Tables:
                 raise TimeoutError(msg)
             time.sleep(every_s)
         columns = tuple(Prediction.model_fields)
-        return frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns)
+        return frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns, WHOLE)
 
     def _samples(self, id: str, repetition: int | None, kind: str | None) -> list[SampleRead]:
-        path, wanted = f"/experiments/{segment(id)}/samples", None if kind is None else MeasurementKind(kind)
-        return list(self._connection.items(Page[SampleRead], path, limit=PAGE, repetition=repetition, kind=wanted))
+        path = f"/experiments/{segment(id)}/samples"
+        return list(self._connection.items(Page[SampleRead], path, limit=PAGE, repetition=repetition, kind=kind))
+
+
+def _repeats(sample: SampleRead) -> int:
+    """Return the number of values whose mean is the fitness; a measurement without repeats has one."""
+    return 0 if sample.fitness is None else len(sample.repeats or (sample.fitness,))
+
+
+def _tuned(simulator: SimulatorRead) -> dict[str, float]:
+    """Return the tunables of a simulator by column, and what its tuner says of them."""
+    found = dict(simulator.parameters)
+    for name, (lower, upper) in (simulator.intervals or {}).items():
+        found |= {f"{name}_lower": lower, f"{name}_upper": upper}
+    return found if simulator.weight is None else found | {"weight": simulator.weight}
 
 
 def _values(readings: Sequence[float | None], sensors: SensorsRead) -> Iterator[tuple[float | None, ...]]:

@@ -59,6 +59,7 @@ class Watcher:
             ExperimentFailed: it failed or was cancelled; `ended` is its last state.
             TimeoutError: it has not ended yet. It continues; wait again.
         """
+        every_s = every_s if timeout_s is None else min(every_s, timeout_s)
         snapshots = _within(Snapshots(self._records).of(id, every_s=every_s, patience_s=patience_s), timeout_s)
         if progress is None:
             progress = in_notebook() or sys.stderr.isatty()

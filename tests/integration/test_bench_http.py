@@ -4,13 +4,15 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Event, Thread
+from threading import enumerate as threads
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from httpx2 import MockTransport, Response
 
-from gaplab import Client, ServiceError
+from gaplab import Client, ServiceError, ServiceUnreachable
 from gaplab.api.clients import driving
 from gaplab.api.clients.journal import Journal
 from gaplab.schemas.access import Role
@@ -19,6 +21,7 @@ from gaplab.services.store.session import Store
 from tests.experiments import toy
 from tests.integration.test_bench import compute, truth
 from tests.integration.test_client import InProcess
+from tests.waiting import wait_until
 
 SPEC = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 1, "iterations": 2}
 REALITY = {"kind": "physical", "probes": "each"}
@@ -340,7 +343,7 @@ def test_readings_of_numpy_are_stored_with_null_where_a_sensor_failed(
     assert task.sensors is not None
     table = np.full((len(task.sensors.times_s), len(task.sensors.names)), 0.25, dtype=np.float32)
 
-    for wrong, place in (((np.inf, table), "/value"), ((0.5, table * np.inf), "/readings/0/0")):
+    for wrong, place in (((np.inf, table), "/values/0"), ((0.5, table * np.inf), "/readings/0/0")):
         with pytest.raises(ValueError, match=f"^{place}: must be a finite number, not inf"):
             task.note(*wrong)
     assert journal.read_bytes() == b""
@@ -358,6 +361,49 @@ def test_readings_of_numpy_are_stored_with_null_where_a_sensor_failed(
     assert answer.readings is not None
     assert [set(row) for row in answer.readings[0]] == [set(row) for row in answer.readings[1]]
     assert (set(answer.readings[0][0]), set(answer.readings[0][1])) == ({0.25}, {None})
+
+
+@pytest.mark.usefixtures("computing")
+def test_repeats_of_an_answer_with_a_mistake_are_not_lost(client: Client, tmp_path: Path) -> None:
+    experiment = submitted(client, repeats=2)
+    loop = client.requests(experiment.id, journal=tmp_path / "journal")
+    task = next(loop)
+    task.note(0.25)
+    task.note(0.5)
+    wrong: Any = [[0.25], [0.5]]
+    with pytest.raises(TypeError, match=r"^/values/0: must be a number"):
+        task.tell(wrong)
+    with pytest.raises(ServiceError, match="2 values"):
+        task.tell([0.25])
+    del loop
+    loop = client.requests(experiment.id, journal=tmp_path / "journal")
+    again = next(loop)
+
+    assert (again.id, again.known) == (task.id, [(0.25, None), (0.5, None)])
+    assert again.tell([value for value, _ in again.known]).state == "counted"
+    assert again.known == []
+
+
+def test_no_sign_of_life_is_given_after_an_answer(client: Client, store: Store) -> None:
+    experiment = submitted(client)
+    compute(store)
+    loop = client.requests(experiment.id)
+    task = next(loop)
+    assert [each.name for each in threads() if each.name == "heartbeat"] == ["heartbeat"]
+
+    task.fail(RuntimeError(""))
+
+    wait_until(lambda: not any(each.name == "heartbeat" for each in threads()))
+    assert client.bench.request(task.id).answers[0].failed == "RuntimeError"
+
+
+def test_a_driver_ends_at_once_where_no_gaplab_is() -> None:
+    page = MockTransport(lambda _: Response(200, html="<p>welcome</p>"))
+    with (
+        Client("http://127.0.0.1:1", transport=page) as client,
+        pytest.raises(ServiceUnreachable, match="is no gaplab"),
+    ):
+        next(client.requests("x"))
 
 
 def test_an_answer_may_be_computed_from_traces(client: Client, store: Store, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gaplab.api.clients.drivers import DriverBroken, measure
@@ -55,6 +56,7 @@ class Driver:
         (SENSORS, (0.4, TABLE[:2]), "readings of another shape than the sensors'; return 3 rows of 2 numbers"),
         (SENSORS, (0.4, [0.1, 0.2, 0.3]), "readings of another shape"),
         (SENSORS.model_copy(update={"names": (), "times_s": ()}), (0.4, TABLE), "the robot has no sensors"),
+        (None, np.array([0.4, 0.5]), "must return the fitness, a number"),
         (SENSORS, (0.4, [[0.1, float("inf")]] * 3), "cannot be sent: /readings/0/1: must be a finite number, not inf"),
     ],
 )
@@ -74,6 +76,7 @@ def test_a_wrong_answer_is_refused_after_the_first_run(sensors: SensorsRead, ans
         (SENSORS.model_copy(update={"needed": True}), (0.4, TABLE), [([0.4, 0.4], [TABLE, TABLE])]),
         (SENSORS, 0.4, [([0.4, 0.4], None)]),
         (None, 0.4, [([0.4, 0.4], None)]),
+        (SENSORS, (0.4, np.array(TABLE, dtype=float)), [([0.4, 0.4], [TABLE, TABLE])]),
     ],
 )
 def test_what_fits_is_told_after_the_last_run(sensors: SensorsRead | None, answer: Any, told: Any) -> None:
@@ -82,3 +85,12 @@ def test_what_fits_is_told_after_the_last_run(sensors: SensorsRead | None, answe
     measure(task, driver, None, lambda sentence: None)  # type: ignore[arg-type]
 
     assert (driver.runs, task.told) == (2, told)
+
+
+def test_a_repeat_of_a_journal_whose_readings_do_not_fit_is_measured_again() -> None:
+    task, driver = Task(SENSORS.model_copy(update={"needed": True})), Driver((0.4, TABLE))
+    task.known = [(0.3, None), (0.2, TABLE)]
+
+    measure(task, driver, None, lambda sentence: None)  # type: ignore[arg-type]
+
+    assert (driver.runs, task.told) == (1, [([0.2, 0.4], [TABLE, TABLE])])
