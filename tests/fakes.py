@@ -13,8 +13,8 @@ from gaplab.services.core.registry import Plugin, Registry
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Budget, Outcome
-from gaplab.services.plugins import blame
 from gaplab.services.running import versions
+from gaplab.services.specs import blame
 
 TRUTH = np.array([0.7, 0.2])
 

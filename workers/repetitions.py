@@ -9,9 +9,9 @@ from time import monotonic
 import ray
 
 from gaplab.services.core.errors import Conflict, StoreUnavailable
-from gaplab.services.plugins.blame import describe
 from gaplab.services.running import execution
 from gaplab.services.running.silences import Silences
+from gaplab.services.specs.blame import describe
 from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store

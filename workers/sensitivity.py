@@ -13,11 +13,11 @@ from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort
 from gaplab.services.core.sensitivity import check as check_tunables
-from gaplab.services.plugins.blame import describe
 from gaplab.services.running import sensitivity
 from gaplab.services.running.execution import STALE_AFTER_S
 from gaplab.services.running.sensitivity import CheckClaim
 from gaplab.services.specs.assembly import subject
+from gaplab.services.specs.blame import describe
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from gaplab.workers.nodes import Versions, check_here

@@ -13,8 +13,8 @@ from gaplab.services.core.errors import RealityFailed
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.ports import Reality
 from gaplab.services.core.types import Measured, Probed
-from gaplab.services.plugins.blame import describe, raised
 from gaplab.services.specs.assembly import engine_of, setting
+from gaplab.services.specs.blame import describe, raised
 from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, TimedStep
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.nodes import Versions, check_here

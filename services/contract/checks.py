@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from inspect import getdoc
-from traceback import extract_tb
+from pathlib import Path
+from traceback import walk_tb
 from typing import Any
 
 from gaplab.services.contract import (
@@ -66,7 +67,9 @@ def results(kind: str, plugin: type[Any]) -> Iterator[Result]:
 def _reason(error: BaseException) -> str:
     """Return the message of a failed check; for an error of the plug-in, its kind and line too."""
     message = str(error).strip().partition("\n")[0]
-    if isinstance(error, AssertionError) and message:
+    (*_, (frame, line)) = walk_tb(error.__traceback__)
+    if isinstance(error, AssertionError) and frame.f_globals.get("__name__", "").startswith(f"{__package__}."):
         return message
-    (*_, last) = extract_tb(error.__traceback__)
-    return f"{type(error).__name__}: {message} ({last.filename.rpartition('/')[2]}, line {last.lineno})"
+    told = f"{type(error).__name__}: {message} ({Path(frame.f_code.co_filename).name}, line {line})"
+    changes = isinstance(error, ValueError) and "read-only" in message
+    return f"{told}: it changes an array that it was given; change a copy" if changes else told

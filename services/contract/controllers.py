@@ -4,10 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.contract.descriptions import is_described
+from gaplab.services.contract.motions import check_targets, numbers
+from gaplab.services.core.arrays import frozen
 from gaplab.services.core.controllers.base import Controller
 from gaplab.services.core.motions import Loop
-from gaplab.services.core.observations import GROUPS, names
+from gaplab.services.core.observations import GROUPS
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box
 from gaplab.services.core.world import Body, Joint, PDMotor, World
@@ -45,12 +47,6 @@ def prepared(plugin: Plugin) -> Iterator[tuple[Controller, World]]:
         yield controller, world
 
 
-def is_described(plugin: Plugin) -> None:
-    """Has a docstring whose first line is a sentence."""
-    described = plugin.describe()
-    assert described.summary.endswith("."), f"its summary is {described.summary!r}; end it with a full stop"
-
-
 def has_its_known_genome_in_its_space(plugin: Plugin) -> None:
     """Has a known genome within the bounds of its space."""
     for controller, _ in prepared(plugin):
@@ -65,16 +61,11 @@ def has_its_known_genome_in_its_space(plugin: Plugin) -> None:
 def drives_every_actuator(plugin: Plugin) -> None:
     """Describes motions with finite targets for every actuator, or loops, all observed at the given times."""
     for controller, world in prepared(plugin):
-        for genome in [controller.known, *controller.space.draw(5, np.random.default_rng(0))]:
+        for genome in frozen([controller.known, *controller.space.draw(5, np.random.default_rng(0))]):
             motion = controller.motion(genome)
             assert np.array_equal(motion.observe_s, OBSERVE_S), f"observe_s is {motion.observe_s.tolist()}"
-            if isinstance(motion, Loop):
-                continue
-            expected = (len(motion.times_s), len(world.actuators))
-            assert motion.targets.shape == expected, f"targets have the shape {motion.targets.shape}, not {expected}"
-            assert np.isfinite(motion.targets).all(), "targets are not finite"
-            assert motion.times_s[0] == 0.0, f"times_s begin at {motion.times_s[0]}, not at 0"
-            assert np.all(np.diff(motion.times_s) > 0), "times_s do not ascend"
+            if not isinstance(motion, Loop):
+                check_targets(motion, len(world.actuators))
 
 
 def declares_whether_it_loops(plugin: Plugin) -> None:
@@ -92,8 +83,8 @@ def declares_whether_it_loops(plugin: Plugin) -> None:
 def repeats_itself(plugin: Plugin) -> None:
     """Describes the same motion by the same genome, in every process."""
     for (first, world), (second, _) in zip(prepared(plugin), prepared(plugin), strict=True):
-        genome = first.space.draw(1, np.random.default_rng(1))[0]
-        answers = [_numbers(controller, world, genome[None]) for controller in (first, second, first)]
+        genome = frozen(first.space.draw(1, np.random.default_rng(1))[0])
+        answers = [numbers(controller, world, genome[None]) for controller in (first, second, first)]
         assert all(np.array_equal(answers[0], each) for each in answers), "the same genome gives different numbers"
 
 
@@ -102,38 +93,14 @@ def acts_on_each_row_alone(plugin: Plugin) -> None:
     if not plugin.loops:
         return
     for controller, world in prepared(plugin):
-        genomes = controller.space.draw(max(TOGETHER), np.random.default_rng(2))
-        whole = _numbers(controller, world, genomes)
+        genomes = frozen(controller.space.draw(max(TOGETHER), np.random.default_rng(2)))
+        whole = numbers(controller, world, genomes)
         assert np.isfinite(whole).all(), "targets or memories are not finite"
         for count in TOGETHER:
-            same = np.array_equal(_numbers(controller, world, genomes[:count]), whole[:, :count])
+            same = np.array_equal(numbers(controller, world, genomes[:count]), whole[:, :count])
             assert same, f"of {max(TOGETHER)} loops the first {count} differ from {count} alone"
-        backwards = _numbers(controller, world, genomes[::-1])
+        backwards = numbers(controller, world, genomes[::-1])
         assert np.array_equal(backwards[:, ::-1], whole), "loops differ with their order"
-
-
-def _numbers(controller: Controller, world: World, genomes: FloatArray) -> FloatArray:
-    """Return the numbers of each genome, `(k, n, ...)`: targets, of a loop also memories, of a few calls."""
-    loops = [controller.motion(genome) for genome in genomes]
-    if not isinstance(loops[0], Loop):
-        return np.array([[each.targets for each in loops if not isinstance(each, Loop)]])
-    first = loops[0]
-    count = len(names(world, first.senses))
-    memories = np.array([each.memory for each in loops if isinstance(each, Loop)])
-    found = []
-    for tick in range(12):
-        observations = np.array([_seen(genome, tick, count) for genome in genomes])
-        targets, memories = first.act(genomes, observations, memories, tick * first.period_s)
-        expected = (len(genomes), len(world.actuators))
-        assert np.shape(targets) == expected, f"act returned targets of shape {np.shape(targets)}, not {expected}"
-        assert np.shape(memories) == (len(genomes), len(first.memory)), f"act returned {np.shape(memories)} as memories"
-        found.append(np.hstack([targets, memories]))
-    return np.array(found)
-
-
-def _seen(genome: FloatArray, tick: int, count: int) -> FloatArray:
-    """Return some observations `(count,)` that belong to a genome and a call."""
-    return np.random.default_rng([tick, *np.frombuffer(genome.tobytes(), dtype=np.uint32)]).normal(size=count)
 
 
 CHECKS = (

@@ -1,32 +1,44 @@
 """The contract of a discrepancy."""
 
+from functools import partial
+
 import numpy as np
 
-from gaplab.services.core.arrays import FloatArray, Outcomes
+from gaplab.services.contract.descriptions import is_described
+from gaplab.services.contract.repetition import check_repeats
+from gaplab.services.core.arrays import NO_READINGS, FloatArray, Outcomes, frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 
 READINGS = 6
-TIMES_S = np.linspace(0.25, 1.5, READINGS)
+TIMES_S = frozen(np.linspace(0.25, 1.5, READINGS))
 Plugin = type[Discrepancy]
 
 
-def answers(plugin: Plugin, samples: int = 4, simulators: int = 5) -> tuple[Outcomes, FloatArray]:
+def answers(plugin: Plugin, samples: int = 4, simulators: int = 5, seed: int = 6) -> tuple[Outcomes, FloatArray]:
     """Return outcomes in simulation `(n, m, 1 + q)` and in reality `(n, 1 + q)`; q is 0 unless it `senses`."""
-    rng = np.random.default_rng(6)
+    rng = np.random.default_rng(seed)
     size = 1 + (READINGS if plugin.senses else 0)
     return rng.normal(size=(samples, simulators, size)), rng.normal(size=(samples, size))
 
 
-def terms(plugin: Plugin, simulated: Outcomes, measured: FloatArray) -> FloatArray:
-    """Return the terms `(n, m)` of a discrepancy."""
-    times_s = TIMES_S if plugin.senses else np.empty(0)
-    return np.asarray(plugin().terms(simulated, measured, times_s))
+def terms(discrepancy: Discrepancy, simulated: Outcomes, measured: FloatArray) -> FloatArray:
+    """Return the terms `(n, m)` of a discrepancy, which is given read-only arrays."""
+    return np.asarray(discrepancy.terms(frozen(simulated), frozen(measured), _times_s(discrepancy)))
+
+
+def residuals(discrepancy: Discrepancy, simulated: Outcomes, measured: FloatArray) -> FloatArray:
+    """Return the residuals `(n, m, r)` of a discrepancy, which is given read-only arrays."""
+    return np.asarray(discrepancy.residuals(frozen(simulated), frozen(measured), _times_s(discrepancy)))
+
+
+def _times_s(discrepancy: Discrepancy) -> FloatArray:
+    return TIMES_S if discrepancy.senses else NO_READINGS
 
 
 def gives_a_term_for_each_sample_and_simulator(plugin: Plugin) -> None:
     """Gives a number of at least 0 for each sample and simulator."""
     simulated, measured = answers(plugin)
-    found = terms(plugin, simulated, measured)
+    found = terms(plugin(), simulated, measured)
     assert found.shape == (4, 5), f"of 4 samples in 5 simulators it returns an array of shape {found.shape}"
     assert (found >= 0).all(), f"its least term is {found.min()}; permitted: at least 0"
 
@@ -34,16 +46,16 @@ def gives_a_term_for_each_sample_and_simulator(plugin: Plugin) -> None:
 def is_zero_where_nothing_differs(plugin: Plugin) -> None:
     """Is 0 for a simulator that answers as reality did, and above 0 for one that does not."""
     simulated, measured = answers(plugin)
-    same = terms(plugin, np.repeat(measured[:, None, :], 5, axis=1), measured)
+    same = terms(plugin(), np.repeat(measured[:, None, :], 5, axis=1), measured)
     assert (same == 0).all(), f"for the right simulator it is {same.max()}"
-    assert (terms(plugin, simulated, measured) > 0).all(), "it is 0 for a simulator that differs"
+    assert (terms(plugin(), simulated, measured) > 0).all(), "it is 0 for a simulator that differs"
 
 
 def judges_each_simulator_by_itself(plugin: Plugin) -> None:
     """Judges each sample in each simulator by itself, whatever else is in the call."""
     simulated, measured = answers(plugin)
-    together = terms(plugin, simulated, measured)
-    alone = terms(plugin, simulated[1:2, 2:3], measured[1:2])[0, 0]
+    together = terms(plugin(), simulated, measured)
+    alone = terms(plugin(), simulated[1:2, 2:3], measured[1:2])[0, 0]
     assert alone == together[1, 2], f"a term is {together[1, 2]} in a large call, and {alone} alone"
 
 
@@ -51,7 +63,7 @@ def says_where_the_physics_failed(plugin: Plugin) -> None:
     """Is nan where the physics failed, and there alone."""
     simulated, measured = answers(plugin)
     simulated[2, 3] = np.nan
-    failed = np.isnan(terms(plugin, simulated, measured))
+    failed = np.isnan(terms(plugin(), simulated, measured))
     assert failed[2, 3], "it is a number although the physics failed"
     assert failed.sum() == 1, "it is nan in simulators whose physics did not fail"
 
@@ -60,7 +72,7 @@ def copes_with_a_failed_sensor(plugin: Plugin) -> None:
     """Copes with readings in reality that are nan, because a sensor failed."""
     simulated, measured = answers(plugin)
     measured[1, 1:] = np.nan
-    assert np.isfinite(terms(plugin, simulated, measured)).all(), "a reading of nan makes a term nan"
+    assert np.isfinite(terms(plugin(), simulated, measured)).all(), "a reading of nan makes a term nan"
 
 
 def has_residuals_whose_squares_are_its_terms(plugin: Plugin) -> None:
@@ -68,21 +80,26 @@ def has_residuals_whose_squares_are_its_terms(plugin: Plugin) -> None:
     if not plugin.squares:
         return
     simulated, measured = answers(plugin)
-    times_s = TIMES_S if plugin.senses else np.empty(0)
-    squares = (plugin().residuals(simulated, measured, times_s) ** 2).sum(axis=-1)
-    assert np.allclose(squares, terms(plugin, simulated, measured)), "the squares of its residuals are not its terms"
+    squares = (residuals(plugin(), simulated, measured) ** 2).sum(axis=-1)
+    assert np.allclose(squares, terms(plugin(), simulated, measured)), "the squares of its residuals are not its terms"
 
 
-def is_described(plugin: Plugin) -> None:
-    """Has a docstring whose first line is a sentence."""
-    summary = plugin.describe().summary
-    assert summary.endswith("."), f"its summary in the catalogue is {summary!r}; end it with a full stop"
+def repeats_itself(plugin: Plugin) -> None:
+    """Gives the same terms for the same outcomes, whatever it compared before."""
+    questions = {}
+    for seed in (6, 7):
+        simulated, measured = answers(plugin, seed=seed)
+        questions[f"a term of outcomes {seed}"] = partial(terms, simulated=simulated, measured=measured)
+        if plugin.squares:
+            questions[f"a residual of outcomes {seed}"] = partial(residuals, simulated=simulated, measured=measured)
+    check_repeats(plugin, questions, "use no random numbers, and keep nothing from one call for the next")
 
 
 CHECKS = (
     gives_a_term_for_each_sample_and_simulator,
     is_zero_where_nothing_differs,
     judges_each_simulator_by_itself,
+    repeats_itself,
     says_where_the_physics_failed,
     copes_with_a_failed_sensor,
     has_residuals_whose_squares_are_its_terms,

@@ -11,8 +11,11 @@ from gaplab.services.contract.checks import CHECKS, Result, results
 from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.plugins.external import REGISTRIES
+from gaplab.services.plugins.ignored import NO_CLASS, why_no_plugin
 
 KINDS = tuple(CHECKS)
+
+_IMPORT = re.compile(r"^(?:from \S+ )?import (.+)$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -49,19 +52,33 @@ def write_skeleton(kind: str, name: str, folder: Path) -> Path:
         GaplabError: the name is not permitted, or the kind has a plug-in of this name.
         FileExistsError: the file exists.
     """
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or iskeyword(name):
-        raise GaplabError(f"{name!r} cannot be the name of a plug-in; use small letters, digits and _, like my_{kind}")
+    _check_name(kind, name)
     file = folder / f"{name}.py"
     if file.exists():
         raise FileExistsError(17, "the file exists; choose another name or folder", str(file))
     if name in REGISTRIES[kind]:
         raise GaplabError(f"there is a {kind} called {name!r} already; choose another name")
     template = files("gaplab.services.contract").joinpath("skeletons", f"{kind}.txt").read_text("utf-8")
-    class_name = "".join(part.capitalize() for part in name.split("_"))
+    class_name = _class_name(name)
+    if class_name in re.findall(r"\w+", " ".join(_IMPORT.findall(template))):
+        class_name += kind.capitalize()
     folder.mkdir(parents=True, exist_ok=True)
     with file.open("x", encoding="utf-8") as target:
         target.write(template.replace("{class}", class_name).replace("{name}", name))
     return file
+
+
+def _check_name(kind: str, name: str) -> None:
+    """Refuse a name that no module can have, or whose class no module can have."""
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or iskeyword(name):
+        raise GaplabError(f"{name!r} cannot be the name of a plug-in; use small letters, digits and _, like my_{kind}")
+    if iskeyword(class_name := _class_name(name)):
+        why = f"its class would be {class_name}, a word of Python"
+        raise GaplabError(f"{name!r} cannot be the name of a plug-in, since {why}; use another, like my_{kind}")
+
+
+def _class_name(name: str) -> str:
+    return "".join(part.capitalize() for part in name.split("_"))
 
 
 def check_file(file: Path) -> Iterator[CheckedPlugin]:
@@ -71,15 +88,15 @@ def check_file(file: Path) -> Iterator[CheckedPlugin]:
     imported.
 
     Args:
-        file: a module, or the folder of a package.
+        file: a module, or the folder of a package, or its `__init__.py`.
 
     Raises:
         FileNotFoundError: there is no such file.
-        GaplabError: it has no plug-in.
+        GaplabError: it has no plug-in; the message says why.
     """
-    path = file.absolute()
-    if not path.exists():
+    if not file.exists():
         raise FileNotFoundError(2, "there is no such file", str(file))
+    path = file.absolute().parent if file.name == "__init__.py" else file.absolute()
     module = f"{path.name}/" if path.is_dir() else path.name
     others = external_plugins.folders()
     if path.parent in others:
@@ -96,8 +113,14 @@ def check_file(file: Path) -> Iterator[CheckedPlugin]:
         found = True
         yield CheckedPlugin(refused_kind or "plug-in", name, unusable=why)
     if not found:
-        bases = ", ".join(kind.capitalize() for kind in KINDS)
-        raise GaplabError(f"{file} has no plug-in; it needs a class of one of {bases} from gaplab.plugins")
+        raise GaplabError(f"{file} has no plug-in; {_needed(path)}")
+
+
+def _needed(path: Path) -> str:
+    """Return what a file without a plug-in lacks."""
+    if (why := why_no_plugin(path)) != NO_CLASS:
+        return why
+    return f"it needs a class of one of {', '.join(kind.capitalize() for kind in KINDS)} from gaplab.plugins"
 
 
 def _unusable(module: str) -> list[tuple[str, str | None, str]]:

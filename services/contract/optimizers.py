@@ -1,17 +1,19 @@
 """The contract of an optimizer."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from gaplab.services.core.arrays import FloatArray, Genomes
+from gaplab.services.contract.repetition import check_repeats
+from gaplab.services.core.arrays import FloatArray, Genomes, frozen
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.search import Question, maximise
 from gaplab.services.core.space import Space
 
 SPACE = Space.box([0.0, -2.0, 0.0], [1.0, 2.0, 5.0], [True, False, False])
-SUMMIT = np.array([0.9, 0.5, 4.0])
+SUMMIT = frozen([0.9, 0.5, 4.0])
 Plugin = type[Optimizer]
 
 
@@ -33,8 +35,16 @@ class Hill:
 
 
 def searched(plugin: Plugin, hill: Hill, evaluations: int = 300) -> Any:  # noqa: ANN401 - a population
-    """Return what an optimizer finds on a hill."""
+    """Return what a new optimizer finds on a hill."""
     return maximise(plugin(), SPACE, hill, evaluations, np.random.default_rng(3))
+
+
+def numbers(optimizer: Optimizer, seed: int, members: int = 0) -> FloatArray:
+    """Return all that an optimizer asks for and finds on a hill, as one vector; with members, of its diverse one."""
+    hill = Hill()
+    searching = optimizer.diverse(members) if members else optimizer
+    found = maximise(searching, SPACE, hill, 200, np.random.default_rng(seed))
+    return np.concatenate([np.ravel(each) for each in (*hill.asked, found.genomes, found.fitness)])
 
 
 def asks_within_the_box(plugin: Plugin) -> None:
@@ -67,9 +77,13 @@ def keeps_the_best(plugin: Plugin) -> None:
 
 
 def repeats_itself(plugin: Plugin) -> None:
-    """Finds the same with the same random stream."""
-    first, second = (searched(plugin, Hill()).genomes for _ in range(2))
-    assert np.array_equal(first, second), "two searches with the same stream differ: use only `rng`"
+    """Finds the same with the same random stream, whatever it searched before."""
+    questions = {
+        "a search": partial(numbers, seed=3),
+        "a search with another stream": partial(numbers, seed=4),
+        "a search for diverse members": partial(numbers, seed=3, members=9),
+    }
+    check_repeats(plugin, questions, "use only `rng`, and keep nothing but the population from one call for the next")
 
 
 def compares_by_rank(plugin: Plugin) -> None:
@@ -123,7 +137,7 @@ def keeps_diverse_members(plugin: Plugin) -> None:
 
 def begins_with_given_genomes(plugin: Plugin) -> None:
     """Begins with genomes that it did not ask for, as a warm start does, and keeps the best of them."""
-    hill, start = Hill(), np.vstack([SUMMIT, SPACE.draw(8, np.random.default_rng(1))])
+    hill, start = Hill(), frozen([SUMMIT, *SPACE.draw(8, np.random.default_rng(1))])
     found = maximise(plugin().diverse(9), SPACE, hill, 60, np.random.default_rng(0), start)
     assert np.array_equal(hill.asked[0], start), "the search does not begin with the given genomes"
     best = found.genomes[0]

@@ -3,18 +3,30 @@
 A strategy without samples selects nothing, so that what it transfers is checked in place of what it selects.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
-from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters
+from gaplab.services.contract.descriptions import is_described
+from gaplab.services.contract.repetition import check_repeats
+from gaplab.services.core.arrays import (
+    NO_READINGS,
+    Fitnesses,
+    FloatArray,
+    Genome,
+    Genomes,
+    Outcomes,
+    Parameters,
+    frozen,
+)
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Score, Strategy
 from gaplab.services.core.types import Belief, Sample, Simulator
 
 SPACE = Space.box([0.0, 0.0], [1.0, 1.0], [True, False])
 TUNABLES, NAMES = Space.box([0.0, 0.0], [1.0, 1.0]), ("static_friction", "dynamic_friction")
-SAMPLES = (Sample(np.array([0.5, 0.5]), 0.8), Sample(np.array([0.1, 0.5]), float("nan")))
+SAMPLES = (Sample(frozen([0.5, 0.5]), 0.8), Sample(frozen([0.1, 0.5]), float("nan")))
 Plugin = type[Strategy]
 
 
@@ -30,22 +42,29 @@ def seen(genomes: Genomes, parameters: Parameters) -> Outcomes:
 
 
 def belief(strategy: Strategy, samples: Sequence[Sample] = ()) -> Belief:
-    """Return what a strategy knows: its simulators, a hand-designed genome and samples."""
+    """Return what a strategy knows, read-only: its simulators, a hand-designed genome and samples."""
     rng = np.random.default_rng(5)
     drawn = np.asarray(strategy.draw(TUNABLES, NAMES, rng))
     expected = (strategy.ensemble, 2)
     assert drawn.shape == expected, f"its first simulators have the shape {drawn.shape}, not {expected}"
     assert np.all((drawn >= 0.0) & (drawn <= 1.0)), f"it draws simulators outside the bounds 0 to 1: {drawn.tolist()}"
-    simulators = tuple(Simulator(row, 0.1) for row in drawn)
-    return Belief(SPACE, np.array([0.2, 0.9]), tuple(samples), simulators, TUNABLES, NAMES)
+    simulators = tuple(Simulator(frozen(row), 0.1) for row in drawn)
+    return Belief(SPACE, frozen([0.2, 0.9]), tuple(samples), simulators, TUNABLES, NAMES)
 
 
 class GridSearch:
-    """A search that looks at every point of a grid, and counts its calls and its simulators."""
+    """A search that looks at every point of a grid, and counts its calls and its simulators.
+
+    Attributes:
+        calls: number of its calls.
+        simulators: most simulators of a call.
+        scores: `(n,)`: scores of its last call.
+    """
 
     def __init__(self, believed: Belief) -> None:
         self.believed = believed
         self.calls = self.simulators = 0
+        self.scores: FloatArray = NO_READINGS
 
     def __call__(
         self,
@@ -63,6 +82,7 @@ class GridSearch:
         grid = np.array(np.meshgrid(axis, axis)).reshape(2, -1).T if candidates is None else candidates
         scores = np.asarray(score(grid, (seen if senses else hill)(grid, simulators)))
         assert scores.shape == (len(grid),), f"its score of {len(grid)} genomes has the shape {scores.shape}"
+        self.scores = scores
         best: Genome = grid[int(np.argmax(np.where(np.isnan(scores), -np.inf, scores)))]
         return best
 
@@ -96,9 +116,22 @@ def _check_inside(genome: FloatArray, verb: str) -> None:
 
 
 def selects_the_same_from_the_same(plugin: Plugin) -> None:
-    """Selects the same genome from the same belief and random stream."""
-    first, second = selected(plugin()), selected(plugin())
-    assert np.array_equal(first, second), f"it selects {first.tolist()}, then {second.tolist()}: use only `rng`"
+    """Selects and transfers the same from the same belief and random stream, whatever it did before."""
+    questions: dict[str, Callable[[Strategy], FloatArray]] = {}
+    for known, samples in (("without samples", ()), ("with samples", SAMPLES)):
+        if plugin.takes_samples:
+            questions[f"what it selects {known}"] = partial(_numbers, samples=samples, transfer=False)
+        questions[f"what it transfers {known}"] = partial(_numbers, samples=samples, transfer=True)
+    check_repeats(plugin, questions, "use only `rng`, and keep nothing but the belief from one call for the next")
+
+
+def _numbers(strategy: Strategy, samples: Sequence[Sample], *, transfer: bool) -> FloatArray:
+    """Return the drawn simulators, the scores of a search and the chosen genome, as one vector."""
+    believed = belief(strategy, samples)
+    search = GridSearch(believed)
+    choose = strategy.transfer if transfer else strategy.select
+    genome = choose(believed, search, np.random.default_rng(0))
+    return np.concatenate([np.ravel(each) for each in (believed.parameters, search.scores, genome)])
 
 
 def copes_with_failed_measurements(plugin: Plugin) -> None:
@@ -136,13 +169,11 @@ def learns_from_its_samples(plugin: Plugin) -> None:
     learns, lessons = strategy.learns(SAMPLES), strategy.lessons(SAMPLES)
     assert learns in {True, False}, f"`learns` returns {learns!r}"
     strange = [each for each in lessons if not any(each is sample for sample in SAMPLES)]
+    again = strategy.learns(SAMPLES), len(strategy.lessons(SAMPLES))
+    assert again == (learns, len(lessons)), (
+        "asked again, it learns from others: keep nothing from one call for the next"
+    )
     assert not strange, f"its lessons have {len(strange)} samples that were not measured"
-
-
-def is_described(plugin: Plugin) -> None:
-    """Has a docstring whose first line is a sentence."""
-    summary = plugin.describe().summary
-    assert summary.endswith("."), f"its summary in the catalogue is {summary!r}; end it with a full stop"
 
 
 CHECKS = (

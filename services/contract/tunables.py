@@ -1,10 +1,14 @@
 """The contract of a tunable, without options, in a robot that has what it edits."""
 
+from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import asdict
 from math import isclose
 from typing import Any
 
+from gaplab.services.contract import descriptions
 from gaplab.services.contract.controllers import arm
+from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.world import World
@@ -16,10 +20,20 @@ OF_NO_FIELD = ("origin", "edits")
 
 
 def subject(tunable: Tunable) -> World:
-    """Return a robot that has what a tunable edits."""
-    worlds = [world for world in (Quadruped().world, arm()) if tunable.lack(world) is None]
-    assert worlds, f"neither the quadruped nor an arm has what it edits: {tunable.lack(Quadruped().world)}"
-    return worlds[0]
+    """Return the first robot that has what a tunable edits."""
+    world = next((world for world in _worlds() if tunable.lack(world) is None), None)
+    if world is None:
+        lack, _ = tunable.lack(Quadruped().world) or ("", ())
+        raise AssertionError(f"neither an arm nor {', '.join(robots)} has what it edits: {lack}")
+    return world
+
+
+def _worlds() -> Iterator[World]:
+    """Yield the quadruped, an arm, and then an example of every robot."""
+    yield Quadruped().world
+    yield arm()
+    for robot in robots.values():
+        yield robot.example().world
 
 
 def reads_back_what_it_wrote(plugin: Plugin) -> None:
@@ -57,7 +71,8 @@ def edits_its_field_alone(plugin: Plugin) -> None:
 def leaves_the_given_world(plugin: Plugin) -> None:
     """Leaves the world that it was given unchanged."""
     tunable = plugin()
-    world, same = subject(tunable), subject(tunable)
+    world = subject(tunable)
+    same = deepcopy(world)
     tunable.edit(world, _another(tunable, tunable.read(world)))
     assert world == same, "it changes the given world; return a copy by dataclasses.replace"
 
@@ -79,10 +94,10 @@ def has_bounds_that_mean_something(plugin: Plugin) -> None:
 
 
 def is_described(plugin: Plugin) -> None:
-    """Has a docstring whose first line is a sentence."""
-    described = plugin.describe()
-    assert described.summary.endswith("."), f"its summary is {described.summary!r}; end it with a full stop"
-    assert set(described.details) == DETAILS, f"its details are {sorted(described.details)}"
+    """Has a docstring of its own whose first line is a sentence, and the details of every tunable."""
+    descriptions.is_described(plugin)
+    details = plugin.describe().details
+    assert set(details) == DETAILS, f"its details are {sorted(details)}"
 
 
 def flattened(value: Any, prefix: str = "") -> dict[str, Any]:  # noqa: ANN401 - nested

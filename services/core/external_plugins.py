@@ -14,6 +14,8 @@ from types import ModuleType
 from typing import TypeGuard, TypeVar
 
 from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.plugin_faults import fault_of
+from gaplab.services.core.plugin_imports import import_uncached
 from gaplab.services.core.unusable_plugins import Unusable, from_file, quoted, remedied
 
 PACKAGE = "gaplab_plugins"
@@ -58,6 +60,7 @@ def set_folders(folders: tuple[Path, ...], only: str | None = None) -> None:
     for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
         del sys.modules[name]
     sys.modules[PACKAGE] = _Package(folders, only)
+    import_uncached(PACKAGE)
     _load.cache_clear()
     invalidate_caches()
 
@@ -78,17 +81,16 @@ def named_folders() -> tuple[Path, ...]:
     return () if found is None else tuple(Path(path) for path in found.__path__)
 
 
-def classes(base: type[P]) -> tuple[list[type[P]], list[Unusable]]:
-    """Return the valid external plug-ins of one kind, and the invalid ones of this kind or of a kind unknown."""
+def classes(base: type[P], kind: str) -> tuple[list[type[P]], list[Unusable]]:
+    """Return the valid external plug-ins of one kind, and the invalid ones."""
     valid, invalid = list[type[P]](), list[Unusable]()
     for module in loaded().modules:
         for each in _classes(module, base):
-            try:
-                _check(each)
-            except PluginBroken as error:
-                invalid.append(Unusable(file_of(each) or "", _name_of(each), None, remedied(str(error))))
-            else:
+            fault, file = fault_of(each, kind, folders()), file_of(each) or ""
+            if fault is None:
                 valid.append(each)
+            else:
+                invalid.append(Unusable(file, _name_of(each), None, remedied(f"{each.__name__} in {file} {fault}")))
     return valid, invalid
 
 
@@ -144,13 +146,23 @@ def _imported(name: str, paths: list[Path]) -> Iterator[ModuleType]:
         PluginBroken: it cannot be imported, or is in several folders.
     """
     if len(paths) > 1:
-        raise PluginBroken(f"{' and '.join(map(str, paths))} have the same name: rename one of them")
+        raise PluginBroken(f"{' and '.join(_told_apart(paths))} have the same name: rename one of them")
     if name.startswith("_"):
         return
     try:
         yield import_module(f"{PACKAGE}.{name}")
     except (Exception, SystemExit) as error:
         raise PluginBroken(f"{name}.py cannot be imported: {quoted(error, folders())}") from error
+
+
+def _told_apart(paths: list[Path]) -> list[str]:
+    """Return the ends of the paths of modules: from the folder, or from as far above it as makes them differ."""
+    parts = [(path.parent if path.name == "__init__.py" else path).parts for path in paths]
+    for length in range(2, max(map(len, parts))):
+        ends = ["/".join(each[-length:]) for each in parts]
+        if len(set(ends)) == len(ends):
+            return ends
+    return list(map(str, paths))
 
 
 def _classes(module: ModuleType, base: type[P]) -> Iterator[type[P]]:
@@ -164,23 +176,6 @@ def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:
     return found.__module__ == module.__name__ or found.__module__.startswith(f"{module.__name__}.")
 
 
-def _check(plugin: type) -> None:
-    where = f"{plugin.__name__} in {file_of(plugin)}"
-    if missing := [name for name in dir(plugin) if _is_abstract(plugin, name)]:
-        raise PluginBroken(f"{where} does not define {', '.join(missing)}")
-    if not isinstance(getattr(plugin, "name", None), str):
-        raise PluginBroken(f"{where} has no name for specs to use: add name = '…'")
-    try:
-        plugin.Options()  # type: ignore[attr-defined]
-        plugin.describe().model_dump_json()  # type: ignore[attr-defined]
-    except (Exception, SystemExit) as error:
-        raise PluginBroken(f"{where} cannot be described: {quoted(error, folders())}") from error
-
-
 def _name_of(plugin: type) -> str:
     name = getattr(plugin, "name", None)
     return name if isinstance(name, str) and name else Path((file_of(plugin) or "").removesuffix("/__init__.py")).stem
-
-
-def _is_abstract(plugin: type, name: str) -> bool:
-    return bool(getattr(getattr(plugin, name, None), "__isabstractmethod__", False))

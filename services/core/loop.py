@@ -29,7 +29,7 @@ from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.tuners.search import SearchTuner
-from gaplab.services.core.tuning import Misfit
+from gaplab.services.core.tuning import Misfit, sound
 from gaplab.services.core.types import (
     Belief,
     Budget,
@@ -221,8 +221,7 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     source = f"tuner {setting.tuner.name!r} with optimizer {setting.optimizer.name!r}"
     if not 1 <= len(found) <= ensemble:
         raise PluginBroken(f"{source} returned {len(found)} simulators; permitted: {ensemble}")
-    for simulator in found:
-        setting.parameters.check(simulator.parameters, source)
+    found = tuple(sound(simulator, setting.parameters, source) for simulator in found)
     if tests:
         found = tested(found, Misfit(answers, tests, setting.discrepancy, setting.reading_times_s))
     return Tuned(iteration, found, answers.cost_within(budget, source))

@@ -3,7 +3,7 @@
 from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from inspect import getdoc, isabstract
+from inspect import cleandoc, isabstract
 from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any, ClassVar, Generic, TypeVar
@@ -11,10 +11,10 @@ from typing import Any, ClassVar, Generic, TypeVar
 from pydantic import ValidationError
 
 from gaplab.schemas.base import Frozen
-from gaplab.schemas.mistakes import permitted_by, sentence
 from gaplab.schemas.plugin import PluginRead, PluginRef
 from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, unknown_name
+from gaplab.services.core.plugin_options import option_violation
 from gaplab.services.core.unusable_plugins import Unusable, quoted, remedied
 
 
@@ -47,8 +47,8 @@ class Plugin:
 
     @classmethod
     def describe(cls) -> PluginRead:
-        """Return the catalogue's entry of the plug-in."""
-        summary = (getdoc(cls) or "").split("\n\n", maxsplit=1)[0].replace("\n", " ")
+        """Return the catalogue's entry of the plug-in; one without a docstring has no summary."""
+        summary = cleandoc(cls.__doc__ or "").split("\n\n", maxsplit=1)[0].replace("\n", " ")
         return PluginRead(
             name=cls.name,
             summary=summary,
@@ -106,16 +106,15 @@ class Registry(Mapping[str, type[P]], Generic[P]):
 
     def _sort(self) -> _Found[P]:
         usable = self._own()
-        valid, unusable = external_plugins.classes(self._base)
+        valid, unusable = external_plugins.classes(self._base, self.kind)
         unusable += [each for each in external_plugins.loaded().unusable if each.kind in {None, self.kind}]
         for name in sorted({each.name for each in valid}):
-            files = [external_plugins.file_of(each) or "" for each in valid if each.name == name]
-            others = [*files, *(["gaplab"] if name in usable else [])]
-            if len(others) == 1:
-                usable[name] = next(each for each in valid if each.name == name)
+            alike = [each for each in valid if each.name == name]
+            if len(alike) == 1 and name not in usable:
+                usable[name] = alike[0]
             else:
-                why = f"{files[0]} has a {self.kind} called {name!r}, but so has {others[1]}: rename one of them"
-                unusable.append(Unusable(files[0], name, self.kind, remedied(why)))
+                files = [external_plugins.file_of(each) or "" for each in alike]
+                unusable += _of_one_name(self.kind, name, files, ["gaplab"] if name in usable else [])
         return _Found(dict(sorted(usable.items())), _by_name(unusable, usable))
 
     def _own(self) -> dict[str, type[P]]:
@@ -162,7 +161,8 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             return plugin, plugin.Options.model_validate(ref.options)
         except ValidationError as error:
             raise InvalidSpec(
-                _option_violation(plugin, dict(each), f"{pointer}/options") for each in error.errors()
+                option_violation(plugin.name, plugin.Options, dict(each), f"{pointer}/options")
+                for each in error.errors()
             ) from error
 
     def create(self, ref: PluginRef, pointer: str = "") -> P:
@@ -188,6 +188,21 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         return tuple(sorted(entries, key=lambda entry: entry.name))
 
 
+def _of_one_name(kind: str, name: str, files: list[str], owner: list[str]) -> Iterator[Unusable]:
+    """Yield for each file that its plug-in has the name of another.
+
+    Args:
+        kind: kind of the plug-ins.
+        name: their name.
+        files: the file of each; one with several of them is here as often.
+        owner: "gaplab", if it has the name too.
+    """
+    for file in dict.fromkeys(files):
+        others = [*owner, *(each for each in files if each != file), "another class in it"]
+        why = f"{file} has a {kind} called {name!r}, but so has {others[0]}: rename one of them"
+        yield Unusable(file, name, kind, remedied(why))
+
+
 def _by_name(unusable: Iterable[Unusable], usable: Container[str]) -> dict[str, Unusable]:
     """Return unusable plug-ins by their names in the catalogue: with the file where the name alone is another's."""
     named: dict[str, Unusable] = {}
@@ -207,16 +222,3 @@ def _source(plugin: type[Plugin]) -> str:
     """Return the stated source of a plug-in, or else the file of an external one."""
     file = external_plugins.file_of(plugin)
     return f"{file} of GAPLAB_PLUGINS" if file and plugin.source == Plugin.source else plugin.source
-
-
-def _option_names(plugin: type[Plugin]) -> list[str]:
-    """Return the names of the options, as specs have them."""
-    return [field.alias or name for name, field in plugin.Options.model_fields.items()]
-
-
-def _option_violation(plugin: type[Plugin], error: dict[str, Any], pointer: str) -> Violation:
-    place = "".join(f"/{part}" for part in error["loc"])
-    if error["type"] == "extra_forbidden":
-        kind = f"option of {plugin.name!r}"
-        return unknown_name(pointer + place, kind, str(error["loc"][-1]), _option_names(plugin) or ["none"])
-    return Violation(pointer + place, error["input"], sentence(error), permitted_by(error))

@@ -71,7 +71,7 @@ def maximise(
     state = optimizer.init(space)
     known: dict[bytes, float] = {}
     while evaluations > 0:
-        genomes = (optimizer.ask(state, rng) if start is None else start)[:evaluations]
+        genomes = (_asked(optimizer, state, space, rng) if start is None else start)[:evaluations]
         start = None
         if not len(genomes):
             raise PluginBroken(f"optimizer {optimizer.name!r} asks for no genome although {evaluations} are left")
@@ -89,6 +89,23 @@ def maximise(
     return state.ranked()
 
 
+def _asked(optimizer: Optimizer, state: Population, space: Space, rng: Generator) -> Genomes:
+    """Return the genomes that an optimizer asks for, `(n, g)`.
+
+    Raises:
+        PluginBroken: they are no such array.
+    """
+    asked = optimizer.ask(state, rng)
+    try:
+        genomes = np.asarray(asked, dtype=np.float64)
+    except (TypeError, ValueError):
+        genomes = np.empty(0)
+    if genomes.ndim != 2 or genomes.shape[1] != space.size:
+        msg = f"genomes of shape {np.shape(genomes)}; permitted: (n, {space.size})"
+        raise PluginBroken(f"optimizer {optimizer.name!r} asks for {msg}")
+    return genomes
+
+
 def _unknown(_: Population, genomes: Genomes) -> FloatArray:
     return np.full(len(genomes), -np.inf)
 
@@ -100,5 +117,5 @@ def _following(
     wanted = min(count, FARTHEST - 1, left) if thresholds.max() > -np.inf else 0
     rng, genomes = deepcopy(rng), np.empty((0, state.space.size))
     while len(genomes) < wanted:
-        genomes = np.vstack([genomes, optimizer.ask(state, rng)])
+        genomes = np.vstack([genomes, _asked(optimizer, state, state.space, rng)])
     return genomes[:wanted]

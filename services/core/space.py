@@ -67,7 +67,7 @@ class Space:
         return np.minimum(self.lower + self.extent * shares, self.upper)
 
     def check(self, vector: object, source: str) -> FloatArray:
-        """Return the vector `(g,)`, which a plug-in returned.
+        """Return a read-only copy of the vector `(g,)`, which a plug-in returned.
 
         Args:
             vector: anything.
@@ -89,7 +89,7 @@ class Space:
                 f"{source} returned {found[where]} as number {where} of a vector; "
                 f"permitted: {self.lower[where]} to {self.upper[where]}"
             )
-        return found
+        return frozen(found)
 
     def contain(self, vectors: FloatArray) -> FloatArray:
         """Return the vectors moved into the box: periodic coordinates wrap, the others clip."""

@@ -51,7 +51,7 @@ def _as_before(registry: Registry[Any], ref: PluginRef) -> PluginRef:
         _, complete = registry.check(PluginRef(name=ref.name, options={**before, **ref.options}))
     except InvalidSpec:
         return ref
-    return PluginRef(name=ref.name, options=complete.model_dump(mode="json"))
+    return PluginRef(name=ref.name, options=complete.model_dump(mode="json", by_alias=True))
 
 
 def discrepancy_of(spec: Mapping[str, Any]) -> Discrepancy:

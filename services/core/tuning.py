@@ -1,16 +1,19 @@
 """What simulator tuning minimises: the discrepancy of simulators from the samples."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from gaplab.services.core import repeats
 from gaplab.services.core.answers import Answers, Following, nothing
-from gaplab.services.core.arrays import NO_READINGS, Fitnesses, FloatArray, Genomes, Outcomes, Parameters
+from gaplab.services.core.arrays import NO_READINGS, Fitnesses, FloatArray, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
+from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.search import Question
-from gaplab.services.core.types import Sample
+from gaplab.services.core.space import Space
+from gaplab.services.core.types import Sample, Simulator
 
 ROUNDING = 1e-9
 """Relative excess of a partial sum over a limit: from it on, the whole sum exceeds the limit in spite of rounding."""
@@ -25,6 +28,32 @@ def summed(terms: FloatArray) -> FloatArray:
     for row in terms:
         total = total + row
     return np.where(np.isnan(total), np.inf, total)
+
+
+def sound(simulator: Simulator, space: Space, source: str) -> Simulator:
+    """Return a simulator of a tuner with arrays and numbers of Python, whatever the tuner has in their place.
+
+    Args:
+        simulator: as the tuner returned it.
+        space: of the tunables.
+        source: subject of the error's sentence, like `tuner 'search'`.
+
+    Raises:
+        PluginBroken: its parameters are not one vector within the bounds, or its error is no number.
+    """
+    parameters = space.check(simulator.parameters, source)
+    try:
+        interval = None if simulator.interval is None else frozen(simulator.interval)
+        weight = None if simulator.weight is None else float(simulator.weight)
+        return replace(
+            simulator,
+            parameters=parameters,
+            squared_error=float(simulator.squared_error),
+            interval=interval,
+            weight=weight,
+        )
+    except (TypeError, ValueError) as error:
+        raise PluginBroken(f"{source} returned a simulator whose error, interval or weight is no number") from error
 
 
 def squared_errors(fitnesses: Fitnesses, measured: FloatArray) -> FloatArray:

@@ -3,26 +3,12 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from gaplab.services.core.controllers import controllers
-from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.external_plugins import file_of
-from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.registry import Registry
-from gaplab.services.core.robots import robots
-from gaplab.services.core.strategies import strategies
-from gaplab.services.core.tasks import tasks
-from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.labels import plain_name
-from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.plugins.contents import Contents
 from gaplab.services.plugins.watching import imported, present
-
-REGISTRIES: Mapping[str, Registry[Any]] = {
-    registry.kind: registry
-    for registry in (strategies, robots, controllers, tasks, engines, tunables, optimizers, discrepancies, tuners)
-}
-"""The plug-ins of each kind."""
+from gaplab.services.specs.registries import REGISTRIES as REGISTRIES
 
 
 def external_plugins(contents: Contents | None = None) -> Mapping[str, str]:

@@ -1,10 +1,13 @@
 """Files in the plug-in folders that are no plug-ins: they are named, so that nobody waits for them."""
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeGuard
 
 from gaplab.schemas.plugin import IgnoredFile
 from gaplab.services.core import external_plugins
+from gaplab.services.core.registry import Plugin
 from gaplab.services.plugins.contents import read
 from gaplab.services.plugins.external import REGISTRIES
 
@@ -21,6 +24,8 @@ NOT_A_ROBOT = (
     "(docs/how-to/robot-file.md), or describe the robot as a class (docs/how-to/robot.md)"
 )
 NO_PACKAGE = "the folder has no __init__.py, so it is no package"
+FOR_OTHERS = "its name begins with _, so it is only for other files to import; rename it"
+DOTTED = "a module cannot be imported by a name with a dot; rename it, for example with _ in place of the dot"
 NO_CLASS = "it has no class of a plug-in; if others import it, begin its name with _"
 
 
@@ -34,16 +39,41 @@ def _ignored(folder: Path) -> Iterator[IgnoredFile]:
     for path in sorted(folder.iterdir()):
         if path.name.startswith((".", "_")):
             continue
-        if path.is_dir():
-            if not (path / "__init__.py").exists():
-                yield IgnoredFile(file=f"{path.name}/", why=NO_PACKAGE)
-        elif path.suffix != ".py":
-            yield IgnoredFile(file=path.name, why=_why_not(path.suffix.lower()))
-        elif path.stem not in useful:
-            yield IgnoredFile(file=path.name, why=NO_CLASS)
+        is_module = path.suffix == ".py" and not path.is_dir()
+        if not (path.stem in useful if is_module else (path / "__init__.py").exists()):
+            yield IgnoredFile(file=f"{path.name}/" if path.is_dir() else path.name, why=why_no_plugin(path))
 
 
-def _why_not(suffix: str) -> str:
+def why_no_plugin(path: Path) -> str:
+    """Return why a file or folder without a plug-in has none, after an attempt to import it."""
+    if path.is_dir() and not (path / "__init__.py").exists():
+        return NO_PACKAGE
+    if not path.is_dir() and path.suffix != ".py":
+        return _why_no_module(path.suffix.lower())
+    name = path.name.removesuffix(".py")
+    if name.startswith("_"):
+        return FOR_OTHERS
+    if "." in name:
+        return DOTTED
+    if hidden := _hidden_classes(name):
+        return f"its class {hidden[0]} begins with _, so it is only for others to derive from; rename it"
+    return NO_CLASS
+
+
+def _hidden_classes(name: str) -> list[str]:
+    """Return the classes of plug-ins in a module whose names begin with an underscore."""
+    module = f"{external_plugins.PACKAGE}.{name}"
+    found = vars(sys.modules[module]).values() if module in sys.modules else ()
+    return [
+        each.__name__ for each in found if _is_plugin(each) and each.__module__ == module and each.__name__[0] == "_"
+    ]
+
+
+def _is_plugin(found: object) -> TypeGuard[type[Plugin]]:
+    return isinstance(found, type) and issubclass(found, Plugin)
+
+
+def _why_no_module(suffix: str) -> str:
     """Return why a file with this ending is no plug-in."""
     if suffix in IMPORTED:
         return TO_IMPORT

@@ -17,9 +17,9 @@ SIMULATED_PROBES, PHYSICAL_PROBES = "each", "last"
 
 
 def completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:
-    """Return the reference with every option."""
+    """Return the reference with every option, as specs name it."""
     _, options = registry.check(ref)
-    return PluginRef(name=ref.name, options=options.model_dump(mode="json"))
+    return PluginRef(name=ref.name, options=options.model_dump(mode="json", by_alias=True))
 
 
 def simulated_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine: type[Engine]) -> ResolvedReality:

@@ -26,6 +26,7 @@ from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.bench_violations import bench_violations
+from gaplab.services.specs.blame import refusing_specs
 from gaplab.services.specs.default_engines import default_engine, runs
 from gaplab.services.specs.presets import PRESETS, Preset, preset_options, with_preset
 from gaplab.services.specs.realities import completed, physical_reality, simulated_reality
@@ -53,11 +54,12 @@ NEED_NO_OTHERS: tuple[Registry[Any], ...] = (
 """The kinds of plug-ins of a spec that can be created without others; the field of each has the name of its kind."""
 
 
+@refusing_specs()
 def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     """Return the spec with every field, as it is stored and run. Resolving it again changes nothing.
 
     Raises:
-        InvalidSpec: with every violation, each with its pointer into the spec.
+        InvalidSpec: with every violation, each with its pointer into the spec; or an external plug-in raised an error.
     """
     spec, preset = with_preset(spec), PRESETS[spec.budget.preset]
     robot, strategy, controllers, simulators, discrepancy, tuner = _created(spec)
@@ -189,8 +191,8 @@ def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
 def _label(strategy: Strategy, preset: Preset) -> str:
     """Return the name of the strategy with all options that differ from those of the preset."""
     kind = type(strategy)
-    defaults = kind.Options(**preset_options(preset, kind)).model_dump(mode="json")
-    chosen = strategy.options.model_dump(mode="json")
+    defaults = kind.Options(**preset_options(preset, kind)).model_dump(mode="json", by_alias=True)
+    chosen = strategy.options.model_dump(mode="json", by_alias=True)
     changed = [f"{name} {value}" for name, value in chosen.items() if value != defaults[name]]
     return f"{strategy.name} ({', '.join(changed)})"[:200] if changed else strategy.name
 

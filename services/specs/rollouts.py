@@ -5,13 +5,18 @@ from gaplab.services.core.controller_search import Allowance
 from gaplab.services.core.held_out import seen_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners import tuners
+from gaplab.services.specs.blame import refusing_specs
 
 
+@refusing_specs()
 def expected_rollouts(spec: ResolvedSpec) -> int:
     """Return the number of simulated rollouts in one repetition; real-world evaluations do not count.
 
     Every tuning sees the samples from before the experiment, also that of iteration 0. The evaluations of the direct
     baseline would be real ones. They count, because they are its whole cost.
+
+    Raises:
+        InvalidSpec: an external plug-in raised an error.
     """
     strategy, tunables = strategies.create(spec.strategy), len(spec.tunables)
     budget, iterations = spec.budget, spec.iterations if strategy.takes_samples else 0

@@ -49,7 +49,7 @@ class Simulation:
         sensors = self._robot.sensors
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
-        times = _all_times(motions[0].observe_s.tobytes(), sensors.times_s.tobytes())
+        times = _all_times(*(frozen(each).tobytes() for each in (motions[0].observe_s, sensors.times_s)))
         longer = [motion.observed_at(times.all_s) for motion in motions]
         seen = self._rollouts(genomes, worlds, longer)
         fitnesses = self._fitnesses(_at(seen, times.observed), len(genomes), len(parameters))
@@ -68,7 +68,7 @@ class Simulation:
         return outcomes
 
     def _fitnesses(self, seen: Trajectory, genomes: int, simulators: int) -> Fitnesses:
-        fitnesses = self._robot.fitness(seen)
+        fitnesses = np.asarray(self._robot.fitness(seen), dtype=np.float64)
         if np.shape(fitnesses) != (genomes, simulators):
             expected = f"the fitness of {genomes} genomes in {simulators} simulators"
             raise PluginBroken(f"robot {self._robot.label!r} returned {np.shape(fitnesses)} numbers for {expected}")

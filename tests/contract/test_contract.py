@@ -5,8 +5,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract import checks
 from gaplab.services.contract.checks import CHECKS, Check, results
 from gaplab.services.contract.files import check_file, write_skeleton
@@ -15,6 +17,7 @@ from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.engines import engines
 from gaplab.services.plugins.external import REGISTRIES
+from gaplab.services.plugins.ignored import ignored_files
 
 
 def own() -> Iterator[Any]:
@@ -63,6 +66,53 @@ def test_a_skeleton_of_each_kind_keeps_the_contract_at_once(tmp_path: Path) -> N
 def test_a_name_that_no_module_can_have_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(GaplabError, match="cannot be the name of a plug-in"):
         write_skeleton("strategy", name, tmp_path)
+
+
+@pytest.mark.parametrize("name", ["none", "true", "false"])
+def test_a_name_whose_class_would_be_a_word_of_python_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(GaplabError, match=f"its class would be {name.capitalize()}, a word of Python"):
+        write_skeleton("strategy", name, tmp_path)
+
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.usefixtures("restored")
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("controller", "motion"),
+        ("discrepancy", "frozen"),
+        ("engine", "trajectory"),
+        ("optimizer", "population"),
+        ("robot", "motion"),
+        ("strategy", "strategy"),
+        ("tunable", "tunable"),
+        ("tuner", "simulator"),
+    ],
+)
+def test_a_skeleton_named_like_what_it_imports_keeps_the_contract(tmp_path: Path, kind: str, name: str) -> None:
+    (found,) = check_file(write_skeleton(kind, name, tmp_path))
+
+    assert (found.kind, found.name, found.passes) == (kind, name, True)
+
+
+@pytest.mark.usefixtures("restored")
+def test_the_skeleton_of_an_engine_is_no_hardware(tmp_path: Path) -> None:
+    (found,) = check_file(write_skeleton("engine", "my_engine", tmp_path))
+
+    assert REGISTRIES["engine"][found.name].repeatable
+
+
+@pytest.mark.usefixtures("restored")
+@pytest.mark.parametrize("scale", [0.1, 0.25])
+def test_the_skeleton_of_a_discrepancy_reports_errors_in_the_unit_of_fitness(tmp_path: Path, scale: float) -> None:
+    (found,) = check_file(write_skeleton("discrepancy", "my_discrepancy", tmp_path))
+    discrepancy = REGISTRIES["discrepancy"].create(PluginRef(name=found.name, options={"scale": scale}))
+
+    for away in (0.0, 0.05, scale, 0.3, 2.0):
+        term = discrepancy.terms(np.array([[[1.0 + away]]]), np.array([[1.0]]), np.empty(0))[0, 0]
+        assert term == pytest.approx(discrepancy.floor(away))
+        assert discrepancy.error(term) == pytest.approx(away)
 
 
 def test_a_name_that_is_taken_is_refused(tmp_path: Path) -> None:
@@ -123,6 +173,54 @@ def test_a_file_that_cannot_be_used_says_why(tmp_path: Path) -> None:
         list(check_file(tmp_path / "none.py"))
     with pytest.raises(FileNotFoundError):
         list(check_file(tmp_path / "absent.py"))
+
+
+STRATEGY = BROKEN.format(gene="0.5")
+
+
+@pytest.mark.usefixtures("restored")
+@pytest.mark.parametrize(
+    ("place", "text", "says"),
+    [
+        ("_draft.py", STRATEGY, "its name begins with _, so it is only for other files to import"),
+        ("hidden.py", STRATEGY.replace("class Broken", "class _Hidden"), "its class _Hidden begins with _"),
+        ("my.strategy.py", STRATEGY, "a module cannot be imported by a name with a dot"),
+        ("text.txt", STRATEGY, "it is no Python module; put data"),
+        ("folder/strategy.py", STRATEGY, "the folder has no __init__.py, so it is no package"),
+    ],
+)
+def test_a_file_whose_plug_in_is_not_imported_says_why(tmp_path: Path, place: str, text: str, says: str) -> None:
+    file = tmp_path / place
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(text)
+    checked = file.parent if place.startswith("folder") else file
+
+    with pytest.raises(GaplabError, match=f"{re.escape(str(checked))} has no plug-in; {re.escape(says)}"):
+        list(check_file(checked))
+    external_plugins.set_folders((tmp_path,))
+    assert [each.why.startswith(says) for each in ignored_files()] == ([] if place[0] == "_" else [True])
+
+
+@pytest.mark.usefixtures("restored")
+def test_the_first_file_of_a_package_is_the_package(tmp_path: Path) -> None:
+    (tmp_path / "pack").mkdir()
+    (tmp_path / "pack" / "__init__.py").write_text(STRATEGY)
+
+    for checked in ("pack", "pack/__init__.py"):
+        assert [found.name for found in check_file(tmp_path / checked)] == ["broken"]
+
+
+@pytest.mark.usefixtures("restored")
+@pytest.mark.parametrize(("checked", "other"), [("a", "b"), ("b", "a")])
+def test_a_name_that_another_file_has_is_told_of_either_file(tmp_path: Path, checked: str, other: str) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.py").write_text(STRATEGY)
+    external_plugins.set_folders((tmp_path,))
+
+    (found,) = check_file(tmp_path / f"{checked}.py")
+
+    assert found.unusable is not None
+    assert found.unusable.startswith(f"{checked}.py has a strategy called 'broken', but so has {other}.py")
 
 
 @pytest.mark.usefixtures("restored")

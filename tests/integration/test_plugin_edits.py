@@ -16,9 +16,10 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import checks, reading, submission
-from gaplab.services.plugins import blame, watching
+from gaplab.services.plugins import watching
 from gaplab.services.plugins.watching import FolderWatch
 from gaplab.services.running import execution, provenance, sensitivity, versions
+from gaplab.services.specs import blame
 from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import ExperimentRow

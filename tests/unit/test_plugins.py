@@ -64,7 +64,7 @@ def test_files_import_from_each_other_and_one_with_an_underscore_is_only_for_tha
     assert "hidden" not in strategies()
 
 
-def test_folders_are_several_but_a_file_has_one_place(put: Put, tmp_path: Path) -> None:
+def test_folders_are_several_but_a_file_has_one_place(put: Put) -> None:
     put("mine", careful=CAREFUL)
     put("yours", brave=CAREFUL.replace("areful", "rave").replace("crave", "brave"))
     assert {"careful", "brave"} <= set(strategies())
@@ -74,8 +74,18 @@ def test_folders_are_several_but_a_file_has_one_place(put: Put, tmp_path: Path) 
     found = strategies()
     assert "careful" not in found
     assert "brave" in found
-    files = " and ".join(str(tmp_path / folder / "careful.py") for folder in ("mine", "yours"))
+    files = "mine/careful.py and yours/careful.py"
     assert found.unusable["careful"].startswith(f"{files} have the same name: rename one of them")
+
+
+def test_of_folders_with_one_name_as_much_of_the_path_is_told_as_makes_them_differ(put: Put, tmp_path: Path) -> None:
+    for home in ("first", "second"):
+        (tmp_path / home / "plugins" / "careful").mkdir(parents=True)
+        put(f"{home}/plugins")
+        (tmp_path / home / "plugins" / "careful" / "__init__.py").write_text(CAREFUL)
+
+    files = "first/plugins/careful and second/plugins/careful"
+    assert strategies().unusable["careful"].startswith(f"{files} have the same name: rename one of them")
 
 
 BROKEN = [
@@ -92,7 +102,7 @@ BROKEN = [
     ),
     (CAREFUL.replace("def select", "def choose"), "careful", r"Careful in broken\.py does not define select"),
     (CAREFUL.replace('    name = "careful"\n', ""), "broken", "has no name for specs to use"),
-    (CAREFUL.replace("searches = False", "Options = 7"), "careful", "cannot be described: TypeError"),
+    (CAREFUL.replace("searches = False", "Options = 7"), "careful", "has Options that accept misspelt names"),
     (CAREFUL.replace("searches = False", "details = {1, 2}.pop"), "careful", "cannot be described: "),
 ]
 
@@ -131,6 +141,15 @@ def test_two_files_with_plug_ins_of_one_name_are_both_unavailable(put: Put) -> N
 
     assert "careful" not in found
     assert found.unusable["careful"].startswith("first.py has a strategy called 'careful', but so has second.py")
+    second = found.unusable["careful (second.py)"]
+    assert second.startswith("second.py has a strategy called 'careful', but so has first.py")
+
+
+def test_two_plug_ins_of_one_name_in_a_file_are_both_unavailable(put: Put) -> None:
+    put(twice=CAREFUL + CAREFUL.replace("class Careful", "class Other"))
+
+    why = "twice.py has a strategy called 'careful', but so has another class in it: rename one of them"
+    assert strategies().unusable["careful"].startswith(why)
 
 
 def test_what_imports_a_broken_file_is_unavailable_as_well(put: Put) -> None:
@@ -140,10 +159,13 @@ def test_what_imports_a_broken_file_is_unavailable_as_well(put: Put) -> None:
 
 
 def test_a_plug_in_that_cannot_be_created_is_a_violation_of_its_spec(put: Put) -> None:
-    put(careful=CAREFUL + "\n    def __init__(self, options=None):\n        if options: raise KeyError('oops')\n")
+    text = CAREFUL.replace("searches = False", "Options = EnsembleOptions")
+    text = text.replace("import Strategy", "import EnsembleOptions, Strategy")
+    refusal = "if options and options.simulators == 9: raise KeyError('oops')"
+    put(careful=f"{text}\n    def __init__(self, options=None):\n        {refusal}\n")
 
     with pytest.raises(InvalidSpec, match=r"'careful' cannot be created .*KeyError: 'oops' \(careful\.py, line 19\)"):
-        strategies().create(PluginRef(name="careful"))
+        strategies().create(PluginRef(name="careful", options={"simulators": 9}))
 
 
 def test_a_folder_that_is_not_there_is_empty(tmp_path: Path) -> None:

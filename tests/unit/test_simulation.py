@@ -1,12 +1,15 @@
 """What a robot says of a trajectory, and what is made of it."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from gaplab.services.core.answers import Answers
+from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.robots.base import Sensors
 from gaplab.services.core.robots.toy_function import ToyFunction
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
@@ -45,6 +48,35 @@ def test_a_fitness_that_is_not_finite_is_physics_that_failed_in_simulation_and_i
     np.testing.assert_array_equal(fitnesses, np.where(failed, np.nan, expected))
     assert answers.cost_of(50).failures == failed.sum()
     assert np.isnan(MeasuredReality(broken, np.empty(0))(genomes[failed[:, 0]][0]).fitness)
+
+
+class Whole(ToyFunction):
+    """A robot whose times are whole numbers, and that senses its place at other whole numbers."""
+
+    name = "whole"
+    sensors = Sensors(("x",), ("m",), frozen([0.5]), np.array([1]))
+
+    def motion(self, genome: Any) -> Any:
+        return replace(super().motion(genome), observe_s=np.array([0, 1]))
+
+    def fitness(self, trajectory: Any) -> Any:
+        return super().fitness(trajectory).astype(np.float32)
+
+    def sense(self, trajectory: Any) -> Any:
+        return trajectory.positions_m[..., :, :1]
+
+
+def test_times_may_be_whole_numbers_and_fitness_is_of_double_precision() -> None:
+    usual, whole = (Simulation(robot, Analytic(), ()) for robot in (ToyFunction(), Whole()))
+    genomes, parameters = np.linspace(0.0, 1.0, 5)[:, None], np.empty((1, 0))
+
+    expected = usual(genomes, parameters).astype(np.float32)
+    outcomes = whole.sense(genomes, parameters)
+
+    assert whole(genomes, parameters).dtype == outcomes.dtype == np.float64
+    np.testing.assert_array_equal(whole(genomes, parameters), expected)
+    np.testing.assert_array_equal(outcomes[..., 0], expected)
+    np.testing.assert_allclose(outcomes[..., 1], 2.0 * expected, rtol=1e-6)
 
 
 class Arm(Analytic):

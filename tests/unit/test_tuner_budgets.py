@@ -1,5 +1,6 @@
 """No tuner spends more than its budget, however small, and the loop refuses one that does."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract.tuners import SPACE, Physics, tuned
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.loop import repetition
+from gaplab.services.core.optimizers.base import Population
+from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuners.abc_smc import AbcSmc
@@ -96,6 +99,73 @@ class Spendthrift(SearchTuner):
 def test_a_tuner_that_spends_more_than_its_budget_is_refused() -> None:
     with pytest.raises(PluginBroken, match=r"'spendthrift' .* took 51 rollouts; permitted: at most 50"):
         list(repetition(small_setting(tuner=Spendthrift())))
+
+
+class Loose(SearchTuner):
+    """Returns a list with lists, as plug-ins may."""
+
+    name = "loose"
+
+    def tune(self, task: TuningTask, rng: Any) -> Any:
+        loose: Any = {"squared_error": np.float32(0.25), "interval": [[0.0, 1.0]] * 2}
+        return [replace(each, parameters=each.parameters.tolist(), **loose) for each in super().tune(task, rng)]
+
+
+def test_simulators_of_a_tuner_are_stored_as_arrays_and_numbers() -> None:
+    setting = small_setting(tuner=Loose())
+
+    _, *tuned = [step for step in repetition(setting) if isinstance(step, Tuned)]
+
+    for (simulator,) in (step.simulators for step in tuned):
+        assert (type(simulator.parameters), type(simulator.squared_error)) == (np.ndarray, float)
+        assert simulator.interval is not None
+        assert simulator.interval.shape == (2, 2)
+    with pytest.raises(ValueError, match="read-only"):
+        tuned[0].simulators[0].parameters[0] = 0.0
+
+
+class Wordy(SearchTuner):
+    """Returns an error that is no number."""
+
+    name = "wordy"
+
+    def tune(self, task: TuningTask, rng: Any) -> Any:
+        wrong: Any = "small"
+        return tuple(replace(each, squared_error=wrong) for each in super().tune(task, rng))
+
+
+def test_an_error_of_a_tuner_that_is_no_number_is_refused() -> None:
+    with pytest.raises(
+        PluginBroken, match=r"'wordy' .* returned a simulator whose error, interval or weight is no number"
+    ):
+        list(repetition(small_setting(tuner=Wordy())))
+
+
+class Listing(SteadyState):
+    """Asks for lists, or for something of another shape."""
+
+    name = "listing"
+    reshaped: Any = staticmethod(lambda genomes: genomes.tolist())
+
+    def ask(self, state: Population, rng: Any) -> Any:
+        return self.reshaped(super().ask(state, rng))
+
+
+def test_an_optimizer_may_ask_for_lists_and_for_no_other_shape() -> None:
+    usual, listed = (list(repetition(small_setting(optimizer=each))) for each in (SteadyState(), Listing()))
+    assert list(map(flat, usual)) == list(map(flat, listed))
+
+    for wrong in (
+        lambda genomes: genomes[0],
+        lambda genomes: genomes[:, :-1],
+        lambda _: [[0.5], [0.5, 0.5]],
+        lambda _: "x",
+    ):
+        Listing.reshaped = staticmethod(wrong)
+        with pytest.raises(
+            PluginBroken, match=r"optimizer 'listing' asks for genomes of shape .*; permitted: \(n, 2\)"
+        ):
+            list(repetition(small_setting(optimizer=Listing())))
 
 
 def test_least_squares_stays_within_bounds_that_rounding_would_leave() -> None:

@@ -1,12 +1,15 @@
 """Blame: the plug-in whose code raised an error."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from traceback import walk_tb
-from types import ModuleType
+from types import FrameType, ModuleType
 
 from gaplab.services.core import external_plugins
-from gaplab.services.plugins.external import REGISTRIES
+from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation
+from gaplab.services.specs.registries import REGISTRIES
 
 LONGEST = 2_000
 """Characters of a described error."""
@@ -27,10 +30,41 @@ def raised(error: BaseException) -> str:
     kind = type(error).__name__
     plugins = _plugins(external_plugins.package())
     for frame, line in reversed(list(walk_tb(error.__traceback__))):
-        places = (type(frame.f_locals.get("self")), frame.f_globals.get("__name__"))
-        if named := next((plugins[place] for place in places if place in plugins), None):
+        if named := next((plugins[place] for place in _places(frame) if place in plugins), None):
             return f"{named} raised {kind} ({Path(frame.f_code.co_filename).name}, line {line})"
     return kind
+
+
+@contextmanager
+def refusing_specs() -> Iterator[None]:
+    """Refuse the spec at hand if an external plug-in raises; a mistake in gaplab itself stays an error of the service.
+
+    Raises:
+        InvalidSpec: an external plug-in raised; the violation, of the whole spec, names it.
+    """
+    try:
+        yield
+    except GaplabError:
+        raise
+    except (Exception, SystemExit) as error:
+        if not _is_external(error):
+            raise
+        raise InvalidSpec([Violation("", None, describe(error))]) from error
+
+
+def _is_external(error: BaseException) -> bool:
+    """Return whether code of an external plug-in, or of a file that it imports, led to the error."""
+    modules = (
+        place.__module__ if isinstance(place, type) else str(place)
+        for frame, _ in walk_tb(error.__traceback__)
+        for place in _places(frame)
+    )
+    return any(module.partition(".")[0] == external_plugins.PACKAGE for module in modules)
+
+
+def _places(frame: FrameType) -> tuple[type, str | None]:
+    """Return the class of the object whose method a frame runs, and the name of its module."""
+    return type(frame.f_locals.get("self")), frame.f_globals.get("__name__")
 
 
 @lru_cache(maxsize=1)

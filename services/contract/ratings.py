@@ -1,0 +1,110 @@
+"""What the contracts of tasks and robots ask of whatever rates and senses: its times, fitness and readings."""
+
+from typing import Protocol
+
+import numpy as np
+
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.motions import Trajectory
+from gaplab.services.core.sensors import Sensors
+
+LATE_S = 1e-9
+"""Rounding by which the last reading may be later than the end of a rollout."""
+
+
+class Rates(Protocol):
+    """A task or a robot."""
+
+    @property
+    def sensors(self) -> Sensors:
+        """Return its sensors."""
+        ...
+
+    def fitness(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(...)`: the fitness of each trajectory."""
+        ...
+
+    def sense(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(..., r, s)`: what the sensors say."""
+        ...
+
+
+def check_times(observe_s: FloatArray, sensors: Sensors) -> None:
+    """Check that a rollout is observed at times that ascend, the last of them above 0, and is sensed within them.
+
+    Raises:
+        AssertionError: it is not, or times are no arrays of float64.
+    """
+    _check_seconds("observe_s", observe_s)
+    _check_seconds("sensors.times_s", sensors.times_s)
+    assert len(observe_s), "observe_s is empty"
+    assert observe_s[-1] > 0, f"observe_s ends at {observe_s[-1]}; a rollout lasts longer than 0 s"
+    read, end_s = sensors.times_s, observe_s[-1]
+    within = not len(read) or read[-1] <= end_s + LATE_S
+    assert within, f"its sensors are read at {read.tolist()}, but a rollout ends at {end_s} s"
+
+
+def _check_seconds(name: str, times_s: FloatArray) -> None:
+    """Check that times are an array of float64 that ascends from 0 or later."""
+    example = "an array of float64, in seconds, such as np.array([0.0, 2.0])"
+    found = f"an array of {times_s.dtype}" if isinstance(times_s, np.ndarray) else f"a {type(times_s).__name__}"
+    assert found == "an array of float64", f"{name} is {found}; it must be {example}"
+    assert times_s.ndim == 1, f"{name} has the shape {times_s.shape}; it must be {example}"
+    assert np.isfinite(times_s).all(), f"{name} is not finite: {times_s.tolist()}"
+    assert not len(times_s) or times_s[0] >= 0, f"{name} begins at {times_s[0]} s, before the rollout"
+    assert np.all(np.diff(times_s) > 0), f"{name} does not ascend: {times_s.tolist()}"
+
+
+def check_rates_many(rates: Rates, observe_s: FloatArray) -> None:
+    """Check that the fitness of many trajectories at once is that of each.
+
+    Raises:
+        AssertionError: it is not.
+    """
+    many = trajectories(observe_s)
+    together = np.asarray(rates.fitness(many))
+    one_by_one = [[float(rates.fitness(_one(many, row, column))) for column in range(5)] for row in range(4)]
+    assert together.shape == (4, 5), f"its fitness of (4, 5) trajectories has the shape {together.shape}"
+    assert np.allclose(together, one_by_one), "its fitness of many trajectories differs from that of each"
+
+
+def check_failed_physics(rates: Rates, observe_s: FloatArray) -> None:
+    """Check that the fitness of a trajectory of nan is nan.
+
+    Raises:
+        AssertionError: it is not.
+    """
+    count = len(observe_s)
+    nothing = Trajectory(frozen(observe_s), frozen(np.full((count, 3), np.nan)), frozen(np.full((count, 4), np.nan)))
+    fitness = float(rates.fitness(nothing))
+    assert np.isnan(fitness), f"its fitness of a trajectory of nan is {fitness}"
+
+
+def check_sensors(rates: Rates) -> None:
+    """Check that each sensor has a unit and a noise, and is read at each of its times, many trajectories as each.
+
+    Raises:
+        AssertionError: it has not, or is not.
+    """
+    sensors = rates.sensors
+    noises = np.asarray(sensors.noises)
+    assert len(sensors.units) == len(noises) == len(sensors.names), "its sensors lack units or noises"
+    assert np.all(noises > 0), f"noises must be above 0, and are {noises.tolist()}"
+    many = trajectories(sensors.times_s)
+    values = np.asarray(rates.sense(many))
+    expected = (4, 5, len(sensors.times_s), len(sensors.names))
+    assert values.shape == expected, f"its readings have the shape {values.shape}, not {expected}"
+    assert np.allclose(values[2, 3], rates.sense(_one(many, 2, 3))), "its readings of many differ from those of each"
+
+
+def trajectories(times_s: FloatArray) -> Trajectory:
+    """Return `(4, 5)` trajectories at times `(t,)`, read-only."""
+    rng = np.random.default_rng(0)
+    positions_m = rng.normal(size=(4, 5, len(times_s), 3))
+    turns = rng.normal(size=(4, 5, len(times_s), 4))
+    orientations = turns / np.linalg.norm(turns, axis=-1, keepdims=True)
+    return Trajectory(frozen(times_s), frozen(positions_m), frozen(orientations))
+
+
+def _one(many: Trajectory, row: int, column: int) -> Trajectory:
+    return Trajectory(many.times_s, many.positions_m[row, column], many.orientations[row, column])
