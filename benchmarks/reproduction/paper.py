@@ -58,7 +58,7 @@ CORRELATIONS = (0.5, 0.1)
 """Correlations of the recorded fitnesses of one repetition after several numbers of samples, which the paper pools.
 
 With simulated fit, and of the other three. The paper does not state them. In gaplab's figures in MuJoCo, over three to
-ten samples, they are 0.47 to 0.80, and 0.01 to 0.06, but 0.34 for `informative` where reality is in PhysX: a strategy
+ten samples, they are 0.46 to 0.79, and 0.01 to 0.07, but 0.30 for `informative` where reality is in PhysX: a strategy
 that does not search for fit samples starts each time from nothing.
 """
 
