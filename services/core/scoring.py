@@ -30,9 +30,13 @@ def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
 
 
 def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
-    """Return the disagreement: the standard deviation over simulators, weighted by accuracy.
+    """Return the disagreement `(n,)`: the standard deviation over simulators, weighted by accuracy.
 
     Source: paper, section 2, *Informative*.
+
+    Args:
+        fitnesses: `(n, m)` of n genomes in m simulators.
+        weights: `(m,)`, non-negative, summing to 1.
     """
     deviations = _weighty(fitnesses, weights) - weighted_mean(fitnesses, weights)[:, None]
     return np.sqrt(deviations**2 @ weights)

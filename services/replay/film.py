@@ -114,10 +114,10 @@ def camera_at(bases: list[FloatArray], size: tuple[int, int], framing: Framing, 
     """Return the page's camera at its beginning, which sees all robots.
 
     Args:
-        bases: `(2,)` each: where the robots are.
+        bases: `(2,)` each: where the robots are, in m.
         size: width and height of the picture in pixels.
         framing: how large the robots are.
-        slope_rad: slope of the ground.
+        slope_rad: slope of the ground, in rad.
     """
     middle = np.mean(bases, axis=0)
     distance = DISTANCE_M * framing.scale + APART * max(float(np.linalg.norm(base - middle)) for base in bases)
