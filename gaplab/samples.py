@@ -31,7 +31,7 @@ class InvalidSamples(ValueError):
         super().__init__("\n".join([*lines, *([f"and {more} more"] if more else [])]))
 
     def __reduce__(self) -> tuple[type[Self], tuple[Path, tuple[Any, ...], int]]:
-        """Return what a process that unpickles the error creates it of."""
+        """Return the class and the arguments from which a copy of the error is made."""
         return type(self), self._made_of
 
 

@@ -28,7 +28,7 @@ class Comparisons(tuple[Comparison, ...]):
         return made
 
     def __reduce__(self) -> tuple[type[Self], tuple[tuple[Comparison, ...], Callable[[str], str]]]:
-        """Return what a copy is made of, also in another process; it has no service that would format it."""
+        """Return the class and the arguments from which a copy is made; it has no service to format it."""
         return type(self), (tuple(self), _refused)
 
     def frame(self) -> "pandas.DataFrame":

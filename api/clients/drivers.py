@@ -10,12 +10,11 @@
 
 import importlib.util
 from collections.abc import Callable
-from math import isfinite
 from pathlib import Path
 from threading import Thread
 from typing import Any, Protocol
 
-from gaplab.api.clients.bodies import json_of, readings_of
+from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
 from gaplab.api.clients.driving import TakenRequest
 from gaplab.api.clients.motions import DriverMotion
 from gaplab.schemas.records import SensorsRead
@@ -139,16 +138,14 @@ def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a dri
     """
     readings: Any
     fitness, readings = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
-    if isinstance(fitness, bool) or (not isinstance(fitness, int | float) and not hasattr(fitness, "__float__")):
-        raise DriverBroken(f"the driver's run returned {answer!r:.100}; it must return the fitness, a number")
     try:
-        value = float(fitness)
-    except (TypeError, ValueError) as error:
-        raise DriverBroken(
-            f"the driver's run returned {answer!r:.100}; it must return the fitness, a number"
-        ) from error
-    if not isfinite(value):
-        raise DriverBroken(f"the driver's run returned {value}; raise MeasurementFailed if nothing was measured")
+        (value,) = numbers_of([fitness], "/fitness")
+    except TypeError as error:
+        msg = f"the driver's run returned {answer!r:.100}; it must return the fitness, a number"
+        raise DriverBroken(msg) from error
+    except ValueError as error:
+        msg = f"the driver's run returned {fitness}; raise MeasurementFailed if nothing was measured"
+        raise DriverBroken(msg) from error
     try:
         return value, json_of(readings_of(readings), "/readings")
     except (TypeError, ValueError) as error:

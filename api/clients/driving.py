@@ -31,7 +31,7 @@ class TakenRequest:
     Attributes:
         request: the request, as it was taken.
         answered: the service's answer, once it is told.
-        over: whether it is answered or released, so that no sign of life is due.
+        over: is set once it is answered or released, so that no sign of life is due.
     """
 
     def __init__(self, driving: "Driving", request: RequestRead) -> None:

@@ -22,7 +22,7 @@ class ServiceError(Exception):
         super().__init__("\n".join(lines_of(problem)) if len(problem.errors) > 1 else problem.detail)
 
     def __reduce__(self) -> tuple[type[Self], tuple[Problem, float | None]]:
-        """Return what a process that unpickles the error creates it of."""
+        """Return the class and the arguments from which a copy of the error is made."""
         return type(self), (self.problem, self.retry_after_s)
 
 
@@ -44,7 +44,7 @@ class ExperimentFailed(Exception):
         super().__init__("; ".join([f"{ended.name} ({ended.id}) ended as {ended.state}", *reasons]))
 
     def __reduce__(self) -> tuple[type[Self], tuple[ExperimentRead | StudyRead]]:
-        """Return what a process that unpickles the error creates it of."""
+        """Return the class and the arguments from which a copy of the error is made."""
         return type(self), (self.ended,)
 
 
@@ -56,7 +56,7 @@ class ExtraMissing(ImportError):
         super().__init__(f"this needs {library}, which is not installed: pip install 'gaplab[{extra}]'", name=library)
 
     def __reduce__(self) -> tuple[type[Self], tuple[str, str]]:
-        """Return what a process that unpickles the error creates it of."""
+        """Return the class and the arguments from which a copy of the error is made."""
         return type(self), (str(self.name), self.extra)
 
 

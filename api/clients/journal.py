@@ -47,9 +47,9 @@ class Journal:
         for line in self._lines:
             if line.get("request") != request:
                 continue
-            if "repeat" in line:
+            if line.get("repeat") is not None:
                 found.append((line["repeat"], line.get("readings")))
-            elif line["key"] not in refused:
+            elif "answer" in line and line["key"] not in refused:
                 found = []
         return found
 

@@ -352,6 +352,7 @@ def test_readings_of_numpy_are_stored_with_null_where_a_sensor_failed(
     task.note(half, table)
     del loop  # the driver dies
     with journal.open("a") as file:  # as a driver of before wrote it
+        file.write(json.dumps({"request": task.id, "repeat": np.nan, "readings": table.tolist()}) + "\n")
         file.write(json.dumps({"request": task.id, "repeat": 0.25, "readings": table.tolist()}) + "\n")
     loop = client.requests(experiment.id, journal=journal)
     task = next(loop)
