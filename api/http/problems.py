@@ -35,6 +35,7 @@ from gaplab.services.core.errors import (
     Unauthenticated,
     Violation,
 )
+from gaplab.services.specs.blame import is_external, raised
 from gaplab.services.store.texts import brief
 
 Responses = dict[int | str, dict[str, Any]]
@@ -193,8 +194,14 @@ def _of_absent_client(request: Request, error: Exception) -> Response:  # noqa: 
 
 
 def _of_bug(request: Request, error: Exception) -> Response:
-    """Answer an unexpected error without its details, which go to the log under the same number."""
+    """Answer an unexpected error without its message, which goes to the log under the same number.
+
+    Its cause is the service, or an external plug-in, which is named with the line that raised the error.
+    """
     incident = uuid4().hex[:8]
     logger.error("incident %s at %s", incident, request.url.path, exc_info=error)
-    detail = f"The service failed; its log has the details under incident {incident}."
-    return response(problem(500, "internal-error", "The service failed", detail))
+    kind, title, cause = "internal-error", "The service failed", ""
+    if is_external(error):
+        kind, title, cause = "plugin-failed", "A plug-in failed", f": {raised(error)}"
+    detail = f"{title}{cause}; the log of the service has the details under incident {incident}."
+    return response(problem(500, kind, title, detail))

@@ -47,12 +47,12 @@ def refusing_specs() -> Iterator[None]:
     except GaplabError:
         raise
     except (Exception, SystemExit) as error:
-        if not _is_external(error):
+        if not is_external(error):
             raise
         raise InvalidSpec([Violation("", None, describe(error))]) from error
 
 
-def _is_external(error: BaseException) -> bool:
+def is_external(error: BaseException) -> bool:
     """Return whether code of an external plug-in, or of a file that it imports, led to the error."""
     modules = (
         place.__module__ if isinstance(place, type) else str(place)

@@ -4,6 +4,7 @@ import json
 import math
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,6 +18,21 @@ from gaplab.services.store.session import Store
 MOST_BYTES = Limits().body_bytes
 LEAST = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke"}
 JSON = {"content-type": "application/json"}
+SLIPPERY = """
+from pathlib import Path
+
+from gaplab.services.core.robots.toy_function import ToyFunction
+
+
+class Slippery(ToyFunction):
+    name = "slippery"
+
+    @classmethod
+    def details(cls):
+        if Path({broken!r}).exists():
+            raise RuntimeError("the password is swordfish")
+        return super().details()
+"""
 
 
 @pytest.fixture
@@ -348,4 +364,21 @@ def test_an_accident_inside_leaks_nothing_but_a_number_to_find_it_by(
     assert "swordfish" not in answer.text
     incident = detail.split()[-1].rstrip(".")
     assert incident in caplog.text
+    assert "swordfish" in caplog.text
+
+
+def test_an_accident_in_a_plug_in_names_it_and_its_line_and_no_more(
+    api: TestClient, put: Any, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    put(slippery=SLIPPERY.format(broken=str(tmp_path / "broken")))
+    assert api.get("/catalogue").status_code == 200
+    (tmp_path / "broken").touch()
+
+    answer = api.get("/catalogue")
+    found = problem(answer, 500)
+
+    assert found["type"] == "urn:gaplab:problem:plugin-failed"
+    assert "robot 'slippery' raised RuntimeError (slippery.py, line 13)" in found["detail"]
+    assert "swordfish" not in answer.text
+    assert found["detail"].split()[-1].rstrip(".") in caplog.text
     assert "swordfish" in caplog.text
