@@ -72,10 +72,11 @@ def _answer(
     check_attachments(session, spec.attachments)
     requests.expire(session, RequestRow.id == row.id)
     session.refresh(row)
-    if row.state is RequestState.WITHDRAWN:
+    answered = row.state in requests.ANSWERED
+    counted = requests.counted_answer(session, row) if answered else None
+    if row.state is RequestState.WITHDRAWN or (answered and counted is None):
         msg = f"request {row.id} is wanted no more: its experiment has ended, or a correction closed its branch"
         raise Conflict(msg)
-    counted = requests.counted_answer(session, row) if row.state in requests.ANSWERED else None
     if counted is not None and _says_nothing_new(counted, spec):
         return view_answer(counted)
     counts = counted is None and (row.state is not RequestState.TAKEN or spec.take == row.takes)

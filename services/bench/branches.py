@@ -73,7 +73,6 @@ def close(session: Session, repetition: RepetitionRow, place: int, iteration: in
     closed = log[place:]
     checkpoints.forget(session, [repetition.id])
     if not closed:
-        session.execute(update(RepetitionRow).where(RepetitionRow.id == repetition.id).values(checkpoints=0))
         _withdraw(session, repetition.id, place, None)
         return None
     of_it = select(func.max(BranchRow.number)).where(BranchRow.repetition_id == repetition.id)
@@ -167,7 +166,6 @@ def _count_down(session: Session, repetition: int, place: int, closed: Sequence[
     row, costs = RepetitionRow, [cast("Cost", getattr(step, "cost", Cost())) for step in closed]
     values = {
         "steps": place,
-        "checkpoints": 0,
         "iterations_done": row.iterations_done - sum(isinstance(step, Probed) for step in closed),
         "rollouts_done": row.rollouts_done - sum(int(cost.rollouts) for cost in costs),
         "rollouts_failed": row.rollouts_failed - sum(int(cost.failures) for cost in costs),

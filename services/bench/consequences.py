@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gaplab.schemas.corrections import Consequences
+from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.types import Measured, Probed
-from gaplab.services.store.models import RepetitionRow, RequestRow
+from gaplab.services.store.models import ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Session
@@ -44,6 +45,10 @@ def places_of(session: Session, request: RequestRow, repetition: RepetitionRow) 
     return tuple(found)
 
 
+def _iterations(session: Session, repetition: RepetitionRow) -> int:
+    return session.get_one(ExperimentRow, repetition.experiment_id).iterations
+
+
 def _left_out(step: Measured | Probed) -> bool:
     return isinstance(step, Probed) and step.left_out
 
@@ -65,6 +70,8 @@ def consequences(
     else:
         again = f"; {measurements} of them measurements, which are reused if asked for again" if measurements else ""
         words = f"{steps} stored step{'' if steps == 1 else 's'} after it will be computed again{again}"
+        if repetition.state is State.COMPLETED and repetition.iterations_done < _iterations(session, repetition):
+            words += "; the repetition, which was stopped, goes on to its last iteration"
     return Consequences(
         request=request.id,
         repetition=repetition.number,

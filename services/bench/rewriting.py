@@ -45,7 +45,7 @@ def apply(
     for place in places_of(session, request, repetition):
         _rewrite(session, place.request, repetition, answer)
     _rewrite_records(session, repetition)
-    _continue(session, repetition)
+    _continue(session, repetition, closed=branch is not None)
     return branch
 
 
@@ -73,15 +73,18 @@ def _rewrite_records(session: Session, repetition: RepetitionRow) -> None:
         history = history.after(step)
 
 
-def _continue(session: Session, repetition: RepetitionRow) -> None:
-    """Queue a repetition whose log ends early, unless it failed or was cancelled; and bring its experiment back."""
-    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
+def _continue(session: Session, repetition: RepetitionRow, *, closed: bool) -> None:
+    """Queue a repetition that had ended or waits for nothing, if steps were closed; and bring its experiment back."""
     session.refresh(repetition)
-    if repetition.state in (State.COMPLETED, State.WAITING) and repetition.iterations_done < experiment.iterations:
-        pending = [each for each in requests.requests_of(session, repetition.id) if each.state in requests.PENDING]
-        if not pending:
-            move(session, RepetitionRow, RepetitionRow.id == repetition.id, State.QUEUED, losses=0)
-    _settle(session, experiment)
+    if (repetition.state is State.COMPLETED and closed) or _waits_for_nothing(session, repetition):
+        move(session, RepetitionRow, RepetitionRow.id == repetition.id, State.QUEUED, losses=0)
+    _settle(session, session.get_one(ExperimentRow, repetition.experiment_id))
+
+
+def _waits_for_nothing(session: Session, repetition: RepetitionRow) -> bool:
+    """Return whether the request that a repetition waited for was withdrawn, as it followed from a corrected sample."""
+    pending = [each for each in requests.requests_of(session, repetition.id) if each.state in requests.PENDING]
+    return repetition.state is State.WAITING and not pending
 
 
 def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) -> None:

@@ -151,7 +151,8 @@ def _obey(session: Session, experiment: ExperimentRow, verb: Verb) -> None:
     if verb is Verb.RETRY:
         show_again(session, experiment)
         failed = (row.experiment_id == experiment.id) & (row.state == State.FAILED)
-        move(session, row, failed, State.QUEUED, losses=0, error=None, hidden_error=None)
+        # Before, a failure left the number of its deleted checkpoints.
+        move(session, row, failed, State.QUEUED, losses=0, checkpoints=0, error=None, hidden_error=None)
     settle(session, [experiment.id], _REQUESTED[verb](experiment))
     session.refresh(experiment)
     if verb is Verb.CANCEL:

@@ -310,6 +310,66 @@ def test_a_correction_of_a_probe_changes_its_point_alone(store: Store) -> None:
     assert read_experiment(store, experiment.id).state is State.COMPLETED
 
 
+def stopped_after_a_step(store: Store) -> tuple[ExperimentRead, list[Any]]:
+    """An experiment of three iterations that was stopped after its first sample and probe, with its requests."""
+    experiment = submit_experiment(store, bench(iterations=3))
+    asked = []
+    for _ in range(3):
+        compute(store)
+        asked.append(pending(store)[0])
+        measure(store, asked[-1], 0.5)
+    compute(store)
+    assert lifecycle.ask_experiment(store, experiment.id, Verb.STOP).state is State.COMPLETED
+    return experiment, [taking.read_request(store, each.id) for each in asked]
+
+
+def test_a_correction_of_a_probe_leaves_a_stopped_experiment_stopped(store: Store) -> None:
+    experiment, asked = stopped_after_a_step(store)
+    probe = next(each for each in asked if each.kind == "probe")
+    slip = CorrectionSpec(values=(0.9,), reason="a slip")
+
+    told = corrections.correct(store, probe.answers[0].id, slip, FREELY).answer
+
+    assert told.words == "nothing follows from it"
+    assert read_experiment(store, experiment.id).state is State.COMPLETED
+    assert compute(store) == 0
+
+
+def test_a_correction_of_a_sample_says_that_a_stopped_experiment_goes_on(store: Store) -> None:
+    experiment, asked = stopped_after_a_step(store)
+    sample = next(each for each in asked if each.kind == "sample")
+    slip = CorrectionSpec(values=(0.9,), reason="a slip")
+
+    told = corrections.correct(store, sample.answers[0].id, slip, FREELY, dry_run=True).answer
+    corrections.correct(store, sample.answers[0].id, slip, FREELY)
+
+    assert told.words.endswith("; the repetition, which was stopped, goes on to its last iteration")
+    assert read_experiment(store, experiment.id).state is State.QUEUED
+
+
+def test_a_void_answer_of_a_closed_branch_is_not_answered_again(store: Store) -> None:
+    experiment = submit_experiment(store, bench(strategy="simulated_fit", iterations=3))
+    finish(store, lambda genome: genome[0])
+    asked = taking.list_requests(store, RequestFilter(pending=False)).items
+    first = next(each for each in asked if each.kind == "sample")
+    corrections.correct(store, first.answers[0].id, CorrectionSpec(values=(9.0,), reason="a slip"), FREELY)
+    compute(store)
+    (wanted,) = pending(store)
+    closed = next(
+        each for each in asked if (each.iteration, each.kind) == (wanted.iteration, wanted.kind) and each.answers
+    )
+    assert closed.genome != wanted.genome
+    corrections.void(store, closed.answers[0].id, VoidSpec(reason="the robot slipped"), FREELY)
+    (before,) = log_of(store, experiment)
+
+    with pytest.raises(Conflict, match="a correction closed its branch"):
+        measure(store, closed, 0.77)
+
+    (after,) = log_of(store, experiment)
+    assert len(after) == len(before)
+    assert pending(store)[0].id == wanted.id
+
+
 def test_a_correction_while_the_repetition_is_computed_fences_its_worker(store: Store) -> None:
     experiment = submit_experiment(store, bench())
     compute(store)

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.schemas.lifecycle import State
+from gaplab.schemas.lifecycle import State, Verb
 from gaplab.services.core.answers import unpack
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments.lifecycle import ask_experiment
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint
 from gaplab.services.running.leases import MAX_LOSSES
@@ -201,6 +202,22 @@ def test_a_repetition_that_fails_leaves_no_checkpoints(store: Store, hopeless: A
     assert execution.fail(store, claim, Failure("no")) is not hopeless
 
     assert checkpoints_left(store) == 0
+
+
+def test_a_repetition_that_is_retried_stores_checkpoints_again(store: Store) -> None:
+    submitted = submission.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+    execution.record_all(store, [(claim, [part(0, 0), part(0, 1)])])
+    execution.fail(store, claim, Failure("no"))
+    ask_experiment(store, submitted.id, Verb.RETRY)
+    (claim,) = execution.claim(store, "me", 1)
+    assert claim.checkpoints == ()
+
+    execution.record_all(store, [(claim, [part(0, 0)])])
+    execution.hand_back(store, claim)
+
+    (claim,) = execution.claim(store, "me", 1)
+    assert claim.checkpoints == (part(0, 0),)
 
 
 def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(store: Store) -> None:

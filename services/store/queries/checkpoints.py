@@ -53,9 +53,10 @@ def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None
 
 
 def forget(session: Session, repetitions: Sequence[int]) -> None:
-    """Delete the parts of steps that are recorded or abandoned."""
+    """Delete the parts of steps that are recorded or abandoned, so that part 0 is the next."""
     if repetitions:
         session.execute(delete(CheckpointRow).where(CheckpointRow.repetition_id.in_(repetitions)))
+        session.execute(update(RepetitionRow).where(RepetitionRow.id.in_(repetitions)).values(checkpoints=0))
 
 
 def stored(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Checkpoint, ...]]:

@@ -27,7 +27,6 @@ _ADVANCE = (
     )
     .values(
         steps=bindparam("to_steps"),
-        checkpoints=0,
         losses=0,
         measuring_at=None,
         heartbeat_at=now(),
