@@ -20,7 +20,7 @@ class Prediction(Frozen):
 class Predictions(Frozen):
     """Predictions of an experiment by repetition and iteration, as far as they are computed.
 
-    Each request computes more: repeat it while some are pending.
+    Each request computes more: repeat it while some are pending. Held-out samples, which no tuning sees, have none.
     """
 
     experiment: Id

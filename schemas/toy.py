@@ -34,7 +34,9 @@ class ToyIteration(Frozen):
     genes: tuple[float, ...] = Field(description="genes at which the functions are evaluated")
     truth: Values | None = Field(description="the true function; null while it is hidden")
     approximations: tuple[Values, ...] = Field(description="the simulators of the iteration, best first")
-    squared_error: float | None = Field(description="squared error of the best simulator over the samples; null: none")
+    squared_error: float | None = Field(description="what tuning minimised, of the best simulator; null: no samples")
+    squares: bool = Field(description="whether that is a sum of squares")
+    error: float | None = Field(description="error per sample that tuning saw, of the best simulator; null: none")
     samples: tuple[ToySample, ...] = Field(description="samples up to this iteration")
     transfer: ToyTransfer | None
     limits: tuple[float, float] = Field(

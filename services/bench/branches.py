@@ -1,9 +1,10 @@
 """Closed branches: the steps after a corrected measurement leave the log, and stay readable."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any, cast
 
-from sqlalchemy import delete, func, insert, select, update
+from sqlalchemy import delete, func, insert, literal, select, update
 
 from gaplab.schemas.corrections import BranchRead
 from gaplab.schemas.lifecycle import Ending, State
@@ -80,8 +81,8 @@ def close(session: Session, repetition: RepetitionRow, place: int, iteration: in
     values = {"repetition_id": repetition.id, "number": number, "iteration": iteration, "reason": reason}
     session.execute(insert(BranchRow).values(**values, steps=[plain(step) for step in closed], closed_at=now()))
     _withdraw(session, repetition.id, place, number)
-    _remove(session, repetition.id, closed)
     _count_down(session, repetition.id, place, closed)
+    _remove(session, repetition.id, closed)
     session.refresh(repetition)
     return number
 
@@ -144,7 +145,7 @@ def _withdraw(session: Session, repetition: int, place: int, branch: int | None)
 def _remove(session: Session, repetition: int, closed: Sequence[Step]) -> None:
     """Delete the rows of closed steps, and empty the columns of iterations that keep earlier steps."""
     measurement, simulator, iteration = MeasurementRow, SimulatorRow, IterationRow
-    opened = {step.iteration for step in closed if isinstance(step, Selected) or position(step) == 0}
+    opened = _whole(closed)
     for step in closed:
         number = step.iteration
         if isinstance(step, Measured | Probed):
@@ -161,10 +162,24 @@ def _remove(session: Session, repetition: int, closed: Sequence[Step]) -> None:
         session.execute(delete(iteration).where(iteration.repetition_id == repetition, iteration.number.in_(opened)))
 
 
+def _whole(closed: Sequence[Step]) -> set[int]:
+    """Return the iterations of which no step is kept."""
+    return {step.iteration for step in closed if isinstance(step, Selected) or position(step) == 0}
+
+
 def _count_down(session: Session, repetition: int, place: int, closed: Sequence[Step]) -> None:
-    """Take closed steps out of the tallies of their repetition."""
-    row, costs = RepetitionRow, [cast("Cost", getattr(step, "cost", Cost())) for step in closed]
+    """Take closed steps out of the tallies of their repetition, and their seconds out of their iterations.
+
+    Seconds of an iteration that keeps steps are shared by rollouts, since those of single steps are not stored.
+    """
+    row, costs = RepetitionRow, list(map(_cost, closed))
+    seconds = _seconds_of(session, repetition, closed)
+    iteration = IterationRow
+    for number, spent in seconds.items():
+        of_it = (iteration.repetition_id == repetition) & (iteration.number == number)
+        session.execute(update(iteration).where(of_it).values(seconds=iteration.seconds - spent))
     values = {
+        "seconds": row.seconds - sum(seconds.values()),
         "steps": place,
         "iterations_done": row.iterations_done - sum(isinstance(step, Probed) for step in closed),
         "rollouts_done": row.rollouts_done - sum(int(cost.rollouts) for cost in costs),
@@ -172,3 +187,21 @@ def _count_down(session: Session, repetition: int, place: int, closed: Sequence[
         "rollouts_saved": row.rollouts_saved - sum(int(cost.saved) for cost in costs),
     }
     session.execute(update(row).where(row.id == repetition).values(values))
+
+
+def _seconds_of(session: Session, repetition: int, closed: Sequence[Step]) -> dict[int, float]:
+    """Return the seconds of the closed steps by iteration."""
+    row, whole, rollouts = IterationRow, _whole(closed), Counter[int]()
+    for step in closed:
+        rollouts[step.iteration] += int(_cost(step).rollouts)
+    parts = (row.selection_rollouts, row.tuning_rollouts, row.transfer_rollouts)
+    every = sum((func.coalesce(part, 0) for part in parts), start=literal(0))
+    query = select(row.number, row.seconds, every).where(row.repetition_id == repetition, row.number.in_(rollouts))
+    return {
+        number: seconds if number in whole else seconds * rollouts[number] / max(count, 1)
+        for number, seconds, count in session.execute(query)
+    }
+
+
+def _cost(step: Step) -> Cost:
+    return cast("Cost", getattr(step, "cost", Cost()))

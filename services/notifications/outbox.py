@@ -15,6 +15,7 @@ from gaplab.schemas.notifications import Channel, Notification
 from gaplab.services.notifications import messages
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import (
+    DeletionRow,
     EventCounterRow,
     EventRow,
     ExperimentRow,
@@ -132,18 +133,20 @@ def settle(session: Session, letter: Letter, failure: str | None, *, hopeless: b
 def _of_end(
     session: Session, event: EventRow, channels: Sequence[Channel], present: datetime
 ) -> Iterator[NotificationRow]:
-    """Yield the notifications of an end, unless it was undone since."""
+    """Yield the notifications of an end, unless it was undone since.
+
+    The end of an experiment that is deleted by now may be that of its study.
+    """
     experiment = session.get(ExperimentRow, event.experiment_id)
-    if experiment is None or not experiment.state.ended:
-        return
-    if experiment.study_id is None:
-        told = [*channels, *([Channel.OWN] if experiment.webhook else [])]
+    deleted = session.get(DeletionRow, event.experiment_id) if experiment is None else None
+    if experiment is not None:
+        if not experiment.state.ended or not _is_last_end(session, event, [experiment.id]):
+            return
+        told = [*(channels if experiment.study_id is None else ()), *([Channel.OWN] if experiment.webhook else [])]
         message = messages.of_experiment(event, experiment)
         yield from (_row(event, message, channel, present) for channel in told)
-        return
-    if experiment.webhook:
-        yield _row(event, messages.of_experiment(event, experiment), Channel.OWN, present)
-    study = session.get(StudyRow, experiment.study_id)
+    of = experiment or deleted
+    study = session.get(StudyRow, of.study_id) if of and of.study_id else None
     if study is not None and _ended_with(session, event, study):
         told = [*channels, *([Channel.OWN] if study.webhook else [])]
         message = messages.of_study(session, event, study)
@@ -151,12 +154,17 @@ def _of_end(
 
 
 def _ended_with(session: Session, event: EventRow, study: StudyRow) -> bool:
-    """Return whether all experiments of the study have ended, the last of them at this event."""
-    experiments, row = experiments_of(session, [study.id]), EventRow
-    if not all(experiment.state.ended for experiment in experiments):
+    """Return whether all experiments of the study have ended, the last of them, deleted or not, at this event."""
+    experiments = experiments_of(session, [study.id])
+    if not experiments or not all(experiment.state.ended for experiment in experiments):
         return False
-    ids = [experiment.id for experiment in experiments]
-    ends = select(func.max(row.number)).where(row.experiment_id.in_(ids), row.kind.in_(ENDS))
+    deleted = session.scalars(select(DeletionRow.id).where(DeletionRow.study_id == study.id))
+    return _is_last_end(session, event, [*(experiment.id for experiment in experiments), *deleted])
+
+
+def _is_last_end(session: Session, event: EventRow, experiments: Sequence[str]) -> bool:
+    row = EventRow
+    ends = select(func.max(row.number)).where(row.experiment_id.in_(experiments), row.kind.in_(ENDS))
     return session.scalar(ends) == event.number
 
 

@@ -62,7 +62,7 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        every = replays.tuned_samples(session, experiment_id)
+        every = replays.tuned_samples(session, row)
     samples = every[:MOST_KEPT]
     spec = spec_of(row.spec)
     place = (row.id, imported_files(row.spec))

@@ -7,7 +7,7 @@ from typing import Any
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.robot_library import label_of
-from gaplab.services.figures.words import number, spoken
+from gaplab.services.figures.words import number, number_of, spoken
 from gaplab.services.reports.blocks import Grid
 from gaplab.services.reports.content import Facts
 from gaplab.services.reports.judged import Judged
@@ -116,11 +116,15 @@ def provenance(facts: Facts) -> tuple[Grid, ...]:
             found[use.id] = use.provenance
             repetitions[use.id] = repetitions.get(use.id, 0) + use.repetitions
     return tuple(
-        Grid(
-            f"Software and machine of {repetitions[id_]} repetitions", ("Part", "Version"), _versions(each), words=True
-        )
+        Grid(_of_software(repetitions[id_]), ("Part", "Version"), _versions(each), words=True)
         for id_, each in found.items()
     )
+
+
+def _of_software(repetitions: int) -> str:
+    """Return the caption of the versions that were the last to compute so many repetitions."""
+    last = f"the last to compute {number_of('repetition', repetitions)}" if repetitions else "of earlier steps"
+    return f"Software and machine, {last}"
 
 
 def _versions(found: Provenance) -> tuple[tuple[str, str], ...]:

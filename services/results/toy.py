@@ -12,7 +12,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
 from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.experiments import hiding
 from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
 from gaplab.services.specs.resolution import is_direct
@@ -134,6 +134,7 @@ def _toy(
     simulators = [each for each in found.simulators if each.iteration == iteration]
     transfer = found.transferred[iteration]
     samples = [each for each in found.measured if each.kind is MeasurementKind.SAMPLE and each.iteration <= iteration]
+    best = simulators[0] if simulators and samples else None
     return ToyIteration(
         experiment=found.row.id,
         name=found.row.name,
@@ -143,7 +144,9 @@ def _toy(
         genes=tuple(genes.tolist()),
         truth=None if truth is None else _values(truth),
         approximations=tuple(map(_values, _approximations(found, simulators, genes))),
-        squared_error=simulators[0].squared_error if simulators and samples else None,
+        squared_error=best and best.squared_error,
+        squares=discrepancy_of(found.row.spec).squares,
+        error=best and best.error,
         samples=tuple(
             ToySample(iteration=each.iteration, gene=each.genome[0], fitness=each.fitness) for each in samples
         ),

@@ -40,17 +40,13 @@ class RepetitionLeases(Leases[Claim]):
         If measurements are cut off repeatedly, the experiment is paused, because a person must look.
         """
         row = self.table
-        measuring = select(row.id, row.experiment_id, row.losses + 1).where(
-            which, row.state == State.RUNNING, row.measuring_at.is_not(None)
-        )
-        cut_off = session.execute(measuring).all()
         values = {"losses": row.losses + 1, "owner": None, "error": reason}
         change = Change(State.QUEUED, Ending.LOST, reason, values)
-        queued = self.end(session, row.id.in_([id_ for id_, _, _ in cut_off]), change)
-        for _, experiment, losses in cut_off:
-            if losses >= MAX_LOSSES:
-                pause(session, experiment, f"a measurement was cut off {losses} times; the last time {reason}")
-        return queued + super().lose(session, which, reason)
+        cut_off = self.end(session, which & row.measuring_at.is_not(None), change)
+        often = select(row.experiment_id, row.losses).where(row.id.in_(cut_off), row.losses >= MAX_LOSSES)
+        for experiment, losses in session.execute(often).all():
+            pause(session, experiment, f"a measurement was cut off {losses} times; the last time {reason}")
+        return cut_off + super().lose(session, which, reason)
 
     def drives(self) -> ColumnElement[bool]:
         """Return the SQL condition: the repetition holds hardware, which its worker may still drive for a moment."""

@@ -89,7 +89,7 @@ def _check(source: Path, copy: Path) -> str:
     with closing(sqlite3.connect(copy)) as connection:
         try:
             (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone() or ("none",)
-            connection.execute("SELECT count(*) FROM experiment, repetition")
+            connection.execute("SELECT 1 FROM experiment, repetition LIMIT 1")
         except sqlite3.OperationalError as error:
             raise StoreUnavailable(f"{source} is no database of gaplab: {error}") from error
         if revision > REVISION:

@@ -35,7 +35,7 @@ from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.lease import Pulse
-from gaplab.services.store.models import AttachmentRow
+from gaplab.services.store.models import AttachmentRow, IterationRow, RepetitionRow
 from gaplab.services.store.queries.costs import work_of
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
@@ -278,6 +278,30 @@ def test_a_correction_closes_what_followed_and_measurements_are_reused(store: St
     (after,) = log_of(store, experiment)
     assert all(map(same, after, before))
     assert read_experiment(store, experiment.id).state is State.COMPLETED
+
+
+def test_seconds_of_closed_steps_are_taken_back(store: Store) -> None:
+    submit_experiment(store, bench(strategy="random", iterations=3))
+    asked = finish(store, lambda genome: genome[0])
+
+    def worked() -> tuple[float, list[float]]:
+        with store.reading() as session:
+            iterations = session.scalars(select(IterationRow.seconds).order_by(IterationRow.number)).all()
+            return session.scalars(select(RepetitionRow.seconds)).one(), list(iterations)
+
+    with store.transaction() as session:  # as if each took ten seconds
+        session.execute(update(IterationRow).values(seconds=10.0))
+        session.execute(update(RepetitionRow).values(seconds=40.0))
+    sample = next(each for each in asked if (each.iteration, each.kind) == (2, "sample"))
+    answer = taking.read_request(store, sample.id).answers[0]
+
+    corrections.correct(store, answer.id, CorrectionSpec(values=(0.9,), reason="a slip"), FREELY)
+
+    total, iterations = worked()
+    assert iterations[:2] == [10.0, 10.0]
+    assert len(iterations) == 3
+    assert 0 <= iterations[2] < 10  # it keeps its selection
+    assert total == pytest.approx(sum(iterations))
 
 
 def test_a_void_measurement_is_asked_for_again(store: Store) -> None:

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from ray.exceptions import ActorDiedError, ActorUnavailableError, GetTimeoutError
+from sqlalchemy import update
 
 from gaplab.schemas.lifecycle import Ending, State, Verb
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
@@ -23,16 +24,18 @@ from gaplab.services.core.types import Measured, Outcome, Probed, Sample
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, lifecycle, reading, submission
-from gaplab.services.running import execution, sensitivity
+from gaplab.services.running import execution, repetition_leases, sensitivity
 from gaplab.services.running.execution import Failure
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.running.silences import Silences
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.clock import moment
 from gaplab.services.store.lease import Claim, Pulse, TimedStep
 from gaplab.services.store.models import EventRow, ExperimentRow, RepetitionRow
+from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.queries.logs import logs
-from gaplab.services.store.session import Store
+from gaplab.services.store.session import Session, Store
 from gaplab.workers import checkpoints, permits, supervisor
 from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
@@ -295,6 +298,29 @@ def test_hardware_has_one_holder_at_a_time(store: Store) -> None:
     execution.requeue_lost(store, stale_after_s=-1.0)
     again = next(each for each in execution.claim(store, "next", 9) if each.experiment_id == second)
     assert (again.id, again.epoch) == (lost.id, lost.epoch + 1)
+
+
+@pytest.mark.parametrize("measuring", [False, True])
+def test_a_heartbeat_that_comes_while_others_are_given_up_keeps_its_lease(
+    store: Store, monkeypatch: pytest.MonkeyPatch, measuring: Any
+) -> None:
+    """As on Postgres, where another transaction may be committed between two statements of one."""
+    submission.submit_experiment(store, on_the_bench(repetitions=1))
+    (held,) = execution.claim(store, "me", 9)
+    if measuring:
+        execution.note_measuring(store, [held])
+    row = RepetitionRow
+
+    def beaten(session: Session, experiments: Any) -> Any:
+        session.execute(update(row).where(row.id == held.id).values(heartbeat_at=moment(session)))
+        return lock(session, experiments)
+
+    with store.transaction() as session:
+        session.execute(update(row).values(heartbeat_at=moment(session) - timedelta(seconds=60)))
+    monkeypatch.setattr(repetition_leases, "lock", beaten)
+
+    assert execution.requeue_lost(store, stale_after_s=30.0) == 0
+    assert execution.heartbeat(store, [held]) == (held,)
 
 
 @pytest.mark.parametrize("by_s", [3600.0, -3600.0])

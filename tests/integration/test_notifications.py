@@ -28,6 +28,7 @@ from gaplab.services import events
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import lifecycle, reading, submission
+from gaplab.services.experiments.deletion import Deleter, delete_experiment
 from gaplab.services.experiments.extension import extend_experiment
 from gaplab.services.notifications import delivery, outbox
 from gaplab.services.notifications.courier import Courier, courier
@@ -142,6 +143,38 @@ def test_a_study_that_goes_on_is_told_again(store: Store, receiver: Receiver) ->
 
     assert [message["subject"] for message in receiver.messages] == [alone.id] * 2
     assert len({message["id"] for message in receiver.messages}) == 2
+
+
+def test_an_experiment_that_ended_twice_before_anybody_looked_is_told_once(store: Store, receiver: Receiver) -> None:
+    bob = begun(store, url=receiver.url)
+    alone = submission.submit_experiment(store, toy(repetitions=1))
+    finish(store)
+    extend_experiment(store, alone.id, ExtensionSpec(repetitions=2))
+    finish(store)
+
+    bob.work()
+
+    assert [message["subject"] for message in receiver.messages] == [alone.id]
+
+
+def test_a_study_whose_last_experiment_was_cancelled_and_deleted_at_once_is_told(
+    store: Store, receiver: Receiver
+) -> None:
+    bob = begun(store, url=receiver.url)
+    study = submission.submit_study(store, StudySpec.model_validate(STUDY))
+    first, second = (each.id for each in study.experiments)
+    lifecycle.ask_experiment(store, second, Verb.PAUSE)
+    finish(store)
+    bob.work()
+    assert receiver.messages == []
+
+    cancel(store, second)
+    delete_experiment(store, second, Deleter(None, may_delete_all=True))
+    bob.work()
+
+    (message,) = receiver.messages
+    assert (message["kind"], message["subject"], message["state"]) == ("study", study.id, "COMPLETED")
+    assert [each["id"] for each in message["experiments"]] == [first]
 
 
 def test_what_is_not_delivered_is_tried_again_after_pauses_until_it_is(store: Store, receiver: Receiver) -> None:

@@ -11,7 +11,7 @@ from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.experiments import archiving, editing, lifecycle, listing, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.experiments.query.conditions import EXPERIMENT_FIELDS, STUDY_FIELDS
-from gaplab.services.experiments.query.parsing import LONGEST, quote
+from gaplab.services.experiments.query.parsing import LONGEST
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
@@ -107,7 +107,7 @@ QUERIES = {
     "name = 'Tagged'": {"Tagged"},
     "name = tagged": set(),
     "name ~ TAGGED": {"Tagged"},
-    quote('no "such" text'): set(),
+    r'"no \"such\" text"': set(),
 }
 
 

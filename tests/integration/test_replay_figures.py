@@ -14,8 +14,12 @@ from gaplab.services.core.types import Probed, Transferred, Tuned
 from gaplab.services.engines.analytic import speed
 from gaplab.services.experiments import submission
 from gaplab.services.figures.kinds.gait import gait_figure
+from gaplab.services.figures.kinds.readings import readings_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.figures.marks import Arrow, Bars, Line, Points
+from gaplab.services.figures.matplotlib.files import render_file
+from gaplab.services.figures.plotly.chart import chart
+from gaplab.services.figures.words import number
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
@@ -94,6 +98,16 @@ def test_a_gait_of_which_nothing_moved_is_empty(replay: Any) -> None:
     assert figure.nothing == "the physics failed"
 
 
+@pytest.mark.parametrize("format_", ["svg", "png", "pdf"])
+def test_readings_of_a_robot_without_sensors_are_an_empty_figure(replay: Any, format_: Any) -> None:
+    figure = readings_figure(replay)
+
+    assert figure.empty
+    assert figure.nothing == "the robot has no sensors"
+    assert chart(figure)["data"] == []
+    assert render_file(figure, format_).startswith(FORMATS[format_])
+
+
 def test_the_toy_has_what_the_papers_figure_has(store: Store) -> None:
     experiment, log = walked(store)
 
@@ -140,6 +154,29 @@ def test_several_iterations_are_panels_and_none_is_the_last(sqlite_store: Store)
     assert [panel.title for panel in figure.panels] == [f"Iteration {number}" for number in range(4)]
     assert len({panel.y.limits for panel in figure.panels}) == 1
     assert last.iteration == 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "seen", "heading"),
+    [
+        ({"held_out": 0.5}, [1, 3], "Sum of squared errors"),
+        ({"discrepancy": "absolute_fitness"}, [1, 2, 3], "Sum of errors"),
+    ],
+)
+def test_the_error_of_the_toy_is_of_what_tuning_saw_and_minimised(
+    sqlite_store: Store, changes: Any, seen: Any, heading: str
+) -> None:
+    experiment, _ = walked(sqlite_store, **changes)
+
+    (shown,) = toy_iterations(sqlite_store, experiment, 0, [3])
+
+    found = [each for each in shown.samples if each.iteration in seen]
+    off = [abs(np.interp(each.gene, shown.genes, shown.approximations[0]) - each.fitness) for each in found]
+    expected = np.sqrt(np.mean(np.square(off))) if shown.squares else np.mean(off)
+    assert shown.error == pytest.approx(expected, abs=1e-3)
+    figure = toy_figure([shown])
+    assert figure.table.head[3] == heading
+    assert f"the best simulator errs by {number(shown.error)} a sample" in figure.caption
 
 
 def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store: Store) -> None:

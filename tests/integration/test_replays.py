@@ -355,6 +355,18 @@ def test_predictions_are_of_the_simulators_before_and_after_a_sample(store: Stor
         assert abs(each.simulated_after - each.fitness) <= abs(each.simulated_before - each.fitness) + 1e-9
 
 
+def test_samples_that_no_tuning_sees_have_no_predictions(sqlite_store: Store, app: Any) -> None:
+    experiment = submission.submit_experiment(sqlite_store, toy(repetitions=1, iterations=4, held_out=0.5)).id
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    for step in repetition(setting(claim.spec, 0)):
+        assert execution.record(sqlite_store, claim, step)
+
+    found = predictions(sqlite_store, app.state.rollout_process, experiment)
+
+    assert [each.iteration for each in found.items] == [1, 3]
+    assert (found.pending, found.left_out) == (0, 0)
+
+
 def test_predictions_take_a_while_and_are_pending_meanwhile(sqlite_store: Store, app: Any) -> None:
     experiment, log, claim = walked(sqlite_store)
     execution.record(sqlite_store, claim, Tuned(2, (Simulator(frozen(BEST)),)))

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Select, and_, func, literal, not_, true
 
 from gaplab.schemas.lifecycle import State
-from gaplab.services.core.errors import InvalidSpec, Violation, unknown_name
+from gaplab.services.core.errors import unknown_name
 from gaplab.services.experiments.query.parsing import Value, refusal
 from gaplab.services.store.cursor import Column
 from gaplab.services.store.texts import storable
@@ -200,8 +200,3 @@ def _moment_of(value: Value) -> tuple[datetime, timedelta]:
         return at, timedelta(days=1) if len(word) == len("2026-11-05") else timedelta(minutes=1)
     except (ValueError, OverflowError) as error:
         raise refusal(value, f"{word!r} is no time, like 2026-11-05, 2026-11-05T09:00 or -7d") from error
-
-
-def moved(error: InvalidSpec, pointer: str) -> InvalidSpec:
-    """Return an error about a query that stands at this place of a request's body."""
-    return InvalidSpec([Violation.moved(each, "q", pointer) for each in error.violations])

@@ -135,12 +135,6 @@ def refusal(
     return InvalidSpec([Violation("q", value.text, f"at character {value.place}: {message}", permitted, nearest)])
 
 
-def quote(text: str) -> str:
-    """Return the text as a query that searches for it."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'
-
-
 @cache
 def _parser() -> Lark:
     return Lark(_GRAMMAR, parser="lalr", maybe_placeholders=False, transformer=_Building())

@@ -7,6 +7,8 @@ from gaplab.services.figures.words import heading, limits, number
 
 SIMULATED, MEASURED = "In simulation", "In reality"
 
+NO_SENSORS = Panel((), Axis("Time (s)", (0.0, 1.0)), Axis("", (0.0, 1.0)))
+
 
 def readings_figure(replay: Replay, *, title: str | None = None) -> FigureDefinition:
     """Return a figure with a panel for each sensor: its readings in simulation, and those in reality.
@@ -21,7 +23,7 @@ def readings_figure(replay: Replay, *, title: str | None = None) -> FigureDefini
     return FigureDefinition(
         name="readings",
         title=heading(own if title is None else title),
-        panels=tuple(_panel(found, place) for place in range(len(found.sensors))) if found else (),
+        panels=tuple(_panel(found, place) for place in range(len(found.sensors))) if found else (NO_SENSORS,),
         caption=_caption(found) if found else "",
         alt=f"{own}: readings of {', '.join(found.sensors)}." if found else own,
         share_x=True,

@@ -84,8 +84,7 @@ def squared_error_figure(
     errors = {at: {one: drawable(value) for one, value in found.items()} for at, found in errors.items()}
     unit = printable(kind.unit)
     square = f"({unit})²" if unit not in {"", "1"} else ""
-    summed = "Sum of squared errors" if kind.squares else "Sum of errors"
-    measures = [_measure(errors, summed, "Sum", square if kind.squares else unit, each=each)]
+    measures = [_measure(errors, summed(squares=kind.squares), "Sum", square if kind.squares else unit, each=each)]
     if samples:
         per_sample = _per_sample(errors, samples, kind)
         measures.insert(0, _measure(per_sample, "Error per sample", "Per sample", unit, each=each))
@@ -98,6 +97,11 @@ def squared_error_figure(
         share_x=True,
         table=_table(measures),
     )
+
+
+def summed(*, squares: bool) -> str:
+    """Return the name of the sum that tuning minimises."""
+    return "Sum of squared errors" if squares else "Sum of errors"
 
 
 def _per_sample(

@@ -1,9 +1,9 @@
 """The toy function, as in the paper's Fig. 3: the true function, its approximations, the samples, and the transfer."""
 
 from collections.abc import Sequence
-from math import sqrt
 
 from gaplab.schemas.toy import ToyIteration
+from gaplab.services.figures.kinds.squared_error import summed
 from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Line, Mark, Panel, Points, Table
 from gaplab.services.figures.style import COLORS, INK, Style
 from gaplab.services.figures.words import heading, number, number_of, spoken, with_unit
@@ -100,19 +100,13 @@ def _is_cut(toy: ToyIteration) -> bool:
 
 def _told(toy: ToyIteration) -> str:
     parts = [f"after {number_of('sample', len(toy.samples))}"]
-    if toy.squared_error is not None:
-        parts.append(f"the best simulator errs by {number(_per_sample(toy))} a sample")
+    if toy.error is not None:
+        parts.append(f"the best simulator errs by {number(toy.error)} a sample")
     gene, simulated, real = _transfer_in_words(toy)
     if gene:
         fitness = f"{simulated or 'nothing'} in simulation and {real or 'nothing'} in reality"
         parts.append(f"the transferred gene {gene} reaches {fitness}")
     return f"Iteration {toy.iteration}: {', '.join(parts)}."
-
-
-def _per_sample(toy: ToyIteration) -> float | None:
-    """Return the root mean square error of the best simulator; None without samples."""
-    samples = sum(sample.fitness is not None for sample in toy.samples)
-    return sqrt(toy.squared_error / samples) if toy.squared_error is not None and samples else None
 
 
 def _transfer_in_words(toy: ToyIteration) -> tuple[str, str, str]:
@@ -122,7 +116,7 @@ def _transfer_in_words(toy: ToyIteration) -> tuple[str, str, str]:
 
 
 def _row(toy: ToyIteration) -> tuple[str, ...]:
-    errors = number(_per_sample(toy)), number(toy.squared_error)
+    errors = number(toy.error), number(toy.squared_error)
     return str(toy.iteration), str(len(toy.samples)), *errors, *_transfer_in_words(toy)
 
 
@@ -132,7 +126,7 @@ def _table(toys: Sequence[ToyIteration]) -> Table:
         "Iteration",
         "Samples",
         "Error per sample",
-        "Sum of squared errors",
+        summed(squares=toys[0].squares),
         "Transferred gene",
         "Fitness in simulation",
         "Fitness in reality",

@@ -1,12 +1,21 @@
 """Rows for replays and predictions: controllers, their simulators, and their fitness in reality."""
 
 from dataclasses import dataclass
+from itertools import starmap
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.records import MeasurementKind
-from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, RequestRow, SimulatorRow
+from gaplab.services.core.held_out import is_held_out
+from gaplab.services.store.models import (
+    ExperimentRow,
+    IterationRow,
+    MeasurementRow,
+    RepetitionRow,
+    RequestRow,
+    SimulatorRow,
+)
 from gaplab.services.store.queries.repetition_rows import of_experiments
 
 
@@ -26,15 +35,21 @@ class TunedSample:
     after: list[float]
 
 
-def tuned_samples(session: Session, experiment: str) -> tuple[TunedSample, ...]:
-    """Return the samples of an experiment that simulators were tuned on, by repetition and iteration."""
+def tuned_samples(session: Session, experiment: ExperimentRow) -> tuple[TunedSample, ...]:
+    """Return the samples of an experiment that simulators were tuned on, by repetition and iteration.
+
+    Held-out samples are not among them.
+    """
     row, before, after = MeasurementRow, aliased(SimulatorRow), aliased(SimulatorRow)
     columns = row.iteration, row.genome, row.fitness, before.parameters, after.parameters
-    query = of_experiments(row, [experiment], RepetitionRow.number, *columns).where(row.kind == MeasurementKind.SAMPLE)
+    query = of_experiments(row, [experiment.id], RepetitionRow.number, *columns)
+    query = query.where(row.kind == MeasurementKind.SAMPLE)
     for found, iteration in ((before, row.iteration - 1), (after, row.iteration)):
         best = (found.repetition_id == row.repetition_id) & (found.iteration == iteration) & (found.rank == 0)
         query = query.join(found, best)
-    return tuple(TunedSample(*each) for each in session.execute(query.order_by(RepetitionRow.number, row.iteration)))
+    share = experiment.spec.get("held_out", 0.0)
+    samples = starmap(TunedSample, session.execute(query.order_by(RepetitionRow.number, row.iteration)))
+    return tuple(each for each in samples if not is_held_out(each.iteration, share))
 
 
 @dataclass(frozen=True)
