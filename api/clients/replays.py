@@ -19,7 +19,8 @@ class Replays:
 
         Args:
             id: id of an experiment.
-            choice: repetition, iteration, kind ("transfer" or "sample") and simulator, as in the API.
+            choice: repetition, iteration (left out: the last that was measured), kind ("transfer" or "sample") and
+                simulator, as in the API.
         """
         return self._connection.get(Replay, f"/experiments/{segment(id)}/replay", **choice)
 

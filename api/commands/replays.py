@@ -37,9 +37,6 @@ def replay(
         )
     with connect(url) as client:
         choice = dict(map(named_option, options or []))
-        if "iteration" not in choice:
-            done = {str(found.number): found.iterations_done for found in client.repetitions(id)}
-            choice["iteration"] = str(max(0, done.get(choice.get("repetition", "0"), 0) - 1))
         found = client.replay(id, **choice)
         file = client.video(id, save, **choice) if save else None
     if as_json:

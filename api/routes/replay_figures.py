@@ -15,7 +15,6 @@ from gaplab.services.figures.kinds.readings import readings_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.replays import replay
-from gaplab.services.replay.rollout import ReplayChoice
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.store.session import Store
 
@@ -64,5 +63,4 @@ def draw_toy(store: StoreDep, query: Annotated[ToyDrawing, Query()]) -> Response
 
 
 def _replay(store: Store, process: RolloutProcess, query: ReplayDrawing) -> Replay:
-    wanted = ReplayChoice(query.repetition, query.iteration, query.kind, query.simulator)
-    return replay(store, process, query.experiment, wanted)
+    return replay(store, process, query.experiment, query.choice())

@@ -10,7 +10,7 @@ from gaplab.api.http.problems import documented
 from gaplab.schemas.predictions import Predictions
 from gaplab.schemas.replays import ControllerKind, Replay
 from gaplab.services.replay import predictions, replays
-from gaplab.services.replay.rollout import ReplayChoice
+from gaplab.services.replay.rollout import LAST, ReplayChoice
 from gaplab.services.replay.video import VideoFormat, replay_video
 
 router = APIRouter(prefix="/experiments", tags=["replays"])
@@ -26,8 +26,11 @@ class ReplayQuery(Parameters):
     """The controller to replay, and the simulator to replay it in."""
 
     repetition: int = Field(default=0, ge=0, le=1_000_000, description="number of the repetition, from 0")
-    iteration: int = Field(
-        default=0, ge=0, le=1_000_000, description="iteration that tried or transferred the controller"
+    iteration: int | None = Field(
+        default=None,
+        ge=0,
+        le=1_000_000,
+        description="iteration that tried or transferred the controller; left out: the last that was measured",
     )
     kind: ControllerKind = ControllerKind.TRANSFER
     simulator: int | None = Field(
@@ -37,6 +40,11 @@ class ReplayQuery(Parameters):
         description="iteration whose best simulator replays the controller; left out: the same iteration for a "
         "transferred controller, the one before for a sample",
     )
+
+    def choice(self) -> ReplayChoice:
+        """Return the choice of a controller and of a simulator."""
+        iteration = LAST if self.iteration is None else self.iteration
+        return ReplayChoice(self.repetition, iteration, self.kind, self.simulator)
 
 
 class VideoQuery(ReplayQuery):
@@ -61,7 +69,7 @@ def read_replay(
     Reality is shown for controllers that were measured there, because their motion does not reveal its parameters.
     Before they are measured, the answer is 409.
     """
-    replay = replays.replay_json(store, process, id, ReplayChoice(**query.model_dump()))
+    replay = replays.replay_json(store, process, id, query.choice())
     return Response(replay, media_type="application/json")
 
 
@@ -83,10 +91,10 @@ def draw_video(
 
     MP4 needs the extra `video` where the service runs. No hardware is moved.
     """
-    choice = ReplayChoice(**query.model_dump(exclude={"format", "width"}))
-    replay = replays.replay_json(store, process, id, choice)
+    replay = replays.replay_json(store, process, id, query.choice())
     drawn = replay_video(drawing, replay, query.format, 2 * (query.width // 2))
-    name = f"gaplab-{id}-{choice.repetition}-{choice.iteration}.{query.format}"
+    shown = Replay.model_validate_json(replay)
+    name = f"gaplab-{id}-{shown.repetition}-{shown.iteration}.{query.format}"
     disposition = {"Content-Disposition": f'inline; filename="{name}"'}
     return Response(drawn, media_type=MEDIA_TYPES[query.format], headers=disposition)
 

@@ -1,5 +1,6 @@
 """Replays: the motion of a measured controller in its simulator and in reality, computed on request."""
 
+from dataclasses import replace
 from hashlib import sha256
 
 from gaplab.schemas.records import MeasurementKind
@@ -11,7 +12,7 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import Key, RolloutProcess
-from gaplab.services.replay.rollout import ReplayChoice, ReplayRequest, compute_replay
+from gaplab.services.replay.rollout import LAST, ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.replay.sent_specs import sent
 from gaplab.services.specs.assembly import refuse_missing
 from gaplab.services.specs.hardware import is_computed
@@ -46,6 +47,7 @@ def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choic
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
         spec = spec_of(row.spec)
+        choice = _with_iteration(session, row, choice)
         _refuse_impossible(row, spec, choice)
         request = _request(session, row, spec, choice)
     key: Key = ("replay", sha256(repr(request).encode()).hexdigest(), imported_files(row.spec))
@@ -57,11 +59,23 @@ def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choic
     return found
 
 
+def _with_iteration(session: Session, row: ExperimentRow, choice: ReplayChoice) -> ReplayChoice:
+    """Return the choice with its iteration; for the last, if none is measured yet, the first."""
+    if choice.iteration != LAST:
+        return choice
+    last = replays.last_measured(session, row.id, choice.repetition, _MEASURED_AS[choice.kind])
+    return replace(choice, iteration=_first(choice.kind) if last is None else last)
+
+
+def _first(kind: ControllerKind) -> int:
+    return 1 if kind is ControllerKind.SAMPLE else 0
+
+
 def _refuse_impossible(row: ExperimentRow, spec: ResolvedSpec, choice: ReplayChoice) -> None:
     if not robot_of(spec).world.bodies:
         message = f"the robot {label_of(spec.robot)!r} has no body, so it has no motion to replay"
         raise InvalidSpec([Violation("id", row.id, message, "an experiment with a robot that has a body")])
-    first = 1 if choice.kind is ControllerKind.SAMPLE else 0
+    first = _first(choice.kind)
     _refuse_outside("repetition", choice.repetition, 0, row.spec["repetitions"])
     _refuse_outside(f"iteration with a {choice.kind}", choice.iteration, first, row.iterations)
     if choice.simulator is not None:

@@ -24,20 +24,23 @@ AROUND_FRAMES = 5
 """A speed is the mean over this many frames before and after."""
 
 
+LAST = -1
+
+
 @dataclass(frozen=True)
 class ReplayChoice:
     """The choice of a controller and of a simulator.
 
     Attributes:
         repetition: number of the repetition, from 0.
-        iteration: the iteration that measured the controller.
+        iteration: the iteration that measured the controller; `LAST` for the last one that did.
         kind: a sample, or the transferred controller.
         simulator: the iteration whose best simulator is used; None for the simulator that chose the controller: of the
             same iteration for a transferred controller, of the iteration before for a sample.
     """
 
     repetition: int = 0
-    iteration: int = 0
+    iteration: int = LAST
     kind: ControllerKind = ControllerKind.TRANSFER
     simulator: int | None = None
 

@@ -1,5 +1,6 @@
 """What may be asked of an experiment on its page: the verbs, its turn, its name, and what a reader may not."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -98,11 +99,33 @@ def test_a_study_is_extended(api: Any, written: Store, visit: Any) -> None:
     for claim in execution.claim(written, "tests", 2):
         run(written, claim, some_log(2 if claim.spec.strategy.name == "random" else 0))
     page = visit(f"{api.url}/#/studies/{study.id}")
+    page.get_by_label("Band").select_option("sd")
+    expect(page.get_by_role("link", name="SVG")).to_have_attribute("href", re.compile("band=sd"))
     page.get_by_role("button", name="Extend").click()
+    expect(page.get_by_role("dialog")).to_contain_text("Now 2. Empty: unchanged.")
     page.get_by_label("Repetitions in all").fill("3")
     page.get_by_role("button", name="Extend it").click()
     expect(page.locator(".state-now").first).to_contain_text("queued")
     assert [each["spec"]["repetitions"] for each in api.get(f"/studies/{study.id}")["experiments"]] == [3, 3]
+
+
+def test_a_study_gets_more_iterations_and_its_baseline_no_more_repetitions(
+    api: Any, written: Store, visit: Any
+) -> None:
+    spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "direct"]}
+    size = {"iterations": 2, "repetitions": 1, "direct_repetitions": 3}
+    study = submission.submit_study(written, StudySpec.model_validate(spec | size))
+    for claim in execution.claim(written, "tests", 9):
+        run(written, claim, some_log(2 if claim.spec.strategy.name == "random" else 0))
+    page = visit(f"{api.url}/#/studies/{study.id}")
+    page.get_by_role("button", name="Extend").click()
+    expect(page.get_by_role("dialog")).to_contain_text("Now 1 to 3. Empty: unchanged.")
+    page.get_by_label("Iterations in all").fill("3")
+    page.get_by_role("button", name="Extend it").click()
+    expect(page.locator(".state-now").first).to_contain_text("running")
+    grown = {each["strategy"]: each["spec"] for each in api.get(f"/studies/{study.id}")["experiments"]}
+    assert (grown["random"]["iterations"], grown["random"]["repetitions"]) == (3, 1)
+    assert grown["direct"]["repetitions"] == 3
 
 
 def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api: Any, written: Store, visit: Any) -> None:

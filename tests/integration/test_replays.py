@@ -300,7 +300,7 @@ def test_what_was_computed_once_is_remembered(sqlite_store: Store, app: Any, api
     app.state.rollout_process.close()
 
     assert api.get(f"/experiments/{experiment}/replay").content == first
-    other = api.get(f"/experiments/{experiment}/replay?iteration=1")
+    other = api.get(f"/experiments/{experiment}/replay?iteration=0")
     assert (other.status_code, other.headers["Retry-After"]) == (503, "5")
 
 
@@ -334,6 +334,18 @@ def test_replays_and_predictions_follow_an_edit_of_a_plug_in(
 
     assert before == (log[6].fitness,) * 2
     assert computed() == (2 * log[6].fitness,) * 2
+
+
+@pytest.mark.parametrize(("kind", "iteration"), [("transfer", 1), ("sample", 2)])
+def test_without_an_iteration_the_last_measured_controller_is_replayed(
+    sqlite_store: Store, api: Any, kind: Any, iteration: Any
+) -> None:
+    experiment, _, _ = walked(sqlite_store)
+
+    left_out = api.get(f"/experiments/{experiment}/replay?kind={kind}")
+    named = api.get(f"/experiments/{experiment}/replay?kind={kind}&iteration={iteration}")
+
+    assert left_out.json() == named.json()
 
 
 def test_predictions_are_of_the_simulators_before_and_after_a_sample(store: Store, app: Any) -> None:

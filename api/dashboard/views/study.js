@@ -58,12 +58,16 @@ export async function show(root, parameters, signal) {
  */
 function curves({ id, signal, sections: parts }) {
   const place = h("div");
+  const downloads = h("div");
   const draw = plot(place, "curves", signal);
   const options = curveOptions();
-  const load = async () => (await draw({ study: id, ...options.query() }) ? undefined : "failed");
-  options.element.addEventListener("change", parts.add(place, CURVE_KINDS, load));
   const csv = /** @type {const} */ (["CSV", `/studies/${id}/curves`, { format: "csv" }, `gaplab-${id}-curves.csv`]);
+  const load = async () => {
+    const query = { study: id, ...options.query() };
+    downloads.replaceChildren(figureDownloads("curves", query, `gaplab-${id}-curves`, [...csv]));
+    return await draw(query) ? undefined : "failed";
+  };
+  options.element.addEventListener("change", parts.add(place, CURVE_KINDS, load));
   return h("section", { class: "card", "aria-labelledby": "curves-title" },
-    h("div", { class: "titled" }, h("h2", { id: "curves-title" }, "Curves"), options.element), place,
-    figureDownloads("curves", { study: id }, `gaplab-${id}-curves`, [...csv]));
+    h("div", { class: "titled" }, h("h2", { id: "curves-title" }, "Curves"), options.element), place, downloads);
 }

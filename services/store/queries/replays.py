@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from itertools import starmap
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.records import MeasurementKind
@@ -86,6 +86,14 @@ def measured_controller(
         return None
     genome, real, simulated, readings = found
     return MeasuredController(genome, real, simulated if kind is MeasurementKind.PROBE else None, readings)
+
+
+def last_measured(session: Session, experiment: str, repetition: int, kind: MeasurementKind) -> int | None:
+    """Return the last iteration of a repetition with such a measurement; None if there is none yet."""
+    row = MeasurementRow
+    query = of_experiments(row, [experiment], func.max(row.iteration))
+    last: int | None = session.scalar(query.where(RepetitionRow.number == repetition, row.kind == kind))
+    return last
 
 
 def requested_controller(

@@ -80,19 +80,30 @@ function cancel(page) {
 
 /** @param {Page.StudyPage} page */
 function extend(page) {
-  const experiments = permitting(page.study, "extend");
-  const iterations = Math.max(...experiments.map(({ spec }) => spec.iterations));
-  const repetitions = Math.max(...experiments.map(({ spec }) => spec.repetitions));
-  const whole = { type: "number", required: true, step: 1 };
+  const whole = { value: "", type: "number", min: 1, step: 1 };
   openDialog({
     title: "Extend this study",
     text: `${subject(page, "extend")} grow to these totals. Results so far stay, and the study is then as if it had been submitted `
-      + "with these totals. An experiment that is larger already stays as it is.",
+      + "with these totals. An experiment that is larger already stays as it is. To finish experiments that were stopped, leave both empty.",
     fields: [
-      { name: "iterations", label: "Iterations in all", value: iterations, min: 1, max: 1000, ...whole },
-      { name: "repetitions", label: "Repetitions in all", value: repetitions, min: 1, max: 10000, ...whole },
+      { name: "iterations", label: "Iterations in all", hint: now(page, "iterations"), max: 1000, ...whole },
+      { name: "repetitions", label: "Repetitions in all", hint: now(page, "repetitions"), max: 10000, ...whole },
     ],
     action: "Extend it",
-    act: (values) => send(page, "extend", { iterations: Number(values.iterations), repetitions: Number(values.repetitions) }),
+    act: (values) => send(page, "extend", Object.fromEntries(
+      Object.entries(values).filter(([, value]) => value).map(([name, value]) => [name, Number(value)]))),
   }, page.signal);
+}
+
+/**
+ * Return the present totals of the experiments that can be extended: `direct` may have others.
+ *
+ * @param {Page.StudyPage} page
+ * @param {"iterations" | "repetitions"} name
+ */
+function now({ study }, name) {
+  const totals = permitting(study, "extend").filter(({ level }) => name === "repetitions" || !level).map(({ spec }) => spec[name]);
+  const [least, most] = [Math.min(...totals), Math.max(...totals)];
+  const present = totals.length ? `Now ${count(least)}${most > least ? ` to ${count(most)}` : ""}. ` : "";
+  return `${present}Empty: unchanged.`;
 }
