@@ -113,7 +113,8 @@ class Recording:
         trajectory: trajectory, bit-equal to that of the plain rollout.
         times_s: `(k,)`: times of observation.
         poses: `(k, 7)`: positions and quaternions x, y, z, w of the base's frame; nan where the physics failed.
-        angles_rad: `(k, joints)`, in the world's order; None if the engine does not provide them.
+        angles_rad: `(k, joints)`, in the world's order, with every full turn; m for a joint that slides; None if the
+            engine does not provide them.
         torques_nm: `(k, joints)`: torques of the motors in the time step before; None if the engine does not provide
             them.
     """

@@ -26,6 +26,9 @@ LONGEST_NAME = 60
 MOST_BYTES = 2_000_000
 """Largest size of a robot file."""
 
+LONGEST_LINE = 1_000
+"""Most characters of a line of what an import lost, and of a comment."""
+
 _SHAPES = "a shape: its kind is box, sphere, capsule, cylinder or hull"
 _MESSAGES = {
     "extra_forbidden": ("{} is no field here", "no such field"),
@@ -60,8 +63,8 @@ class RobotFile(Frozen):
     source: RobotSource | None = None
     usual_controller: PluginRef
     usual_task: PluginRef
-    lost: Annotated[tuple[Annotated[str, Field(max_length=1_000)], ...], Field(max_length=MOST_LOSSES)] = ()
-    comments: Annotated[tuple[Annotated[str, Field(max_length=1_000)], ...], Field(max_length=MOST_LOSSES)] = ()
+    lost: Annotated[tuple[Annotated[str, Field(max_length=LONGEST_LINE)], ...], Field(max_length=MOST_LOSSES)] = ()
+    comments: Annotated[tuple[Annotated[str, Field(max_length=LONGEST_LINE)], ...], Field(max_length=MOST_LOSSES)] = ()
     world: World
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> "RobotFile":

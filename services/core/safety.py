@@ -161,7 +161,7 @@ def _joint_speed(recording: Recording) -> float:
     """Return the greatest speed of a joint between two observations; nan if the engine does not tell angles."""
     if recording.angles_rad is None or len(recording.times_s) < 2:
         return nan
-    turned = np.abs(np.diff(np.unwrap(recording.angles_rad, axis=0), axis=0))
+    turned = np.abs(np.diff(recording.angles_rad, axis=0))
     return _largest(turned / np.diff(recording.times_s)[:, None])
 
 

@@ -13,7 +13,9 @@ import numpy as np
 import scipy
 
 from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.kinematics import from_start
 from gaplab.services.core.motions import Trajectory
+from gaplab.services.core.world import World
 
 STEP_S = 0.005
 """Resolution of the alignment."""
@@ -95,18 +97,21 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None) -> Alignmen
     return Alignment(float(min(first + best * STEP_S, max(first, latest))), float(min(scores[best], 1.0)))
 
 
-def from_start(trace: Trace, lag_s: float, times_s: FloatArray) -> Trajectory:
-    """Return the poses of a trace at times `(t,)` of the motion, placed and turned as if it began at the origin.
+def placed(trace: Trace, lag_s: float, times_s: FloatArray, world: World) -> Trajectory:
+    """Return the poses of a trace at times `(t,)` of the motion, placed and turned as in a simulation.
+
+    There a motion begins above the origin, with the base turned as `world.start_turn`; only a turn about z is removed.
 
     Args:
         trace: as recorded.
         lag_s: when the motion began.
         times_s: seconds since then.
+        world: the robot's.
     """
     seen = trace.at(np.clip(times_s + lag_s, trace.times_s[0], trace.times_s[-1]))
     start = trace.at(frozen([lag_s]))
     rotation = scipy.spatial.transform.Rotation
-    heading = rotation.from_quat(start.orientations[0]).apply([1.0, 0.0, 0.0])
+    heading = rotation.from_quat(from_start(world, start.orientations)[0]).apply([1.0, 0.0, 0.0])
     back = rotation.from_rotvec([0.0, 0.0, -np.arctan2(heading[1], heading[0])])
     moved = seen.positions_m - start.positions_m[0] * [1.0, 1.0, 0.0]
     turned = (back * rotation.from_quat(seen.orientations)).as_quat()

@@ -11,11 +11,13 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.traces import AlignedTrace, TracesRead, TracesSpec
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
+from gaplab.services.core.kinematics import observes_base
 from gaplab.services.core.motions import Trajectory
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.trace_tables import read_trace
-from gaplab.services.core.traces import TooShort, Trace, align, from_start
+from gaplab.services.core.traces import Alignment, TooShort, Trace, align, placed
+from gaplab.services.core.world import World
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.sent_specs import SentSpec, received, sent
 from gaplab.services.specs.assembly import edits_of, engine_of
@@ -64,13 +66,15 @@ def evaluate_traces(store: Store, process: RolloutProcess, request: str, spec: T
         row, repetition = requests.get(session, request)
         experiment = session.get_one(ExperimentRow, repetition.experiment_id)
         resolved = spec_of(experiment.spec)
+        robot = robot_of(resolved)
+        refuse_other_bodies(robot.world)
         tables = _tables(session, spec, resolved.reality.repeats)
         tuned = row.iteration - (row.kind is MeasurementKind.SAMPLE)
         simulators = replays.tuned_parameters(session, experiment.id, repetition.number, tuned)
         genome = tuple(row.genome)
     if not simulators:
         raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
-    robot, traces = robot_of(resolved), [read_trace(*table) for table in tables]
+    traces = [read_trace(*table) for table in tables]
     until_s = max([float(robot.motion(frozen(genome)).observe_s[-1]), *robot.sensors.times_s.tolist()])
     wanted = Expected(sent(resolved), genome, tuple(simulators[0]), until_s)
     expected = _trace_of(*process.call(expected_motion, wanted))
@@ -97,6 +101,18 @@ def expected_motion(wanted: Expected) -> tuple[FloatArray, FloatArray]:
 
 def _trace_of(times_s: FloatArray, poses: FloatArray) -> Trace:
     return Trace(times_s, poses[:, :3], poses[:, 3:])
+
+
+def refuse_other_bodies(world: World) -> None:
+    """Refuse traces, which are of a base, for a robot whose task rates another body, or whose base cannot move.
+
+    Raises:
+        InvalidSpec: the motion that counts is not that of a base that moves.
+    """
+    if world.fixed or not observes_base(world):
+        body = world.observed or world.bodies[0].name
+        message = f"a trace is of a base that moves, but the motion that counts here is that of {body!r}; give values"
+        raise InvalidSpec([Violation("/traces", None, message)])
 
 
 def _tables(session: Session, spec: TracesSpec, repeats: int) -> list[tuple[str, str]]:
@@ -133,14 +149,14 @@ def _evaluated(
         except TooShort as error:
             violations.append(Violation(f"/traces/{place}", digest, f"the trace does not contain the motion: {error}"))
             continue
-        values.append(float(robot.fitness(from_start(trace, found.lag_s, observe_s))))
+        values.append(float(robot.fitness(placed(trace, found.lag_s, observe_s, robot.world))))
         if not isfinite(values[-1]):
             message = f"the {robot.label} computes no finite fitness from this trace"
             violations.append(Violation(f"/traces/{place}", digest, message))
         if sensors.size:
-            seen = robot.sense(from_start(trace, found.lag_s, sensors.times_s))
+            seen = robot.sense(placed(trace, found.lag_s, sensors.times_s, robot.world))
             readings.append(_told(seen))
-        aligned.append(_beside(digest, trace, expected, found.lag_s, found.match))
+        aligned.append(_beside(digest, trace, expected, found, robot.world))
     if violations:
         raise InvalidSpec(violations)
     return TracesRead(
@@ -152,15 +168,15 @@ def _told(seen: FloatArray) -> tuple[tuple[float | None, ...], ...]:
     return tuple(tuple(value if isfinite(value) else None for value in row) for row in seen.tolist())
 
 
-def _beside(digest: str, trace: Trace, expected: Trace, lag_s: float, match: float | None) -> AlignedTrace:
+def _beside(digest: str, trace: Trace, expected: Trace, alignment: Alignment, world: World) -> AlignedTrace:
     """Return a trace beside the expected motion."""
     times = expected.times_s[expected.times_s <= LONGEST_PLOT_S]
-    seen, known = from_start(trace, lag_s, times), bool(np.all(np.isfinite(expected.positions_m)))
-    wanted = from_start(expected, 0.0, times) if known else None
+    known = bool(np.all(np.isfinite(expected.positions_m)))
+    seen, wanted = placed(trace, alignment.lag_s, times, world), placed(expected, 0.0, times, world) if known else None
     return AlignedTrace(
         attachment=digest,
-        lag_s=lag_s,
-        match=match,
+        lag_s=alignment.lag_s,
+        match=alignment.match,
         times_s=tuple(times.tolist()),
         heights_m=_heights(seen),
         distances_m=_distances(seen),

@@ -33,6 +33,12 @@ def tilted(*angles: float) -> Recording:
     return Recording(trajectory, frozen(np.arange(count) * 0.01), poses, frozen(np.arange(count)[:, None] * 0.1))
 
 
+def test_a_joint_may_turn_by_more_than_half_a_turn_between_two_observations() -> None:
+    spun = replace(tilted(0.0, 0.0, 0.0), angles_rad=frozen([[0.0], [3.5], [7.0]]))
+
+    assert extremes(ROBOT.world, spun, 0.4).joint_speed == pytest.approx(350.0)
+
+
 def test_extremes_are_the_worst_of_a_rollout() -> None:
     found = extremes(ROBOT.world, tilted(0.0, 0.3, -0.6), 0.4)
 

@@ -1,5 +1,6 @@
 """Tables of samples: what is read, and every error with its line and column."""
 
+import re
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -61,6 +62,17 @@ def test_readings_have_a_sensor_a_time_and_a_repeat() -> None:
     assert robot.sensors.times_s.tolist() == [0.75, 1.0]
     none = (None,) * 5
     assert sample.readings == (((0.1, *none[1:]), (*none[1:], -2.0)), (none, none))
+
+
+def test_a_reading_is_found_by_the_name_that_errors_say_also_at_odd_times() -> None:
+    robot = Quadruped(QuadrupedOptions(counted_s=123.45678))
+    unknown = read_samples(f"{GENES},value,rolled\n{HALVES},0.3,0.1\n", robot).errors[0]
+    (last,) = re.findall(r", ([\d.]+) s$", str(unknown.permitted))
+
+    (sample,) = read_samples(f"{GENES},value,roll@{last}\n{HALVES},0.3,0.1\n", robot).samples
+
+    assert sample.readings is not None
+    assert sample.readings[0][-1][0] == 0.1
 
 
 def test_all_errors_are_told_at_once_with_line_and_column() -> None:

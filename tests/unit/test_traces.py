@@ -1,6 +1,7 @@
 """Traces of a physical robot: their clock, their place on the ground, and what is wrong with them."""
 
 import tracemalloc
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.trace_tables import COLUMNS, MOST_ERRORS, read_trace
-from gaplab.services.core.traces import TooShort, Trace, align, from_start
+from gaplab.services.core.traces import TooShort, Trace, align, placed
 from gaplab.services.engines.mujoco.engine import MuJoCo
+from gaplab.services.replay.traces import refuse_other_bodies
 
 ROBOT = Quadruped()
 MOTION = open_loop(ROBOT.motion(ROBOT.known))
@@ -51,13 +53,41 @@ def test_the_clock_of_a_trace_is_found(expected: Trace, lag_s: float, noise: flo
 def test_fitness_and_readings_depend_on_no_place_and_no_heading(expected: Trace, turn_rad: float) -> None:
     trace = shifted(expected, 5.0, turn_rad)
     lag_s = align(trace, expected).lag_s
-    moved = from_start(trace, lag_s, MOTION.observe_s)
+    moved = placed(trace, lag_s, MOTION.observe_s, ROBOT.world)
     world_s = ROBOT.sensors.times_s
 
     real = float(ROBOT.fitness(MuJoCo().rollout(ROBOT.world, MOTION)))
     assert float(ROBOT.fitness(moved)) == pytest.approx(real, abs=0.01)
-    told = ROBOT.sense(from_start(trace, lag_s, world_s))
+    told = ROBOT.sense(placed(trace, lag_s, world_s, ROBOT.world))
     assert told == pytest.approx(ROBOT.sense(expected.at(world_s)), abs=0.03)
+
+
+@pytest.mark.parametrize("axis", [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.6, 0.0, 0.8]])
+@pytest.mark.parametrize("turn_rad", [0.0, 2.5])
+def test_a_base_that_begins_turned_moves_in_a_trace_as_in_its_simulation(
+    expected: Trace, axis: list[float], turn_rad: float
+) -> None:
+    start = Rotation.from_rotvec(np.pi / 2 * np.array(axis))
+    world = replace(ROBOT.world, start_turn=tuple(start.as_quat().tolist()))
+    turned = (Rotation.from_quat(expected.orientations) * start).as_quat()
+    simulated = Trace(expected.times_s, expected.positions_m, frozen(turned))
+
+    found = placed(shifted(simulated, 5.0, turn_rad), 5.0, MOTION.observe_s, world)
+
+    as_simulated = simulated.at(MOTION.observe_s)
+    heading = placed(simulated, 0.0, MOTION.observe_s, world)
+    assert found.positions_m == pytest.approx(heading.positions_m, abs=1e-9)
+    assert found.positions_m == pytest.approx(as_simulated.positions_m, abs=0.02)
+    assert abs((found.orientations * as_simulated.orientations).sum(axis=-1)) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("changes", [{"fixed": True}, {"observed": ROBOT.world.bodies[-1].name}])
+def test_a_trace_of_a_base_is_refused_where_another_motion_counts(changes: Any) -> None:
+    refuse_other_bodies(ROBOT.world)
+    with pytest.raises(
+        InvalidSpec, match="is of a base that moves, but the motion that counts"
+    ):
+        refuse_other_bodies(replace(ROBOT.world, **changes))
 
 
 def test_a_given_lag_is_kept_and_a_motion_without_change_begins_with_its_trace(expected: Trace) -> None:

@@ -20,7 +20,7 @@ from gaplab.services.core.strategies.noise_envelope import NoiseEnvelope, NoiseE
 from gaplab.services.core.tunables.base import Tunable, matching
 from gaplab.services.core.tunables.defaults import usual_tunables
 from gaplab.services.core.tunables.labels import label_of, proper, separated, tunable_of, unit_of
-from gaplab.services.core.world import Inertia, Material, Noise
+from gaplab.services.core.world import Inertia, Material, Noise, PDMotor
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.plugins.external import named_in
 from gaplab.services.specs import resolution
@@ -194,6 +194,22 @@ def test_numbers_of_joints_and_motors_are_those_of_the_pattern() -> None:
     stiff = edited("kp", 2.0, arm())
     assert [joint.motor.kp for joint in stiff.joints] == [100.0, 0.0, 0.0]
     assert [joint.motor.delay_s for joint in edited("delay(joint_1)", 0.03, arm()).joints] == [0.0, 0.03, 0.0]
+
+
+@pytest.mark.parametrize(("name", "follows"), [("kp", {"position"}), ("kd", {"position", "velocity"})])
+def test_a_gain_is_of_the_motors_whose_torque_depends_on_it(name: str, follows: set[str]) -> None:
+    kinds = {kind: PDMotor(kind, 8.0, kp=100.0, kd=100.0) for kind in ("position", "velocity", "torque")}  # type: ignore[arg-type]
+    one = WORLD.joints[0]
+    mixed = replace(
+        WORLD, joints=(*(replace(one, name=kind, motor=motor) for kind, motor in kinds.items()), *WORLD.joints[3:])
+    )
+
+    changed = tunable_of(f"{name}(*, as=value)").edit(mixed, 50.0)
+
+    motors = [joint.motor for joint in changed.joints if isinstance(joint.motor, PDMotor)]
+    assert {motor.follows for motor in motors if getattr(motor, name) == 50.0} == follows
+    torque = replace(WORLD, joints=tuple(replace(joint, motor=kinds["torque"]) for joint in WORLD.joints))
+    assert tunable_of(name).lack(torque) is not None
 
 
 def test_friction_of_a_surface_leaves_the_ground() -> None:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.tunables.base import IN_PLACE, LONGEST_PATTERN, Tunable, lacking, matching
-from gaplab.services.core.world import Body, Joint, World
+from gaplab.services.core.world import Body, Joint, PDMotor, World
 
 Pattern = Annotated[str, Field(min_length=1, max_length=LONGEST_PATTERN)]
 ALL = "names of bodies, joints or motors by a pattern with * ? and [ ], as in shells"
@@ -163,13 +163,21 @@ class JointTunable(Grouped):
 
 
 class MotorTunable(JointTunable):
-    """A number of motors: the attribute whose name ends `field`, of those that have it."""
+    """A number of motors: the attribute whose name ends `field`, of those whose torque depends on it.
+
+    Attributes:
+        follows: kinds of PD motors whose torque depends on it.
+    """
 
     kind = "joint with such a motor"
+    follows: ClassVar[tuple[str, ...]] = ("position", "velocity", "torque")
 
     def has(self, member: Joint) -> bool:
-        """Return whether the motor of a joint has the number."""
-        return hasattr(member.motor, self._attribute)
+        """Return whether the torque of a joint's motor depends on the number."""
+        motor = member.motor
+        return hasattr(motor, self._attribute) and not (
+            isinstance(motor, PDMotor) and motor.follows not in self.follows
+        )
 
     def number(self, member: Joint) -> float:
         """Return the number of a joint's motor."""

@@ -8,6 +8,7 @@ class Kd(MotorTunable):
 
     name = "kd"
     field = "motor.kd"
+    follows = ("position", "velocity")
     value_unit = "N m s/rad"
     Options = ScaleOptions
     value = Limits(0.1, 10.0, 0.0, 1e5)

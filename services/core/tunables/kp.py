@@ -8,6 +8,7 @@ class Kp(MotorTunable):
 
     name = "kp"
     field = "motor.kp"
+    follows = ("position",)
     value_unit = "N m/rad"
     Options = ScaleOptions
     value = Limits(1.0, 100.0, 0.0, 1e6)
