@@ -185,6 +185,14 @@ def test_masses_scale_with_their_inertia() -> None:
     assert body(legs, "trunk") == body(stated, "trunk")
 
 
+def test_a_factor_of_one_leaves_stated_inertias_to_the_bit() -> None:
+    moments = (0.8369, 0.8105, 0.0986)
+    bodies = tuple(replace(each, mass_kg=0.7, inertia=Inertia(moments)) for each in WORLD.bodies)
+    stated = replace(WORLD, bodies=bodies)
+
+    assert tunable_of("mass").edit(stated, 1.0) == stated
+
+
 def test_numbers_of_joints_and_motors_are_those_of_the_pattern() -> None:
     world = edited("joint_damping(*_knee)", 0.3)
     assert [joint.damping for joint in world.joints] == [0.0, 0.0, 0.3] * 4

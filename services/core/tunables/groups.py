@@ -175,9 +175,8 @@ class MotorTunable(JointTunable):
     def has(self, member: Joint) -> bool:
         """Return whether the torque of a joint's motor depends on the number."""
         motor = member.motor
-        return hasattr(motor, self._attribute) and not (
-            isinstance(motor, PDMotor) and motor.follows not in self.follows
-        )
+        follows = motor.follows if isinstance(motor, PDMotor) else self.follows[0]
+        return hasattr(motor, self._attribute) and follows in self.follows
 
     def number(self, member: Joint) -> float:
         """Return the number of a joint's motor."""

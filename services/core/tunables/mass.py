@@ -26,6 +26,8 @@ class Mass(BodyTunable):
         """Return a body of another mass."""
         if member.inertia is None or not member.mass_kg:
             return replace(member, mass_kg=number)
+        if number == member.mass_kg:
+            return member  # moments, multiplied and divided, could differ by a rounding
         x, y, z = (moment * number / member.mass_kg for moment in member.inertia.moments_kg_m2)
         return replace(member, mass_kg=number, inertia=Inertia((x, y, z), member.inertia.turn))
 
