@@ -122,6 +122,11 @@ class Comparison(Groups, Pair):
         default=None, description="lower end of the 90 % interval of the difference; paired if the streams are shared"
     )
     upper: Statistic = Field(default=None, description="upper end of that interval")
+    warnings: tuple[str, ...] = Field(
+        default=(),
+        description="what differs besides the strategy, so that fitness says little of it: robot, task or reality",
+        examples=[["different robots (toy_function; quadruped): their fitness does not mean the same"]],
+    )
     improvement: Estimate = Field(
         description="probability that a repetition of the first is fitter than one of the second; a tie counts half"
     )

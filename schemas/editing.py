@@ -33,7 +33,7 @@ class Edit(Frozen):
     @model_validator(mode="after")
     def _something_changes(self) -> "Edit":
         if not self.model_fields_set:
-            raise ValueError("nothing to change: give a name, notes or tags")
+            raise ValueError("nothing to change: give a name or notes, or tags to add or remove")
         if "name" in self.model_fields_set and self.name is None:
             raise ValueError("the name is null, but must be text: a name can be changed, not removed")
         if "tags" in self.model_fields_set and self.tags is None:

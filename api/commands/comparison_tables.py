@@ -28,6 +28,7 @@ def _tables(pairs: Sequence[Comparison]) -> Iterator[Table | str]:
     first, last = pairs[0].from_evaluations, pairs[0].to_evaluations
     several = first != last
     where = f"mean of each repetition over {first} to {last}" if several else f"after {first}"
+    yield from dict.fromkeys(f"! {escape(warning)}\n" for pair in pairs for warning in pair.warnings)
     yield f"Fitness in reality, {where} real-world evaluations; 95 % bootstrap intervals"
     yield table(("experiment", "n", "mean", "interquartile mean", "SD"), map(_experiment, *_summaries(pairs)))
     yield "Differences with 90 % intervals, Cohen's d, and the probability that a repetition of the first is fitter"

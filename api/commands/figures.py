@@ -22,6 +22,8 @@ def curve(
     url: Url = None,
 ) -> None:
     """Print or draw curves: recorded fitness, mean ± SD, by number of real-world evaluations."""
+    if csv and as_json:
+        raise typer.BadParameter("only one of --csv and --json can be printed", param_hint="--csv")
     files = [file for file in (svg, html) if file]
     with connect(url) as client:
         if as_json:

@@ -35,6 +35,8 @@ def list_(
     url: Url = None,
 ) -> None:
     """List the newest studies, and the experiments without a study; or what fits a query or a saved view."""
+    if view and experiments:
+        raise typer.BadParameter("a saved view says what it lists; leave it out", param_hint="--experiments")
     with connect(url) as client:
         newest = _of_view(client, view, query, limit) if view else _newest(client, query, limit, alone=experiments)
     if as_json:
@@ -55,6 +57,9 @@ def show(
     with connect(url) as client:
         record = client.find(id)
         if isinstance(record, StudyRead):
+            if with_spec:
+                msg = f"{id} is a study; `gaplab spec {id} --resolved` prints the specs of its experiments"
+                raise typer.BadParameter(msg, param_hint="--spec")
             _show_study(record, as_json=as_json)
         else:
             _show_experiment(client, record, as_json=as_json, with_spec=with_spec)
@@ -92,6 +97,8 @@ def edit(
     url: Url = None,
 ) -> None:
     """Change the name or the notes of a study or an experiment."""
+    if name is None and notes is None:
+        raise CommandError("nothing to change: give --name or --notes; `gaplab tag` changes tags", Exit.INVALID)
     changes: dict[str, str | None] = {} if name is None else {"name": name}
     if notes is not None:
         changes["notes"] = notes or None

@@ -35,6 +35,8 @@ def rerun(
     """Submit the spec of an archive again, or verify its results on this machine."""
     from gaplab.services.plugins import folders
 
+    if repetitions and not verify:
+        raise typer.BadParameter("it limits what --verify computes; add --verify", param_hint="--repetitions")
     folders.load()
     if verify:
         _verify(file, repetitions, as_json=as_json)

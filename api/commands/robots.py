@@ -52,7 +52,10 @@ def import_file(  # noqa: PLR0913, PLR0917 - each is an option of the command
         list[str] | None,
         typer.Option(metavar="JOINT=RAD", help="angle at time 0; JOINT may be a pattern like '*_knee'; repeatable"),
     ] = None,
-    lock: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="joints to fix at zero; repeatable")] = None,
+    lock: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT", help="joints to fix: at zero in a URDF, at `ref` in an MJCF; repeatable"),
+    ] = None,
     settings: Annotated[list[str] | None, typer.Option("--set", "-s", metavar="NAME=VALUE", help=OTHERS)] = None,
     force: Annotated[bool, typer.Option("--force", help="replace the file that is written, if it exists")] = False,
     as_json: AsJson = False,

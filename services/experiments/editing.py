@@ -32,8 +32,8 @@ def edit_experiment(
         Changed: it was edited meanwhile.
     """
     row = get_experiment(session, experiment_id)
-    _edit(session, row, edit, starting_from)
-    note(session, EventKind.EDITED, row.id, fields=sorted(edit.model_fields_set))
+    if told := _edit(session, row, edit, starting_from):
+        note(session, EventKind.EDITED, row.id, **told)
     return view_experiments(session, [row])[0]
 
 
@@ -46,22 +46,30 @@ def edit_study(session: Session, study_id: str, edit: Edit, *, starting_from: Co
         Changed: it was edited meanwhile.
     """
     row = get_study(session, study_id)
-    _edit(session, row, edit, starting_from)
-    for experiment in experiments_of(session, [row.id]):
-        note(session, EventKind.EDITED, experiment.id, fields=sorted(edit.model_fields_set), of_study=True)
+    if told := _edit(session, row, edit, starting_from):
+        for experiment in experiments_of(session, [row.id]):
+            note(session, EventKind.EDITED, experiment.id, **told, of_study=True)
     return view_studies(session, [row])[0]
 
 
-def _edit(session: Session, row: ExperimentRow | StudyRow, edit: Edit, starting_from: Collection[int] | None) -> None:
+def _edit(
+    session: Session, row: ExperimentRow | StudyRow, edit: Edit, starting_from: Collection[int] | None
+) -> dict[str, list[str]]:
+    """Change what differs, and return it as an event's body: the fields, and tags that are new or gone."""
     table = type(row)
     session.refresh(row, with_for_update={"key_share": True})
     if starting_from is not None and row.edits not in starting_from:
         raise Changed(f"{row.id!r} was changed by someone else since you read it; read it again, and then decide")
-    values = _texts(edit) | {"edits": table.edits + 1}
-    if edit.model_fields_set & {"tags", "add_tags", "remove_tags"}:
-        values["tags"] = pack_tags(_tags_after(row, edit))
+    before, after = set(unpack_tags(row.tags)), _tags_after(row, edit)
+    values = {name: text for name, text in _texts(edit).items() if text != getattr(row, name)}
+    told = {"fields": sorted([*values, *(["tags"] if after != before else [])])}
+    if not told["fields"]:
+        return {}
+    values |= {"edits": table.edits + 1, "tags": pack_tags(after)}
     session.execute(update(table).where(table.id == row.id).values(values))
     session.refresh(row)
+    changes = {"add_tags": sorted(after - before), "remove_tags": sorted(before - after)}
+    return told | {name: tags for name, tags in changes.items() if tags}
 
 
 def _texts(edit: Edit) -> dict[str, Any]:

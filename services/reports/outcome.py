@@ -74,7 +74,8 @@ def outcome_of(store: Store, experiment_id: str) -> ExperimentOutcome:
         simulators = _latest(session, row, best.repetition if best else 0)
         tuned = tunings.measured(session, row)
     if best is None and not simulators:
-        raise Conflict(f"experiment {experiment_id!r} has measured and tuned nothing yet; try again later")
+        later = f", and is {row.state}" if row.state.ended else " yet; try again later"
+        raise Conflict(f"experiment {experiment_id!r} has measured and tuned nothing{later}")
     spec = spec_of(row.spec)
     return ExperimentOutcome(
         facts=facts,

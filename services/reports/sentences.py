@@ -39,8 +39,8 @@ def ranking(
         return
     best = learned[0]
     where = f"After {number_of('real-world evaluation', count or 0)}"
-    highest = " has the highest mean" if len(learned) > 1 else " has a mean"
-    yield f"{where}, {best.name}{highest}, {_with_interval(best)}."
+    told = f"{best.name} has the highest mean," if len(learned) > 1 else f"the mean of {best.name} is"
+    yield f"{where}, {told} {_with_interval(best)}."
     ids = {one.curve.experiment for one in learned}
     own = [
         pair for pair in pairs if best.curve.experiment in {pair.first, pair.second} <= ids and p_of(pair) is not None

@@ -10,7 +10,9 @@ from gaplab.services.core.comparisons import Compared, compare_all
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.fitness import fitness_of
+from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments
+from gaplab.services.results.comparability import warnings
 from gaplab.services.results.curves import recorded_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
@@ -67,6 +69,7 @@ def compare(
         rows, values = recorded_of(session, experiment_ids)
         final = _common_count(session, rows) if to_evaluations is None else to_evaluations
         within = None if margin is None else _in_units(session, rows, margin)
+        concealed = hidden(session, rows)
     first = final if from_evaluations is None else from_evaluations
     if not 0 <= first <= final:
         message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
@@ -75,7 +78,10 @@ def compare(
     if to_evaluations is not None:
         _check_the_end(compared, to_evaluations)
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
-    return compare_all(compared, first, final, margin=within, intervals=with_intervals)
+    pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
+    by_id = {row.id: row for row in rows}
+    warned = (tuple(warnings(by_id[pair.first], by_id[pair.second], concealed)) for pair in pairs)
+    return tuple(pair.model_copy(update={"warnings": each}) for pair, each in zip(pairs, warned, strict=True))
 
 
 def _check_the_end(compared: Sequence[Compared], last: int) -> None:

@@ -34,7 +34,12 @@ def rotation_of(wxyz: FloatArray) -> Rotation:
 
 
 class Shapes:
-    """Shapes of the geoms of a model; the hull of a mesh is computed once."""
+    """Shapes of the geoms of a model; the hull of a mesh is computed once.
+
+    Attributes:
+        friction: coefficient of the file's ground; 0 if the file has no ground.
+        condim: MuJoCo's dimension of contacts of the file's ground: 1 has no friction, and is also that of no ground.
+    """
 
     def __init__(self, model: Any, options: ImportOptions, notes: Notes) -> None:  # noqa: ANN401
         self._model, self._options, self._notes = model, options, notes
@@ -42,6 +47,7 @@ class Shapes:
         planes = [at for at in range(model.ngeom) if model.geom_bodyid[at] == 0 and self._kind(at) == "plane"]
         self._grounds = [(int(model.geom_contype[at]), int(model.geom_conaffinity[at])) for at in planes]
         self.friction = max((float(model.geom_friction[at, 0]) for at in planes), default=0.0)
+        self.condim = max((int(model.geom_condim[at]) for at in planes), default=1)
 
     def collides(self, geom: int) -> bool:
         """Return whether a geom collides with the file's ground, or with anything, if the file has no ground."""

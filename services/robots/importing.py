@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
+from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import RobotSource
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
@@ -84,20 +86,23 @@ def import_robot(file: Path, options: ImportOptions) -> ImportedFile:
     for row in masses:
         if abs(row.after_kg - row.before_kg) > SAME_KG:
             notes.lose(f"{row.body}: {row.before_kg:.6g} kg in the file, {row.after_kg:.6g} kg imported")
-    robot = RobotFile(
-        name=_name(options.name or source.name or file.stem),
-        source=RobotSource(
-            file=file.name,
-            sha256=sha256(content).hexdigest(),
-            options=options.model_dump(mode="json", exclude_defaults=True),
-        ),
-        usual_controller=options.controller or PluginRef(name="sine" if world.fixed else "cpg"),
-        usual_task=options.task or PluginRef(name="reach" if world.fixed else "walk"),
-        lost=tuple(notes.lost),
-        world=world,
-    )
+    name = _name(options.name or source.name or file.stem)
     try:
+        robot = RobotFile(
+            name=name,
+            source=RobotSource(
+                file=file.name,
+                sha256=sha256(content).hexdigest(),
+                options=options.model_dump(mode="json", exclude_defaults=True),
+            ),
+            usual_controller=options.controller or PluginRef(name="sine" if world.fixed else "cpg"),
+            usual_task=options.task or PluginRef(name="reach" if world.fixed else "walk"),
+            lost=tuple(notes.lost),
+            world=world,
+        )
         return ImportedFile(read_robot_file(robot.text), masses)
+    except ValidationError as error:
+        raise InvalidRobot(sentence(dict(each)) for each in error.errors()) from error
     except InvalidSpec as error:
         raise InvalidRobot(f"{each.pointer}: {each.message}" for each in error.violations) from error
     except ValueError as error:  # JSON has neither nan nor infinity

@@ -1,5 +1,6 @@
 """Masses and inertias that no rigid body has: refused, or replaced where the user asks for it."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,16 +21,23 @@ ROUNDING = 1e-6
 """Share by which a moment may exceed the sum of the other two, as files have rounded numbers: MuJoCo's own."""
 
 
-def hold(base: Any, notes: Notes) -> None:  # noqa: ANN401
-    """Give a fixed base a mass and an inertia, if it has none; no number depends on them."""
-    if _is_empty(base):
-        _state(base)
-        base.mass = max(base.mass, HELD_KG)
-        _change(base, HELD_KG)
-        notes.lose("{} has no mass or no inertia, but never moves: it gets 1 kg m²", base.name or "the base")
+def hold(base: Any, notes: Notes) -> Mapping[str, float]:  # noqa: ANN401
+    """Give a fixed base a mass and an inertia, if it has none; no number depends on them.
+
+    Returns:
+        The mass that was replaced, by the name of the body; empty if none was.
+    """
+    if not _is_empty(base):
+        return {}
+    _state(base)
+    before = float(base.mass)
+    base.mass = max(before, HELD_KG)
+    _change(base, HELD_KG)
+    notes.lose("{} has no mass or no inertia, but never moves: it gets 1 kg m²", base.name or "the base")
+    return {base.name or "body1": before}
 
 
-def mend(spec: Any, notes: Notes, moved: set[str], *, allowed: bool) -> None:  # noqa: ANN401
+def mend(spec: Any, notes: Notes, moved: set[str], *, allowed: bool) -> Mapping[str, float]:  # noqa: ANN401
     """Replace what no rigid body has, or refuse it.
 
     Moments that break the triangle inequality become their mean, as by MuJoCo's `balanceinertia`. Moments of zero
@@ -40,6 +48,9 @@ def mend(spec: Any, notes: Notes, moved: set[str], *, allowed: bool) -> None:  #
         notes: what is said about it.
         moved: names of the bodies with joints.
         allowed: whether to replace it.
+
+    Returns:
+        Masses that were replaced, by the names of the bodies.
     """
     empty = []
     is_bounded = min(spec.compiler.boundmass, spec.compiler.boundinertia) > 0  # MuJoCo then gives each body some
@@ -56,9 +67,11 @@ def mend(spec: Any, notes: Notes, moved: set[str], *, allowed: bool) -> None:  #
     if not allowed:
         for _, body, name in empty:
             _note(notes, allowed, f"{name} moves, but has mass {body.mass:.4g} kg and a moment of inertia of 0", "")
-        return
+        return {}
+    replaced = {name: float(body.mass) for _, body, name in empty}
     if empty:
         _fill(spec, empty, notes)
+    return replaced
 
 
 def _note(notes: Notes, allowed: bool, fault: str, instead: str) -> None:

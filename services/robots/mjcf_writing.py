@@ -13,6 +13,7 @@ from gaplab.services.core.world import World
 from gaplab.services.robots.bodies import Bodies, joint_name
 from gaplab.services.robots.changes import Change
 from gaplab.services.robots.inertials import Inertial, inertials
+from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.xml import Document, Element, child, decoded, numbers, tree
 
 _OF_JOINTS = {"damping": "damping", "dry_friction": "frictionloss", "armature": "armature"}
@@ -22,10 +23,11 @@ _FILES = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin
 class MjcfDocument(Document):
     """An MJCF whose values change; files that it includes become part of it."""
 
-    def __init__(self, text: str, folder: Path, model: Any, locked: Sequence[str]) -> None:  # noqa: ANN401 - MjModel
+    def __init__(self, text: str, folder: Path, model: Any, options: ImportOptions) -> None:  # noqa: ANN401 - MjModel
         super().__init__(text)
         _include(self.root, folder)
-        self._model = model
+        self._model, self._has_motors = model, options.motor is None
+        locked = options.lock
         elements = [each for world in self.root.findall("worldbody") for each in world.iter()]
         self._bodies = [each for each in elements if each.tag == "body"]
         joints = [each for body in self._bodies for each in body if each.tag in {"joint", "freejoint"}]
@@ -127,6 +129,10 @@ class MjcfDocument(Document):
             geom.set("friction", " ".join([numbers(coefficient), *others]))
 
     def _write_motor(self, name: str, value: str, number: float) -> bool:
+        if not self._has_motors:  # an option gives the joints other motors, with the torque that the joint bears
+            if value == "motor.max_torque_nm":
+                _limit(self._joint(name), "actuatorfrc", number)
+            return value == "motor.max_torque_nm"
         model = self._model
         at = next(
             (a for a in range(model.nu) if joint_name(model, int(np.ravel(model.actuator_trnid[a])[0])) == name), -1
@@ -135,10 +141,7 @@ class MjcfDocument(Document):
             return False
         element, gear = self._actuators[at], float(model.actuator_gear[at, 0])
         if value == "motor.max_torque_nm":
-            is_control = element.tag == "motor" and bool(model.actuator_ctrllimited[at])
-            largest = number / abs(gear)
-            element.set("ctrlrange" if is_control else "forcerange", numbers(-largest, largest))
-            element.set("ctrllimited" if is_control else "forcelimited", "true")
+            self._write_torque(at, name, number)
         elif value == "motor.kp" and element.tag == "position":
             element.set("kp", numbers(number / gear**2))
         elif value == "motor.kd" and element.tag in {"position", "velocity"}:
@@ -147,6 +150,25 @@ class MjcfDocument(Document):
         else:
             return False
         return True
+
+    def _write_torque(self, at: int, name: str, number: float) -> None:
+        """Write every limit that the file has, since an import takes the smallest; write one of the force if none."""
+        model, element, joint = self._model, self._actuators[at], self._joint(name)
+        is_control = element.tag == "motor" and bool(model.actuator_ctrllimited[at])
+        is_of_joint = bool(model.jnt_actfrclimited[self._joints.index(joint)])
+        largest = number / abs(float(model.actuator_gear[at, 0]))
+        if is_control:
+            _limit(element, "ctrl", largest)
+        if is_of_joint:
+            _limit(joint, "actuatorfrc", number)
+        if model.actuator_forcelimited[at] or not (is_control or is_of_joint):
+            _limit(element, "force", largest)
+
+
+def _limit(element: Element, what: str, largest: float) -> None:
+    """Write a range to both sides, and that it counts."""
+    element.set(f"{what}range", numbers(-largest, largest))
+    element.set(f"{what}limited", "true")
 
 
 def _fits(name: str, patterns: Sequence[str]) -> bool:

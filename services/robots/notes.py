@@ -4,6 +4,10 @@ from collections.abc import Iterable, Sequence
 from fnmatch import fnmatchcase
 
 from gaplab.services.core.errors import InvalidRobot
+from gaplab.services.core.robot_files import LONGEST_LINE
+
+MOST_NAMES = 40
+"""Most names in a line of what is lost."""
 
 
 class Notes:
@@ -19,8 +23,8 @@ class Notes:
 
     @property
     def lost(self) -> list[str]:
-        """Return what is lost or changed, a line each."""
-        return [line.replace("{}", listed(names, 40)) for line, names in self._lost.items()]
+        """Return what is lost or changed, a line each, with as many names as a robot file permits."""
+        return [_fitting(line, names) for line, names in self._lost.items()]
 
     def lose(self, line: str, *names: str) -> None:
         """Note what is lost or changed, once.
@@ -50,6 +54,12 @@ class Notes:
         """
         if self.refused:
             raise InvalidRobot(self.refused)
+
+
+def _fitting(line: str, names: Sequence[str]) -> str:
+    texts = [line.replace("{}", listed(names, most)) for most in range(MOST_NAMES, 0, -1)]
+    shortest = texts[-1]
+    return next((text for text in texts if len(text) <= LONGEST_LINE), f"{shortest[: LONGEST_LINE - 1]}…")
 
 
 def listed(names: Iterable[str], most: int = 6) -> str:

@@ -19,7 +19,7 @@ class ImportOptions(Frozen):
         fixed: whether the base never moves; a URDF does not say it.
         mend: whether masses and inertias that no rigid body has are replaced, instead of refused.
         visuals: whether shapes that touch nothing are kept where the body also has shapes that touch.
-        lock: patterns of the names of joints that are fixed at zero, like `*_finger_*`.
+        lock: patterns of the names of joints that are fixed, like `*_finger_*`: at zero in a URDF, at `ref` in an MJCF.
         motor: motor of all motored joints, in place of the file's; None: the file's, and `position` for a URDF.
         motored: pattern of the names of joints that get a motor, like `*_knee`; for a URDF, or with `motor`.
         kp: gain of the motors, N·m/rad; None: computed.

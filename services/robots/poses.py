@@ -17,6 +17,9 @@ from gaplab.services.robots.notes import Notes, listed
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.reading import Source, mujoco_library
 
+ROUNDED = 1e-4
+"""Distance from a limit that the rounding of an angle in a file or an option explains, rad or m."""
+
 
 def start_angles(source: Source, options: ImportOptions, notes: Notes) -> FloatArray:
     """Return MuJoCo's `qpos` at the start: of a keyframe, or the reference angles; the user may turn the base."""
@@ -60,9 +63,12 @@ def with_starts(
 def _start(joint: Joint, given: float, chosen: Mapping[str, float], notes: Notes) -> float:
     wanted = [angle for pattern, angle in chosen.items() if fnmatchcase(joint.name, pattern)]
     start = wanted[-1] if wanted else given
-    if joint.limits is None or joint.limits[0] <= start <= joint.limits[1]:
+    if joint.limits is None:
         return start
     lower, upper = joint.limits
+    nearest = min(max(start, lower), upper)
+    if abs(start - nearest) <= ROUNDED:
+        return nearest
     if wanted:
         notes.refuse(f"{joint.name} cannot start at {start:g}: its limits are {lower:g} to {upper:g}")
         return start

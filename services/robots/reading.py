@@ -89,18 +89,18 @@ def _compiled(spec: Any, options: ImportOptions, notes: Notes, source: Source) -
     spec.compiler.fusestatic = False
     root = _root(spec, notes)
     notes.check()
-    fixed = options.fixed
+    fixed, replaced = options.fixed, dict[str, float]()
     if not root.joints:
         fixed = fixed or not source.is_urdf
         root.add_freejoint()
     if fixed and all("FREE" in str(joint.type) for joint in root.joints):  # else the base is the scene
-        hold(root, notes)
+        replaced.update(hold(root, notes))
     moved = {body.name or f"body{at}" for at, body in enumerate(spec.bodies) if body.joints}
-    mend(spec, notes, moved, allowed=options.mend)
+    replaced.update(mend(spec, notes, moved, allowed=options.mend))
     notes.check()
     model = spec.compile()
-    masses = source.masses_kg or {body_name(model, at): float(model.body_mass[at]) for at in range(1, model.nbody)}
-    return replace(source, model=model, masses_kg=masses, fixed=fixed)
+    compiled = {body_name(model, at): float(model.body_mass[at]) for at in range(1, model.nbody)}
+    return replace(source, model=model, masses_kg=source.masses_kg or compiled | replaced, fixed=fixed)
 
 
 def _root(spec: Any, notes: Notes) -> Any:  # noqa: ANN401

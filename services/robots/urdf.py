@@ -27,6 +27,9 @@ _LOST = {
 }
 """What is said of elements that MuJoCo drops, by tag."""
 
+MOST_FACES = 200_000
+"""Largest number of faces of an STL that MuJoCo reads."""
+
 
 @dataclass(frozen=True)
 class Urdf:
@@ -150,11 +153,19 @@ def find_mesh(given: str, folder: Path) -> Path | None:
 
 def _converted(path: Path, notes: Notes) -> bytes:
     """Return a DAE, in the unit that it says, as STL in metres."""
-    if find_spec("trimesh") is None:
+    if find_spec("trimesh") is None or find_spec("collada") is None:
         notes.refuse(f"{path.name} is a DAE, which trimesh reads: pip install 'gaplab[collada]'")
         return b""
-    loaded: Any = import_module("trimesh").load_scene(path)
-    return bytes(loaded.convert_units("meters").to_mesh().export(file_type="stl"))
+    try:
+        scene: Any = import_module("trimesh").load_scene(path)
+        mesh = scene.convert_units("meters").to_mesh()
+    except Exception as error:  # noqa: BLE001 - trimesh and collada raise anything for a broken file
+        notes.refuse(f"{path} is no DAE that can be read: {' '.join(str(error).split()) or type(error).__name__}")
+        return b""
+    if not 1 <= len(mesh.faces) <= MOST_FACES:
+        notes.refuse(f"{path} has {len(mesh.faces)} faces, but 1 to {MOST_FACES} are permitted")
+        return b""
+    return bytes(mesh.export(file_type="stl"))
 
 
 def _mass_kg(link: Element) -> float | None:

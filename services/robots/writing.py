@@ -30,6 +30,18 @@ _COMPUTED = {"start_height_m", "swing", "motor.kp", "motor.kd", "motor.max_torqu
 
 _FRICTION = ("material.static_friction", "material.dynamic_friction")
 
+_SET_BY = {
+    "max_torque": ("motor.max_torque_nm",),
+    "kp": ("motor.kp",),
+    "kd": ("motor.kd",),
+    "position_gain": ("motor.position_gain",),
+    "motor": ("motor.kp", "motor.kd"),
+    "time_step_s": ("time_step_s",),
+    "static_friction": _FRICTION,
+    "dynamic_friction": _FRICTION,
+}
+"""Values by the option of an import that sets them, so that a new import does not read them from the file."""
+
 
 @dataclass(frozen=True)
 class WrittenFile:
@@ -111,14 +123,17 @@ def write_xml(tuning: Tuning, original: Path, output: Path, accept: Accept) -> W
     text, notes = decoded(original.read_bytes()), Notes()
     source = read_source(original, text, options, notes)
     document: UrdfDocument | MjcfDocument = (
-        UrdfDocument(text) if source.is_urdf else MjcfDocument(text, original.parent, source.model, options.lock)
+        UrdfDocument(text) if source.is_urdf else MjcfDocument(text, original.parent, source.model, options)
     )
     wanted = changes(robot.world, tuned)
-    written = _write(document, Bodies(source, options, notes), wanted, (robot.world, tuned))
+    given = _given(options, is_urdf=source.is_urdf)
+    open_ = [change for change in wanted if change.place[2] not in given]
+    written = _write(document, Bodies(source, options, notes), open_, (robot.world, tuned))
     left_out = tuple(change for change in wanted if change.place not in written)
     if left_out and not tuning.partial:
         form = "URDF" if source.is_urdf else "MJCF"
-        reasons = [f"{change}: the {form} has no place for it" for change in left_out]
+        faults = {value: f"the import sets it with {option}" for value, option in given.items()}
+        reasons = [f"{each}: {faults.get(each.place[2], f'the {form} has no place for it')}" for each in left_out]
         raise InvalidRobot([*reasons, "--partial leaves these out; robot.json has a place for all"])
     if output.absolute().parent != original.absolute().parent:
         document.move(original.absolute().parent, output.absolute().parent)
@@ -147,6 +162,14 @@ def _options(robot: RobotFile, original: Path, output: Path) -> ImportOptions:
     if original.suffix.lower() != output.suffix.lower():
         raise InvalidRobot([f"{output.name} must end in {original.suffix}, as {original.name} does, or in .json"])
     return ImportOptions.model_validate(robot.source.options)
+
+
+def _given(options: ImportOptions, *, is_urdf: bool) -> dict[str, str]:
+    """Return the options that set values whatever the file says, as they were given, by the names of the values."""
+    names = {"max_torque"} if is_urdf else set(_SET_BY)  # a URDF has no place for the values of the others
+    found = options.model_dump(include=names, exclude_defaults=True)
+    texts = {option: f"{option}={given}".removesuffix(".0") for option, given in found.items()}
+    return {value: text for option, text in texts.items() for value in _SET_BY[option]}
 
 
 def _write(

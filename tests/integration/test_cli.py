@@ -67,7 +67,7 @@ def test_an_edit_that_is_none_is_a_sentence(gaplab: Gaplab) -> None:
     nothing, nameless = gaplab("edit", id), gaplab("edit", id, "--name", "")
 
     assert (nothing.code, nameless.code) == (Exit.INVALID, Exit.INVALID)
-    assert nothing.err == "gaplab: nothing to change: give a name, notes or tags\n"
+    assert nothing.err == "gaplab: nothing to change: give --name or --notes; `gaplab tag` changes tags\n"
     assert nameless.err == "gaplab: --name must have at least 1 character, not 0\n"
 
 
@@ -413,3 +413,17 @@ def test_the_client_knows_when_what_answers_is_no_gaplab() -> None:
 
     with served(other) as address, Client(address) as client, pytest.raises(ServiceUnreachable, match="no gaplab"):
         client.studies()
+
+
+def test_an_option_without_an_effect_is_refused_with_what_to_do(gaplab: Gaplab, tmp_path: Path) -> None:
+    study = json.loads(gaplab("submit", str(EXAMPLES / "toy.json"), "--json").out)["id"]
+    refused = {
+        ("list", "--view", "slow", "--experiments"): "a saved view says what it lists",
+        ("show", study, "--spec"): f"`gaplab spec {study} --resolved`",
+        ("curve", study, "--csv", "--json"): "only one of --csv and --json",
+        ("rerun", str(tmp_path / "x.zip"), "--repetitions", "1"): "add --verify",
+    }
+    for command, why in refused.items():
+        told = gaplab(*command)
+        assert told.code == Exit.USAGE
+        assert why in " ".join(told.err.replace("│", " ").split())

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -15,6 +16,7 @@ from gaplab.schemas.comparisons import Comparison, Equivalence, Estimate, Summar
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import submission
 from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex, escaped
+from gaplab.services.results.comparisons import compare
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import toy
@@ -114,6 +116,44 @@ def test_the_command_prints_each_format(ids: list[str], gaplab: Gaplab) -> None:
     assert "pooled as in the paper" in over
     assert "within ±0.5" in over
     assert "seed 0 and the strategy simulated_fit" in over.replace("\n", " ")
+
+
+SLIPPERY = """
+from gaplab.services.core.robots.toy_function import ToyFunction
+
+
+class Slippery(ToyFunction):
+    name = "slippery"
+"""
+
+
+def test_what_differs_besides_the_strategy_is_said(
+    sqlite_store: Store, finish: Callable[[], None], gaplab: Gaplab, put: Any
+) -> None:
+    put(slippery=SLIPPERY)
+    specs = (
+        toy(repetitions=2),
+        toy(repetitions=2, strategy="random"),
+        toy(repetitions=2, robot="slippery"),
+        toy(repetitions=2, reality={"parameters": {"static_friction": 0.4}}),
+    )
+    plain, random, slippery, icy = (submission.submit_experiment(sqlite_store, spec).id for spec in specs)
+    open_ = submission.submit_experiment(sqlite_store, toy(repetitions=2)).id
+
+    def told(*pair: str) -> list[str]:
+        (found,) = compare(sqlite_store, pair)
+        return list(found.warnings)
+
+    (hidden,) = told(plain, open_)
+    finish()
+
+    assert hidden.startswith("realities are hidden until the experiments have ended")
+    assert told(plain, random) == told(plain, open_) == []
+    assert told(plain, slippery) == [
+        "different robots (toy_function; slippery): their fitness does not mean the same",
+    ]
+    assert told(plain, icy) == ["different realities: a difference may come from the reality, not from the strategy"]
+    assert "! different robots (toy_function; slippery)" in gaplab("compare", plain, slippery).out
 
 
 def test_all_ways_to_ask_begin_at_the_same_count(ids: list[str], gaplab: Gaplab, url: str, sqlite_store: Store) -> None:

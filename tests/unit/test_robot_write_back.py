@@ -326,3 +326,90 @@ def test_a_file_that_declares_another_encoding_declares_the_one_that_it_is_writt
     joints = [joint.get("name") for joint in ET.parse(output).getroot().iter("joint")]
     assert "Größe" in joints
     assert output.read_bytes().startswith(b"<?xml version='1.0' encoding='UTF-8' ?>\n<robot")
+
+
+@pytest.mark.parametrize(
+    ("options", "change", "message"),
+    [
+        (
+            {"max_torque": 33.0},
+            {"max_torque_nm": 26.0},
+            "motor.max_torque_nm 33 → 26: the import sets it with max_torque=33",
+        ),
+        ({"kp": 80.0}, {"kp": 64.0}, "motor.kp 80 → 64: the import sets it with kp=80"),
+        ({"kd": 3.0}, {"kd": 2.5}, "motor.kd 3 → 2.5: the import sets it with kd=3"),
+        ({"motor": "position", "kp": 60.0}, {"kd": 9.0}, "motor.kd .* → 9: the import sets it with motor=position"),
+    ],
+)
+@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
+def test_what_an_option_of_the_import_sets_is_refused_or_left_out(
+    tmp_path: Path, suffix: str, options: dict[str, Any], change: dict[str, float], message: str
+) -> None:
+    original, output, joint = tmp_path / f"m{suffix}", tmp_path / f"tuned{suffix}", "ja"
+    original.write_text(MJCF.format(""))
+    if suffix == ".urdf":
+        original, joint = path_of("a1/a1.urdf"), "FR_hip_joint"
+        message = message if "max_torque" in options else message.partition("the import")[0] + "the URDF has no place"
+    robot = import_robot(original, ImportOptions(**options)).robot
+    tuned = with_joint(robot.world, joint, damping=0.4, motor=change)
+
+    with pytest.raises(InvalidRobot, match=message):
+        write_xml(Tuning(robot, tuned, ()), original, output, fine)
+    written = write_xml(Tuning(robot, tuned, (), partial=True), original, output, fine)
+
+    assert [each.place[2] for each in written.changes] == ["damping"]
+    assert f"not in this file: {written.left_out[0]}" in output.read_text()
+
+
+def test_friction_and_a_time_step_that_options_set_are_left_out(tmp_path: Path) -> None:
+    original = tmp_path / "m.xml"
+    original.write_text(MJCF.format(""))
+    robot = import_robot(original, ImportOptions(static_friction=0.9, time_step_s=0.005)).robot
+    material = replace(robot.world.material, static_friction=0.5, dynamic_friction=0.5)
+    tuned = replace(robot.world, material=material, time_step_s=0.002)
+
+    with pytest.raises(InvalidRobot, match=r"0.9 → 0.5: the import sets it with static_friction=0.9; .*_s=0.005"):
+        write_xml(Tuning(robot, tuned, ()), original, tmp_path / "tuned.xml", fine)
+    assert not write_xml(Tuning(robot, tuned, (), partial=True), original, tmp_path / "tuned.xml", fine).changes
+
+
+LIMITED = """<mujoco><compiler angle="radian"/><worldbody><body><freejoint/><geom size=".1"/>
+<body><joint name="j" {joint}/><geom size=".1" mass="1"/></body></body></worldbody>
+<actuator>{actuator}</actuator></mujoco>"""
+"""A robot with a single hinge, what bears its torque, and its actuator."""
+
+BORNE = 'actuatorfrcrange="-20 20"'
+BOTH = '<motor joint="j" gear="30" ctrlrange="-1 1" forcerange="-.5 .5"/>'
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+@pytest.mark.parametrize(
+    ("joint", "actuator", "options"),
+    [
+        (BORNE, '<position joint="j" kp="50"/>', {}),
+        (BORNE, '<position joint="j" kp="50" gear="2" forcerange="-15 15" ctrlrange="-1 1"/>', {}),
+        ("", '<motor joint="j" gear="30" ctrlrange="-1 1"/>', {}),
+        ("", BOTH, {}),
+        (BORNE, BOTH, {}),
+        ("", '<velocity joint="j" kv="3"/>', {}),
+        (BORNE, BOTH, {"motor": "servo"}),
+        ("", BOTH, {"motor": "torque"}),
+    ],
+)
+def test_a_largest_torque_comes_back_whatever_limits_it(
+    tmp_path: Path, joint: str, actuator: str, options: dict[str, Any], factor: float
+) -> None:
+    original, output = tmp_path / "m.xml", tmp_path / "tuned.xml"
+    original.write_text(LIMITED.format(joint=joint, actuator=actuator))
+    robot = import_robot(original, ImportOptions(**options)).robot
+    torque = factor * robot.world.joints[0].motor.max_torque_nm
+
+    write_xml(Tuning(robot, with_joint(robot.world, "j", motor={"max_torque_nm": torque}), ()), original, output, fine)
+
+    again = import_robot(output, ImportOptions(**options)).robot.world.joints[0].motor
+    assert again.max_torque_nm == pytest.approx(torque, rel=1e-12)
+    limits = mujoco.MjModel.from_xml_path(str(output))
+    assert (limits.actuator_ctrllimited[0], limits.actuator_forcelimited[0]) == (
+        "ctrlrange" in actuator,
+        "forcerange" in actuator or not (joint or "ctrlrange" in actuator or options),
+    )
