@@ -169,6 +169,9 @@ def test_experiments_of_one_strategy_share_colour_and_mark_and_differ_in_their_d
 
     assert len({first.color, second.color, third.color}) == len({first.marker, second.marker, third.marker}) == 1
     assert len({first.dash, second.dash, third.dash}) == 3
+    many = strategy_styles(["random"] * 36)
+    assert len({(style.dash, style.marker) for style in many}) == 36
+    assert {style.color for style in many} == {first.color}
 
 
 def test_every_strategy_of_gaplab_with_a_curve_has_a_colour_of_its_own() -> None:

@@ -129,6 +129,7 @@ declare namespace Api {
     caution: string | null;
     lower: number | null;
     upper: number | null;
+    warnings: Array<string>;
     improvement: Estimate;
     shared_streams: boolean;
     streams: string;
