@@ -166,6 +166,20 @@ def test_a_pair_that_shares_random_streams_is_marked_and_a_margin_is_judged(
     axe(page)
 
 
+def test_a_small_difference_is_not_written_as_nothing(api: Any, written: Store, visit: Any) -> None:
+    ids = [submission.submit_experiment(written, toy(name=name, repetitions=6)).id for name in ("one", "two")]
+    for claim in execution.claim(written, "tests", 12):
+        better = 0.001 + 0.0001 * (claim.number % 3) if claim.experiment_id == ids[0] else 0.0
+        run(written, claim, some_log(recorded=0.5 + 0.0001 * claim.number + better))
+
+    page = visit(address(api, *ids))
+    page.get_by_text("Every pair, at every range").click()
+    page.get_by_text("Each experiment, with intervals").click()
+
+    expect(page.get_by_role("region", name="Pairs").locator("tbody tr")).to_contain_text("+0.0011 [0.001")
+    expect(page.get_by_role("region", name="Each experiment").locator("tbody tr").last).to_contain_text("0.000187")
+
+
 def test_a_comparison_begins_at_the_last_number_that_all_share(archive: Any, ids: Any, visit: Any) -> None:
     page = visit(address(archive, *ids))
 

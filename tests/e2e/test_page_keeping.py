@@ -2,11 +2,15 @@
 
 from typing import Any
 
+from playwright.sync_api import expect
+
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import Verb
 from gaplab.services.experiments import editing, lifecycle, submission
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import toy
+
+SLOW_MS = 120_000
 
 NOTES = """# Floor
 
@@ -123,6 +127,27 @@ def test_a_query_finds_is_explained_and_is_saved_as_a_view(visit: Any, api: Any,
     page.get_by_role("button", name="Delete the view found ones").click()
     page.get_by_role("button", name="Delete it").click()
     page.get_by_role("link", name="found ones").wait_for(state="detached")
+
+
+def test_a_view_that_sorts_downwards_keeps_its_order(visit: Any, api: Any, written: Any) -> None:
+    for name in ("reversed b", "reversed c", "reversed a"):
+        ended(written, name, tags=("reversed",))
+    for name, view in {"all": {"sort": "-name"}, "ones": {"shows": "experiments", "sort": "-strategy"}}.items():
+        answer = api.http.put(f"/views/{name} downwards", json={"query": "tag = reversed", **view})
+        assert answer.is_success, answer.text
+    page = visit(api.url)
+
+    page.get_by_role("link", name="all downwards").click()
+    page.locator(".chip[aria-current]", has_text="all downwards").wait_for()
+    expect(page.locator("td.name a:not(.tag)")).to_have_text(
+        ["reversed c", "reversed b", "reversed a"], timeout=SLOW_MS
+    )
+    assert page.get_by_label("Order").input_value() == "-name"
+    page.get_by_role("link", name="ones downwards").click()
+    page.locator(".chip[aria-current]", has_text="ones downwards").wait_for()
+    assert page.get_by_label("Order").input_value() == "-strategy"
+    for name in ("all", "ones"):
+        assert api.http.delete(f"/views/{name} downwards").is_success
 
 
 def test_what_has_ended_is_archived_and_deleted_by_its_name(visit: Any, api: Any, written: Any) -> None:

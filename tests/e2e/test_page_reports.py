@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
+from tests.e2e.browser import fits, screenshot
 from tests.waiting import wait_until
 
 SLOW_MS = 120_000
@@ -61,6 +62,36 @@ def test_simulators_are_drawn_in_parallel_coordinates(archive: Any, walker: Any,
         ).to_be_visible()
     name, content = saved(page, "SVG", figure)
     assert (name.rpartition("-")[2], content[:5]) == ("coordinates.svg", b"<?xml")
+
+
+def test_on_a_phone_every_axis_of_the_coordinates_has_its_label(archive: Any, walker: Any, visit: Any) -> None:
+    page = visit(f"{archive.url}/#/experiments/{walker}", width=390)
+    figure = page.locator(".figure-coordinates")
+    figure.scroll_into_view_if_needed()
+
+    labels = figure.locator(".xtick text")
+    expect(labels.filter(has_text="Error per sample")).to_be_visible()
+    expect(labels.filter(has_text="Real fitness")).to_be_visible()
+    assert [each.is_visible() for each in labels.all()] == [True] * labels.count()
+    fits(page)
+    figure.scroll_into_view_if_needed()
+    screenshot(page, "coordinates-phone")
+
+
+def test_in_the_dark_the_lines_of_the_coordinates_have_the_colours_of_their_bar(
+    archive: Any, walker: Any, visit: Any
+) -> None:
+    page = visit(f"{archive.url}/#/experiments/{walker}", dark=True)
+    figure = page.locator(".figure-coordinates")
+    figure.scroll_into_view_if_needed()
+    expect(figure.locator(".scatterlayer .js-line").first).to_be_attached()
+
+    lines, scale = figure.locator(".plot").evaluate("""(plot) => [
+      plot.data.filter(({ mode, meta }) => mode === "lines" && !meta).map(({ line }) => line.color),
+      plot.layout.coloraxis.colorscale.map(([, color]) => color)]""")
+
+    assert (lines[0], lines[-1]) == (scale[0], scale[-1])
+    screenshot(page, "coordinates-dark")
 
 
 @pytest.mark.parametrize("of", ["studies", "experiments"])

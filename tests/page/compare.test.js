@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { commonCount, isSeveral, letter, rangesOf, rangeText } from "../../api/dashboard/views/compare/ranges.js";
 import { differentSettings, warnings } from "../../api/dashboard/views/compare/remarks.js";
-import { bothProbabilities, estimated, probability, signed, swapped, verdict } from "../../api/dashboard/views/compare/verdict.js";
+import { bothProbabilities, estimated, interval, probability, signed, swapped, verdict } from "../../api/dashboard/views/compare/verdict.js";
 
 const PAIR = {
   first: "a", second: "b", n_first: 3, n_second: 4, difference: 0.5, effect_size: -1.25,
@@ -57,7 +57,7 @@ test("a pair that is swapped twice is itself", () => {
 });
 
 test("numbers have their intervals, and p-values both", () => {
-  assert.deepEqual([estimated(PAIR.improvement), estimated({ value: 0.5, lower: 0.25, upper: 1 })], ["0.75", "0.50 [0.25, 1.00]"]);
+  assert.deepEqual([estimated(PAIR.improvement), estimated({ value: 0.5, lower: 0.25, upper: 1 })], ["0.75", "0.5 [0.25, 1]"]);
   assert.equal(estimated({ value: null, lower: null, upper: null }), "–");
   assert.deepEqual([bothProbabilities({ p: 0.01, p_holm: 0.03 }), bothProbabilities({ p: 0.0001, p_holm: 0.0003 })],
     ["p = 0.030, raw 0.010", "p < 0.001, raw < 0.001"]);
@@ -66,7 +66,13 @@ test("numbers have their intervals, and p-values both", () => {
 
 test("p-values and effect sizes are written as in papers", () => {
   assert.deepEqual([null, 0.0009, 0.001, 0.25].map(probability), ["undefined", "p < 0.001", "p = 0.001", "p = 0.250"]);
-  assert.deepEqual([null, 0, 1.234, -0.5].map(signed), ["–", "0.00", "+1.23", "−0.50"]);
+  assert.deepEqual([null, 0, 1.234, -0.5].map(signed), ["–", "0", "+1.23", "−0.5"]);
+});
+
+test("a difference that is small and significant is not written as 0", () => {
+  assert.equal(`${signed(0.0012345)}${interval(0.0004, 0.00207)}`, "+0.00123 [0.0004, 0.00207]");
+  assert.equal(`${signed(-0.0012345)}${interval(-0.00207, -0.0004)}`, "−0.00123 [−0.00207, −0.0004]");
+  assert.equal(estimated({ value: 0.00123, lower: 0.00119, upper: 0.00127 }), "0.00123 [0.00119, 0.00127]");
 });
 
 test("robots and realities of one name are told apart by the options in which they differ", () => {

@@ -91,6 +91,13 @@ test("one range is asked for, and the others once their table is unfolded", asyn
   assert.match(part.element.querySelector("details.every").textContent, /At 1Mean of 1–10/);
 });
 
+test("a small spread is not written as 0", async () => {
+  const { part, loading } = comparing();
+  serving(() => [200, [{ ...PAIR, summary_first: { ...SUMMARY, sd: 0.00123 } }]]);
+  await loading.load();
+  assert.match(part.element.querySelector("details.each").textContent, /0\.00123/);
+});
+
 test("what an event did not change stays, and the focus stays where something changed", async () => {
   const { part, loading, view } = comparing();
   serving(() => [200, [PAIR]]);

@@ -37,6 +37,15 @@ test("events are sentences, and a kind that is newer than the page has its name"
   assert.equal(eventText({ kind: "something_new" }), "something new");
 });
 
+test("an edit names its tags, if the event has them", () => {
+  const edited = (body) => eventText({ kind: "edited", body });
+  assert.equal(edited({ fields: ["add_tags"], add_tags: ["gait", "wet"], remove_tags: [] }), "Edited: added the tags gait, wet");
+  assert.equal(edited({ fields: ["name", "remove_tags"], remove_tags: ["wet"] }), "Edited: name; removed the tag wet");
+  assert.equal(edited({ fields: ["tags"], add_tags: ["a_b"], remove_tags: ["wet"], of_study: true }), "Its study was edited: added the tag a_b; removed the tag wet");
+  assert.equal(edited({ fields: ["tags"], tags: ["gait"] }), "Edited: set the tag gait");
+  assert.deepEqual([edited({ fields: ["name", "remove_tags"] }), edited({ fields: ["tags"], add_tags: [], remove_tags: [] })], ["Edited: name, remove tags", "Edited: tags"]);
+});
+
 /** A service with these numbers of an experiment's events, `size` a page. */
 const service = (numbers, size) => (query) => {
   const items = numbers.filter((number) => number > query.after).slice(0, size).map((number) => ({ number }));

@@ -1,9 +1,9 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { age, count, duration, fixed, number, percent, readableName, timeBetween } from "../../api/dashboard/lib/format.js";
+import { age, count, duration, fixed, number, percent, readableName, threeDigits, timeBetween } from "../../api/dashboard/lib/format.js";
 
 test("a missing value is a dash, in every format", () => {
-  for (const format of [number, fixed, count, duration]) assert.deepEqual([format(null), format(undefined)], ["–", "–"]);
+  for (const format of [number, fixed, threeDigits, count, duration]) assert.deepEqual([format(null), format(undefined)], ["–", "–"]);
   assert.equal(timeBetween(null, "2026-01-01T00:00:00Z"), "–");
   assert.equal(timeBetween("2026-01-01T00:00:00Z", null), "–");
 });
@@ -11,6 +11,11 @@ test("a missing value is a dash, in every format", () => {
 test("numbers have three decimals at most, and exactly three in columns", () => {
   assert.deepEqual([number(0.12345), number(2), fixed(2), fixed(-0.1)], ["0.123", "2", "2.000", "−0.100"]);
   assert.deepEqual([count(0), count(1234567)], ["0", "1,234,567"]);
+});
+
+test("three significant digits keep what is small, and all digits before the point", () => {
+  const expected = [[0, "0"], [0.5, "0.5"], [0.0012345, "0.00123"], [-0.98765, "−0.988"], [12345.6, "12346"], [-1.234e-7, "−1.23e−7"]];
+  for (const [value, text] of expected) assert.equal(threeDigits(value), text);
 });
 
 test("durations change their unit where the smaller one becomes hard to read", () => {

@@ -3,6 +3,8 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 const { List } = await import("../../api/dashboard/views/list.js");
+const { addressOf, filtersOf } = await import("../../api/dashboard/views/list/filters.js");
+const { merged } = await import("../../api/dashboard/views/list/sources.js");
 
 const FILTERS = { show: "studies", sort: "-created_at", state: "", strategy: "", text: "", q: "" };
 const PROGRESS = { rollouts: 0, repetitions: 0, completed: 0 };
@@ -92,4 +94,22 @@ test("a view that begins with half a query does not say that it is loading", asy
   list.change({ ...FILTERS, q: "tag =" });
   await answer({ status: 422, title: "No", errors: [{ pointer: "q", message: "a value is missing" }] }, 422);
   assert.deepEqual([list.note.textContent, list.mistake.textContent], ["", "a value is missing"]);
+});
+
+test("an address keeps every order that a saved view can have", () => {
+  const ofStudies = ["created_at", "name", "-name"];
+  const orders = { all: ofStudies, studies: ofStudies, experiments: [...ofStudies, "strategy", "-strategy", "state", "-state"] };
+  for (const [show, sorts] of Object.entries(orders)) {
+    for (const sort of sorts) {
+      const address = addressOf({ ...FILTERS, show, sort });
+      assert.equal(filtersOf(new URLSearchParams(address.split("?")[1])).sort, sort);
+    }
+  }
+});
+
+test("studies and experiments are merged by name in either direction", () => {
+  const sources = (...lists) => lists.map((names) => ({ items: [...names].map((name) => ({ name, created_at: "2026-01-01T00:00:00Z" })), cursor: null }));
+  const names = (given, sort) => merged(given, sort).items.map(({ name }) => name).join("");
+  assert.equal(names(sources("ace", "bd"), "name"), "abcde");
+  assert.equal(names(sources("eca", "db"), "-name"), "edcba");
 });

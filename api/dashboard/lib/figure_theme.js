@@ -14,6 +14,8 @@ const LIGHTER = {
 };
 const WHITE_SHARE = 0.35;
 const NARROW_PX = 480;
+const OPAQUER = 1.4;  // what is half transparent loses its contrast on a dark ground
+const WORDS_PX = 100;  // added on a phone for words that stand upright below an axis
 const PANEL_PX = 270;  // of each panel, where panels stand one above the other
 
 /**
@@ -35,7 +37,7 @@ export function themed({ data, layout: given }, canvas) {
     title: { ...layout[name].title, font: { size: isNarrow ? 12 : 13 } },
   });
   return {
-    data: data.map((trace) => themedTrace(trace, ink)),
+    data: data.map((trace) => themedTrace(trace, ink, Boolean(layout.coloraxis))),
     layout: {
       ...layout,
       ...Object.fromEntries(Object.keys(layout).filter((name) => /^[xy]axis\d*$/.test(name)).map((name) => [name, axis(name)])),
@@ -52,7 +54,7 @@ export function themed({ data, layout: given }, canvas) {
 }
 
 /**
- * Return a layout for a phone: the panels one above the other, and a bar of colours above them all.
+ * Return a layout for a phone: the panels one above the other, a bar of colours above them all, and words below an axis upright.
  *
  * @param {Record<string, any>} layout
  * @returns {Record<string, any>}
@@ -60,6 +62,9 @@ export function themed({ data, layout: given }, canvas) {
 export function stacked(layout) {
   const axes = Object.keys(layout).filter((name) => /^xaxis\d*$/.test(name));
   const result = { ...layout };
+  if (layout.xaxis?.ticktext) {  // upright where they would overlap: of slanted words Plotly leaves out those that would cross the edge
+    Object.assign(result, { xaxis: { ...layout.xaxis, autotickangles: [0, 90] }, height: (layout.height ?? 0) + WORDS_PX });
+  }
   if (layout.coloraxis) {
     const { colorbar } = layout.coloraxis;
     const across = { orientation: "h", x: 0, xanchor: "left", y: 1, yanchor: "bottom", len: 1 };
@@ -72,7 +77,7 @@ export function stacked(layout) {
   axes.forEach((x, index) => {
     const y = x.replace("x", "y");
     const top = 1 - index * (height + gap);
-    result[x] = { ...layout[x], domain: [0, 1] };
+    result[x] = { ...result[x], domain: [0, 1] };
     result[y] = { ...layout[y], domain: [Math.max(0, top - height), top] };
   });
   return { ...result, height: PANEL_PX * axes.length + 120 };
@@ -81,17 +86,19 @@ export function stacked(layout) {
 /**
  * @param {any} trace
  * @param {string} ink
+ * @param {boolean} isShaded whether the colours of the figure are shades of a scale
  */
-function themedTrace(trace, ink) {
+function themedTrace(trace, ink, isShaded) {
   const color = (/** @type {unknown} */ value) => {
     if (typeof value !== "string") return value;
     if (trace.meta?.ink) return inInk(value, ink);
-    return isDark() ? lighter(value) : value;
+    return isDark() ? lighter(value, isShaded) : value;
   };
   const result = { ...trace };
   if (trace.line) result.line = { ...trace.line, color: color(trace.line.color) };
   if (trace.marker) result.marker = { ...trace.marker, color: color(trace.marker.color) };
   if (trace.fillcolor) result.fillcolor = color(trace.fillcolor);
+  if (isShaded && isDark() && trace.opacity < 1) result.opacity = Math.min(1, trace.opacity * OPAQUER);  // as the bar of colours
   return result;
 }
 
@@ -110,11 +117,13 @@ export function components(color) {
  * Return the colour of a line on a dark ground.
  *
  * @param {string} color
+ * @param {boolean} [isShaded] whether a colour without a replacement is a shade of a scale, which is then mixed with white
  */
-export function lighter(color) {
+export function lighter(color, isShaded = false) {
   const [red, green, blue, opacity] = components(color);
   const replacement = LIGHTER[`${red},${green},${blue}`];
-  return replacement ? `rgba(${replacement},${Math.min(1, opacity < 1 ? opacity * 1.4 : 1)})` : color;
+  if (!replacement) return isShaded ? mixed(color) : color;
+  return `rgba(${replacement},${Math.min(1, opacity < 1 ? opacity * OPAQUER : 1)})`;
 }
 
 /**
@@ -123,9 +132,13 @@ export function lighter(color) {
  * @param {{ colorscale: [number, string][] }} axis
  */
 function paler(axis) {
-  const mixed = (/** @type {string} */ color) =>
-    `rgb(${components(color).slice(0, 3).map((value) => Math.round(value + (255 - value) * WHITE_SHARE))})`;
   return { ...axis, colorscale: axis.colorscale.map(([position, color]) => [position, mixed(color)]) };
+}
+
+/** @param {string} color */
+function mixed(color) {
+  const [red, green, blue, opacity] = components(color);
+  return `rgba(${[red, green, blue].map((value) => Math.round(value + (255 - value) * WHITE_SHARE))},${opacity})`;
 }
 
 /**

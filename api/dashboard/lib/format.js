@@ -25,6 +25,16 @@ export const number = (value) => (isMissing(value) ? MISSING : NUMBER.format(val
 export const fixed = (value) => (isMissing(value) ? MISSING : value.toFixed(3).replace("-", "−"));
 
 /**
+ * Format a number with three significant digits, and all digits before the point: a small difference does not become 0.
+ *
+ * @param {Value} value
+ */
+export const threeDigits = (value) => {
+  if (isMissing(value)) return MISSING;
+  return String(Math.abs(value) < 1000 ? Number(value.toPrecision(3)) : Math.round(value)).replaceAll("-", "−");
+};
+
+/**
  * Format a whole number in groups of three digits.
  *
  * @param {Value} value

@@ -2,6 +2,7 @@
 /** Every experiment against every other, at a glance. */
 
 import { h } from "../../lib/dom.js";
+import { threeDigits } from "../../lib/format.js";
 import { framed } from "../../lib/table.js";
 import { letter } from "./ranges.js";
 import { probabilities, signed, swapped, verdict } from "./verdict.js";
@@ -36,10 +37,7 @@ function cell(pair, test) {
   if (kind === "unknown") return h("td", { class: kind }, words);
   const result = h("span", { class: "verdict" }, h("span", { "aria-hidden": "true" }, `${sign} `), words);
   const { equivalence } = pair;
-  const within = equivalence?.verdict === "equivalent" && h("small", { class: "within", title: equivalence.words }, `≡ within ±${rounded(equivalence.margin)}`);
+  const within = equivalence?.verdict === "equivalent" && h("small", { class: "within", title: equivalence.words }, `≡ within ±${threeDigits(equivalence.margin)}`);
   const paired = test === "trusted" && pair.shared_streams && h("small", { title: pair.streams }, "paired");
   return h("td", { class: kind }, result, ...probabilities(pair[test]).map((words) => h("small", {}, words)), h("small", {}, `d = ${signed(pair.effect_size)}`), paired, within);
 }
-
-/** @param {number} margin */
-const rounded = (margin) => Number(margin.toPrecision(3));

@@ -1,6 +1,8 @@
 // @ts-check
 /** What a test says of a pair, in a sign and in words. */
 
+import { threeDigits } from "../../lib/format.js";
+
 const LEVEL = 0.05;
 
 /** @typedef {Page.Comparison["test"]} TestName */
@@ -35,14 +37,14 @@ export const probabilities = ({ p, p_holm: corrected }) =>
  *
  * @param {number | null} value
  */
-export const signed = (value) => (value === null ? "–" : `${value > 0 ? "+" : value < 0 ? "−" : ""}${Math.abs(value).toFixed(2)}`);
+export const signed = (value) => (value === null ? "–" : `${value > 0 ? "+" : value < 0 ? "−" : ""}${threeDigits(Math.abs(value))}`);
 
 /**
  * Write a number with its interval.
  *
  * @param {Api.Estimate} estimate
  */
-export const estimated = ({ value, lower, upper }) => `${value === null ? "–" : value.toFixed(2)}${interval(lower, upper)}`;
+export const estimated = ({ value, lower, upper }) => `${threeDigits(value)}${interval(lower, upper)}`;
 
 /**
  * Write an interval after its number; nothing if it is not known.
@@ -50,7 +52,7 @@ export const estimated = ({ value, lower, upper }) => `${value === null ? "–" 
  * @param {number | null} lower
  * @param {number | null} upper
  */
-export const interval = (lower, upper) => (lower === null || upper === null ? "" : ` [${lower.toFixed(2)}, ${upper.toFixed(2)}]`);
+export const interval = (lower, upper) => (lower === null || upper === null ? "" : ` [${threeDigits(lower)}, ${threeDigits(upper)}]`);
 
 /**
  * Return whether the first of a pair is higher, lower, not shown to differ, or not known to be; of spreads, wider or narrower.

@@ -26,6 +26,8 @@ const reaching = (words, value, where = "") => (value === null || value === unde
 /** @type {(words: string, value: number | null | undefined, where?: string) => string} a robot on a bench fails for other reasons than physics */
 const inReality = (words, value, where = "") => (value === null || value === undefined ? "failed in reality" : `${words} ${number(value)}${where}`);
 
+const TAG_FIELDS = ["tags", "add_tags", "remove_tags"];
+
 /** @type {Record<string, Words>} */
 const WORDS = {
   submitted: ({ body }) => `Submitted, with ${count(body.repetitions)} repetitions`,
@@ -41,7 +43,7 @@ const WORDS = {
   failed: () => "Failed",
   cancelled: () => "Cancelled",
   retried: () => "Retried",
-  edited: ({ body }) => `${body.of_study ? "Its study was edited" : "Edited"}: ${(body.fields ?? []).join(", ").replaceAll("_", " ")}`,
+  edited: ({ body }) => `${body.of_study ? "Its study was edited" : "Edited"}: ${edits(body)}`,
   archived: () => "Archived: lists leave it out",
   unarchived: () => "Listed again",
   deleted: ({ body }) => `Deleted: ${body.name}`,
@@ -78,6 +80,18 @@ const WORDS = {
   transferred: (event) => `${step(event)}: controller evolved, ${reaching("reaching", event.body.simulated_fitness, " in simulation")}`,
   probed: (event) => event.body.left_out ? `${step(event)}: the controller is not measured, as the spec says` : `${step(event)}: ${inReality("the controller reaches", event.body.fitness, " in reality")}`,
 };
+
+/**
+ * Return what an edit changed: tags by their names, where the event has them, and other fields.
+ *
+ * @param {{ fields?: string[], tags?: string[], add_tags?: string[], remove_tags?: string[] }} body
+ */
+function edits({ fields = [], tags, add_tags: added, remove_tags: removed }) {
+  const told = [[tags, "set the"], [added, "added the"], [removed, "removed the"]].flatMap(([names, did]) =>
+    (names?.length ? [`${did} tag${names.length === 1 ? "" : "s"} ${/** @type {string[]} */ (names).join(", ")}`] : []));
+  const others = told.length ? fields.filter((field) => !TAG_FIELDS.includes(field)) : fields;
+  return [others.join(", ").replaceAll("_", " "), ...told].filter(Boolean).join("; ");
+}
 
 /** @param {{ channel?: string }} body */
 const channel = ({ channel: name }) => `the ${String(name).replace("own_webhook", "webhook of its own").replace(/^webhook$/, "service's webhook")}`;

@@ -4,7 +4,7 @@
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
-import { readableName } from "../../lib/format.js";
+import { readableName, threeDigits } from "../../lib/format.js";
 import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
 import { REWRITES } from "./event_words.js";
@@ -67,6 +67,3 @@ const meanAndSd = ({ mean, sd }) => (mean === null ? "–" : `${threeDigits(mean
 
 /** @type {(share: number | null, sign: string) => string} */
 const boundShare = (share, sign) => (share ? ` ${sign} ${Math.round(100 * share)} %` : "");
-
-/** @param {number} value */
-const threeDigits = (value) => String(Number(value.toPrecision(3))).replace("-", "−");

@@ -9,8 +9,11 @@ import { STATES } from "../../lib/state_badge.js";
 /** @typedef {[value: string, label: string][]} Choices */
 
 /** @type {Choices} */
-const STUDY_ORDERS = [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"]];
-const ORDERS = { all: STUDY_ORDERS, studies: STUDY_ORDERS, experiments: /** @type {Choices} */ ([...STUDY_ORDERS, ["strategy", "By strategy"], ["state", "By state"]]) };
+const STUDY_ORDERS = [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"], ["-name", "By name, reversed"]];
+/** @type {Choices} */
+const EXPERIMENT_ORDERS = [...STUDY_ORDERS,
+  ["strategy", "By strategy"], ["-strategy", "By strategy, reversed"], ["state", "By state"], ["-state", "By state, reversed"]];
+const ORDERS = { all: STUDY_ORDERS, studies: STUDY_ORDERS, experiments: EXPERIMENT_ORDERS };
 const NEWEST_FIRST = "-created_at";
 const TYPING_MS = 350;
 

@@ -84,6 +84,7 @@ export function merged(sources, sort) {
  */
 function comesBefore(one, other, sort) {
   if (sort === "name") return one.name < other.name;
+  if (sort === "-name") return one.name > other.name;
   const sooner = Date.parse(one.created_at) - Date.parse(other.created_at);
   return sort.startsWith("-") ? sooner > 0 : sooner < 0;
 }

@@ -96,7 +96,7 @@ function extend(page) {
 }
 
 /**
- * Return the present totals of the experiments that can be extended: `direct` may have others.
+ * Return the present totals of the experiments that can be extended: the direct baseline may have others.
  *
  * @param {Page.StudyPage} page
  * @param {"iterations" | "repetitions"} name
