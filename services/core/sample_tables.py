@@ -19,7 +19,6 @@ from gaplab.services.core.csv_tables import CsvRow, lines_of, rows_of
 from gaplab.services.core.errors import Violation
 from gaplab.services.core.measured_values import sample_violations
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.sensors import Sensors
 
 MOST_SAMPLES = 10_000
 """Most samples of a table, as of a spec."""
@@ -230,16 +229,6 @@ def _told_by_line(line: int, violation: Violation) -> CellError:
     )
 
 
-def reading_columns(sensors: Sensors) -> list[str]:
-    """Return the names of the columns of readings, by time, and within a time by sensor."""
-    return [f"{sensor}@{_time(time)}" for time in sensors.times_s for sensor in sensors.names]
-
-
-def _time(time_s: float) -> str:
-    """Return a time so exactly that its reading is found again."""
-    return f"{time_s:.12g}"
-
-
 def _unknown(line: int, heading: str, robot: Robot) -> CellError:
     nearest = get_close_matches(heading, _names(robot), n=1, cutoff=0.5)
     hint = f" (did you mean {nearest[0]!r}?)" if nearest else ""
@@ -249,12 +238,12 @@ def _unknown(line: int, heading: str, robot: Robot) -> CellError:
 
 def _names(robot: Robot) -> list[str]:
     genes = [f"gene_{place}" for place in range(robot.space.size)]
-    return [*genes, "value", "value_1", "value_2", *reading_columns(robot.sensors)]
+    return [*genes, "value", "value_1", "value_2", *robot.sensors.columns]
 
 
 def _told(robot: Robot) -> str:
     """Return the columns of a robot's table in words."""
     genes = "gene_0" if robot.space.size == 1 else f"gene_0 to gene_{robot.space.size - 1}"
     sensors = robot.sensors
-    read = f", SENSOR@TIME for {', '.join(sensors.names)} at {', '.join(map(_time, sensors.times_s))} s"
+    read = f", SENSOR@TIME for {', '.join(sensors.names)} at {', '.join(sensors.times)} s"
     return f"{genes}, value or value_1, value_2 …{read if sensors.size else ''}"

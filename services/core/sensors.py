@@ -34,6 +34,16 @@ class Sensors:
         """Return the time of each reading, `(q,)`."""
         return np.repeat(self.times_s, len(self.names))
 
+    @property
+    def times(self) -> tuple[str, ...]:
+        """Return the times as texts, so exact that a reading is found by one of them."""
+        return tuple(f"{time:.12g}" for time in self.times_s)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Return the name of each reading in tables, `(q,)`, like `roll@0.75`."""
+        return tuple(f"{name}@{time}" for time in self.times for name in self.names)
+
     def details(self) -> dict[str, Any]:
         """Return name, unit and noise of each sensor, and the times of reading, for the catalogue."""
         named = zip(self.names, self.units, self.noises.tolist(), strict=True)

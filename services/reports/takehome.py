@@ -11,7 +11,6 @@ from zipfile import ZipFile
 from gaplab.schemas.records import SampleRead
 from gaplab.services.bench import motions
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.sample_tables import reading_columns
 from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.reports.html import render_html
 from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
@@ -103,7 +102,7 @@ def samples_csv(outcome: ExperimentOutcome) -> str:
     samples = list({(each.genome, each.repeats, each.fitness): each for each in outcome.measured}.values())
     repeats = max(len(each.repeats or (0,)) for each in samples)
     sensors = outcome.robot.sensors
-    names = reading_columns(sensors) if repeats == 1 and any(each.readings for each in samples) else []
+    names = sensors.columns if repeats == 1 and any(each.readings for each in samples) else ()
     values = ["value"] if repeats == 1 else [f"value_{number}" for number in range(1, repeats + 1)]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -1,11 +1,11 @@
 """Tuned values back in the file that a robot came from; the new file is imported again and compared before."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar, cast
+from typing import Any, NoReturn, TypeAlias, TypeVar, cast
 
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot_file
@@ -131,10 +131,7 @@ def write_xml(tuning: Tuning, original: Path, output: Path, accept: Accept) -> W
     written = _write(document, Bodies(source, options, notes), open_, (robot.world, tuned))
     left_out = tuple(change for change in wanted if change.place not in written)
     if left_out and not tuning.partial:
-        form = "URDF" if source.is_urdf else "MJCF"
-        faults = {value: f"the import sets it with {option}" for value, option in given.items()}
-        reasons = [f"{each}: {faults.get(each.place[2], f'the {form} has no place for it')}" for each in left_out]
-        raise InvalidRobot([*reasons, "--partial leaves these out; robot.json has a place for all"])
+        _refuse(left_out, given, "URDF" if source.is_urdf else "MJCF")
     if output.absolute().parent != original.absolute().parent:
         document.move(original.absolute().parent, output.absolute().parent)
     lines = [*tuning.comments, *(f"not in this file: {change}" for change in left_out)]
@@ -170,6 +167,13 @@ def _given(options: ImportOptions, *, is_urdf: bool) -> dict[str, str]:
     found = options.model_dump(include=names, exclude_defaults=True)
     texts = {option: f"{option}={given}".removesuffix(".0") for option, given in found.items()}
     return {value: text for option, text in texts.items() for value in _SET_BY[option]}
+
+
+def _refuse(left_out: Sequence[Change], given: Mapping[str, str], form: str) -> NoReturn:
+    """Refuse values without a place, each with the reason."""
+    faults = {value: f"the import sets it with {option}" for value, option in given.items()}
+    reasons = [f"{each}: {faults.get(each.place[2], f'the {form} has no place for it')}" for each in left_out]
+    raise InvalidRobot([*reasons, "--partial leaves these out; robot.json has a place for all"])
 
 
 def _write(

@@ -84,9 +84,7 @@ def test_a_base_that_begins_turned_moves_in_a_trace_as_in_its_simulation(
 @pytest.mark.parametrize("changes", [{"fixed": True}, {"observed": ROBOT.world.bodies[-1].name}])
 def test_a_trace_of_a_base_is_refused_where_another_motion_counts(changes: Any) -> None:
     refuse_other_bodies(ROBOT.world)
-    with pytest.raises(
-        InvalidSpec, match="is of a base that moves, but the motion that counts"
-    ):
+    with pytest.raises(InvalidSpec, match="is of a base that moves, but the motion that counts"):
         refuse_other_bodies(replace(ROBOT.world, **changes))
 
 
