@@ -25,6 +25,7 @@ AROUND_FRAMES = 5
 
 
 LAST = -1
+"""Stands for the last iteration whose controller was measured."""
 
 
 @dataclass(frozen=True)
