@@ -27,8 +27,12 @@ def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], count: int 
     elif not differing:
         yield f"No strategy is shown to differ from another {where}; {learned[0].name} has the highest mean."
     else:
-        pairs_differ = f"{differing} of {number_of('pair', len(compared))} of strategies differ"
-        yield f"{pairs_differ} {where}; {learned[0].name} has the highest mean."
+        pairs = (
+            f"{differing} of {number_of('pair', len(compared))} of strategies"
+            if len(compared) > 1
+            else "The strategies"
+        )
+        yield f"{pairs} differ {where}; {learned[0].name} has the highest mean."
 
 
 def ranking(

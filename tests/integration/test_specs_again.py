@@ -265,7 +265,7 @@ def test_readings_that_an_earlier_version_did_not_store_are_not_compared() -> No
 
 
 def test_an_archive_of_before_gives_its_spec_too() -> None:
-    with (Path(__file__).parents[2] / "docs" / "studies" / "pybullet-in-pybullet.zip").open("rb") as source:
+    with (FOLDER / "analytic.zip").open("rb") as source:
         spec = submitted_spec(source)
 
     assert len(stored(spec)) == len(spec["strategies"])

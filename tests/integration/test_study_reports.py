@@ -24,11 +24,12 @@ from gaplab.services.reports.document import study_report
 from gaplab.services.reports.pdf import render_pdf
 from gaplab.services.running import execution
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.store.lease import Claim
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
 
-ARCHIVE = Path(__file__).parents[2] / "docs" / "studies" / "pybullet-in-pybullet.zip"
+STUDIES = Path(__file__).parents[2] / "docs" / "studies"
 EVIL = "<script>alert(1)</script>"
 
 
@@ -41,9 +42,14 @@ def api(sqlite_store: Store) -> Iterator[TestClient]:
 
 @pytest.fixture
 def study(sqlite_store: Store) -> str:
-    """A published study, with eight repetitions of each strategy and five evaluations."""
-    with ARCHIVE.open("rb") as file:
-        made = import_archive(sqlite_store, file)
+    """A published study, with eight repetitions of each strategy and three evaluations."""
+    return imported(sqlite_store, "a1-pybullet-open-fitness.zip")
+
+
+def imported(store: Store, archive: str) -> str:
+    """Import a published study; return its id."""
+    with (STUDIES / archive).open("rb") as file:
+        made = import_archive(store, file)
     assert made.study is not None
     return made.study
 
@@ -71,14 +77,18 @@ def recorded(store: Store, means: list[float], spread: float, repetitions: int =
     spec = toy(iterations=len(means) - 1, repetitions=repetitions)
     made = submission.submit_experiment(store, ExperimentSpec.model_validate(spec)).id
     for claim in execution.claim(store, "test", limit=repetitions):
-        log = list(some_log(len(means) - 1))
-        for step in log:
-            if isinstance(step, Probed):
-                offset = spread * (claim.number - repetitions / 2)
-                step = Probed(step.iteration, 0.5, means[step.iteration] + offset)
-            assert execution.record(store, claim, step, seconds=0.5)
-        assert execution.complete(store, claim)
+        record(store, claim, means, spread, repetitions)
     return made
+
+
+def record(store: Store, claim: Claim, means: list[float], spread: float, repetitions: int = 8) -> None:
+    """Complete a repetition with these recorded values."""
+    for step in some_log(len(means) - 1):
+        if isinstance(step, Probed):
+            offset = spread * (claim.number - repetitions / 2)
+            step = Probed(step.iteration, 0.5, means[step.iteration] + offset)
+        assert execution.record(store, claim, step, seconds=0.5)
+    assert execution.complete(store, claim)
 
 
 def test_the_verdict_on_a_flat_curve_says_since_when_and_advises(sqlite_store: Store, api: TestClient) -> None:
@@ -113,7 +123,7 @@ def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
     sqlite_store: Store, api: TestClient, study: str
 ) -> None:
     experiments = reading.read_study(sqlite_store, study).experiments
-    asked: Any = {"experiment": [each.id for each in experiments], "from": 5, "to": 5}
+    asked: Any = {"experiment": [each.id for each in experiments], "from": 3, "to": 3}
     pairs = api.get("/comparisons", params=asked).json()
     learned = {each.id for each in experiments if not each.direct}
     compared = [pair for pair in pairs if {pair["first"], pair["second"]} <= learned]
@@ -121,11 +131,33 @@ def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
 
     verdict = study_verdict(sqlite_store, study)
 
-    assert verdict.evaluations == 5
-    assert not differing
-    assert verdict.headline.startswith("No strategy is shown to differ from another at 5")
-    assert any("Share of the fitness of Direct" in sentence and "%" in sentence for sentence in verdict.sentences)
+    assert verdict.evaluations == 3
+    assert 0 < len(differing) < len(compared)
+    start = f"{len(differing)} of {len(compared)} pairs of strategies differ at 3 real-world evaluations"
+    assert verdict.headline.replace("\xa0", " ").startswith(start)
     assert "does not show that two strategies are equal" in verdict.rules[0]
+
+
+@pytest.mark.parametrize(
+    ("ahead", "headline"),
+    [(0.01, "No strategy is shown to differ from another at 4"), (0.3, "The strategies differ at 4")],
+)
+def test_the_verdict_on_two_strategies(sqlite_store: Store, ahead: float, headline: str) -> None:
+    spec = toy(iterations=4, repetitions=8).model_dump(mode="json", exclude_unset=True, exclude={"strategy"})
+    made = submission.submit_study(
+        sqlite_store, StudySpec.model_validate({**spec, "strategies": ["random", "known_fit"]})
+    )
+    first = made.experiments[0].id
+    for claim in execution.claim(sqlite_store, "test", limit=16):
+        record(sqlite_store, claim, [0.2, 0.5, 0.6, 0.7, 0.7 + ahead * (claim.experiment_id == first)], spread=0.02)
+
+    assert study_verdict(sqlite_store, made.id).headline.replace("\xa0", " ").startswith(headline)
+
+
+def test_the_verdict_tells_the_share_of_direct(sqlite_store: Store, study: str) -> None:
+    sentences = study_verdict(sqlite_store, study).sentences
+
+    assert any("Share of the fitness of Direct" in sentence and "%" in sentence for sentence in sentences)
 
 
 def test_only_a_margin_turns_no_significance_into_no_difference(api: TestClient, study: str) -> None:
@@ -137,7 +169,7 @@ def test_only_a_margin_turns_no_significance_into_no_difference(api: TestClient,
 
     assert "not shown to differ" in plain
     assert "No difference" not in plain
-    assert "No difference between strategies within ±100 at 5" in wide
+    assert "No difference between strategies within ±100 at 3" in wide
     assert "No difference from Direct within ±100" in wide
     assert "not shown to differ from" not in wide
     assert narrow == plain
