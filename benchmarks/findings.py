@@ -165,9 +165,8 @@ def drawn(store: Store, labels: Imported) -> bytes:
 
 
 def _difference(pair: Comparison) -> Iterator[str]:
-    test = pair.paired_t if pair.paired_t.p is not None else pair.student
     yield f"{_number(pair.difference)} ({_number(pair.lower)} to {_number(pair.upper)})"
-    yield "-" if test.p_holm is None else f"{test.p_holm:.2g}"
+    yield "-" if pair.trusted.p_holm is None else f"{pair.trusted.p_holm:.2g}"
 
 
 def table_of(title: str, columns: Sequence[str]) -> Table:

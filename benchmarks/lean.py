@@ -19,8 +19,10 @@ from benchmarks import lean_ratios
 from benchmarks.differences import Difference
 from benchmarks.findings import opened, table_of
 from benchmarks.lean_count import count_table
+from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.equivalence import SIGNIFICANT
+from gaplab.services.core.statistics import holm
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.results.curves import curves, recorded_of
@@ -32,8 +34,12 @@ SHARE = 0.03
 """Margin of equivalence, as a share of the mean fitness of the paper's `direct`."""
 
 COUNTS = (1, 3, 5)
-COLUMNS = "strategy", "after", "n", "difference", "test", "p", "shown if 0", "verdict"
-"""Of the table of differences; *shown if 0* is the probability that a true difference of 0 is shown to be within."""
+COLUMNS = "strategy", "after", "n", "difference", "test", "p", "shown if 0", "p of 0", "verdict"
+"""Of the table of differences.
+
+*Shown if 0* is the probability that a true difference of 0 is shown to be within; *p of 0* is that of the hypothesis
+that there is no difference, after Holm's correction over the strategies' rows.
+"""
 
 
 class World(NamedTuple):
@@ -110,6 +116,7 @@ def equivalence_rows(store: Store, side: Sides, margin: float) -> Iterator[tuple
     The last rows are of the mean of the differences of all strategies, which has a smaller error than each.
     """
     differences: dict[int, list[Difference]] = defaultdict(list)
+    rows: list[tuple[tuple[str, ...], Comparison]] = []
     for name in side.both:
         pair = [side.lean[name], side.paper[name]]
         known = means(store, pair)
@@ -126,12 +133,15 @@ def equivalence_rows(store: Store, side: Sides, margin: float) -> Iterator[tuple
             if count and found is not None:
                 differences[count].append(found)
             interval, p, power, _ = ("-",) * 4 if found is None else found.cells(margin)
-            sizes = f"{one.n_first}, {one.n_second}"
-            yield name, str(count), sizes, interval, one.equivalence.test, p, power, one.equivalence.verdict.value
+            rows.append(((name, str(count), one.sizes, interval, one.equivalence.test, p, power), one))
+    for (row, one), of_none in zip(rows, holm([one.trusted.p for _, one in rows]), strict=True):
+        assert one.equivalence is not None
+        yield *row, "-" if of_none is None else f"{of_none:.2g}", one.equivalence.verdict.value
     for count, each in sorted(differences.items()):
         if len(each) > 1:
-            interval, *rest = Difference.sum([(1 / len(each), one) for one in each]).cells(margin)
-            yield f"mean of {len(each)}", str(count), "", interval, "welch", *rest
+            mean = Difference.sum([(1 / len(each), one) for one in each])
+            interval, p, power, verdict = mean.cells(margin)
+            yield f"mean of {len(each)}", str(count), "", interval, "welch", p, power, f"{mean.p:.2g}", verdict
 
 
 def ranking_rows(store: Store, side: Sides) -> Iterator[tuple[str, ...]]:

@@ -45,7 +45,10 @@ class Groups(Frozen):
     n_first: int
     n_second: int
     difference: Statistic = Field(description="difference of the means")
-    effect_size: Statistic = Field(description="Cohen's d: the difference divided by the pooled standard deviation")
+    effect_size: Statistic = Field(
+        description="Cohen's d: the difference divided by the pooled standard deviation; where streams are shared, "
+        "over the repetitions that both have"
+    )
     student: Test = Field(description="Student's t-test, which the paper uses")
     welch: Test
     mann_whitney: Test
@@ -61,9 +64,9 @@ class Pooled(Groups):
 
 
 class Trusted(Frozen):
-    """The test by which a pair is judged: paired if the experiments share random streams, else Student's."""
+    """The test by which a pair is judged: paired if the experiments share random streams, else Welch's t."""
 
-    test: Literal["student", "paired_t"]
+    test: Literal["welch", "paired_t"]
     p: Statistic = Field(default=None, description="its two-sided p-value, uncorrected")
     p_holm: Statistic = Field(
         default=None, description="p-value with Holm's correction over the trusted tests of all pairs"
@@ -147,3 +150,8 @@ class Comparison(Groups, Pair):
     pooled: Pooled | None = Field(
         default=None, description="the paper's tests over the same range; null at a single number"
     )
+
+    @property
+    def sizes(self) -> str:
+        """Return how many values the difference is of: of the pairs where streams are shared, else of each group."""
+        return f"{self.n_paired}" if self.shared_streams else f"{self.n_first}, {self.n_second}"

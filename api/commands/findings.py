@@ -44,7 +44,7 @@ def _sentence(pairs: Sequence[Comparison], names: Mapping[str, str], first: int,
     differing = sorted((pair for pair in pairs if _p(pair) < SIGNIFICANT), key=_p)
     where = f"At {first if first == final else f'{first}-{final}'} real-world evaluation{'' if final == 1 else 's'}"
     mean = "" if first == final else "; the mean of each repetition"
-    tests = "paired and Student's t" if any(pair.shared_streams for pair in pairs) else "Student's t"
+    tests = "paired and Welch's t" if any(pair.shared_streams for pair in pairs) else "Welch's t"
     start = f"{where}, {len(differing)} of {len(pairs)} pairs differ (p < {SIGNIFICANT}, {tests}, Holm{mean})"
     shown = [_words(pair, names) for pair in differing[:MOST]]
     more = [f"and {len(differing) - MOST} more"] if len(differing) > MOST else []

@@ -89,7 +89,7 @@ def compare_experiments(
     """Compare every pair: tests of means, ranks and spreads, intervals, and equivalence within a margin.
 
     Each p is given twice: uncorrected, and with Holm's correction over all pairs. `trusted` is the test by which a pair
-    is judged: the paired t-test if both experiments draw the same random numbers, else Student's, which the paper uses.
+    is judged: the paired t-test if both experiments draw the same random numbers, else Welch's.
     """
     try:
         pairs = compare(

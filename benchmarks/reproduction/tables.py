@@ -177,10 +177,10 @@ def best_of(study: Study) -> list[str]:
 
 
 def _ratios(study: Study, arm: Arm, counts: Sequence[int]) -> tuple[str, ...]:
-    return (
-        f"{spoken(arm.read.name)} ({arm.repetitions})",
-        *(_mean(arm.values(count, count) / study.unit, spread=True) for count in counts),
-    )
+    each = [arm.values(count, count) / study.unit for count in counts]
+    sizes = sorted({int(np.isfinite(values).sum()) for values in each} - {0})
+    told = " to ".join(map(str, [sizes[0], sizes[-1]] if len(sizes) > 1 else sizes or [0]))
+    return f"{spoken(arm.read.name)} ({told})", *(_mean(values, spread=True) for values in each)
 
 
 def direct_in_words(study: Study) -> str:

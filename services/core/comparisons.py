@@ -6,7 +6,8 @@ numbers are not independent, so a pooled p is too small. The pooled tests stand 
 
 Random streams have the address (seed, strategy's name, repetition, …). Two experiments of one seed and one strategy
 therefore draw the same numbers in repetitions of one number, and their values may be correlated. Their pair is judged
-by the paired t-test, which is valid whatever the correlation is.
+by the paired t-test, which is valid whatever the correlation is. All other pairs are judged by Welch's t: strategies
+vary unequally and baselines have more repetitions, and then Student's p, which the paper has, is wrong.
 """
 
 from collections.abc import Sequence
@@ -136,7 +137,7 @@ def _compared(
     paired_t, wilcoxon = compare_paired(first, second) if shared else (UNDEFINED, UNDEFINED)
     groups = _groups(finite(first), finite(second))
     if shared:
-        groups["difference"] = _difference(*both(first, second))
+        groups |= {"difference": _difference(*both(first, second)), "effect_size": effect_size(*both(first, second))}
     lower, upper = difference_interval(first, second, paired=shared)
     several = over.first < over.last
     pooled = Pooled(caution=POOLED, **_groups(over.pooled(one), over.pooled(other))) if several else None
@@ -154,7 +155,7 @@ def _compared(
         improvement=improvement(first, second, paired=shared, intervals=intervals),
         shared_streams=shared,
         streams=_streams(one, other),
-        trusted=Trusted(test="paired_t" if shared else "student"),
+        trusted=Trusted(test="paired_t" if shared else "welch"),
         n_paired=len(both(first, second)[0]) if shared else 0,
         paired_t=paired_t,
         wilcoxon=wilcoxon,

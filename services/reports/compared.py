@@ -50,11 +50,11 @@ def pairs(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
     rows = tuple(
         (
             *_pair(facts, pair),
-            f"{pair.n_first}, {pair.n_second}",
+            pair.sizes,
             f"{signed(pair.difference)} ({interval(pair.lower, pair.upper)})",
             signed(pair.effect_size),
             _estimate(pair.improvement),
-            "paired t" if pair.shared_streams else "Student",
+            "paired t" if pair.shared_streams else "Welch",
             *map(probability, (pair.trusted.p, pair.trusted.p_holm)),
             MISSING if (p := p_of(pair)) is None else "yes" if p < SIGNIFICANT else "no",
             *([pair.equivalence.verdict.value] if pair.equivalence else []),

@@ -27,12 +27,12 @@ def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], count: int 
     elif not differing:
         yield f"No strategy is shown to differ from another {where}; {learned[0].name} has the highest mean."
     else:
-        pairs = (
+        told = (
             f"{differing} of {number_of('pair', len(compared))} of strategies"
             if len(compared) > 1
             else "The strategies"
         )
-        yield f"{pairs} differ {where}; {learned[0].name} has the highest mean."
+        yield f"{told} differ {where}; {learned[0].name} has the highest mean."
 
 
 def ranking(
@@ -72,7 +72,7 @@ def _within(pairs: Sequence[Comparison]) -> str:
 def _disagreements(pairs: Sequence[Comparison], names: Mapping[str, str]) -> Iterator[str]:
     """Yield the pairs on which other tests of the same kind, unpaired or paired, disagree with the trusted one."""
     for pair in pairs:
-        unpaired = {"Welch's t": pair.welch.p_holm, "Mann-Whitney": pair.mann_whitney.p_holm}
+        unpaired = {"Student's t": pair.student.p_holm, "Mann-Whitney": pair.mann_whitney.p_holm}
         tests = {"Wilcoxon": pair.wilcoxon.p_holm} if pair.shared_streams else unpaired
         other = [name for name, p in tests.items() if p is not None and (p < SIGNIFICANT) != differs(pair)]
         if other and p_of(pair) is not None:

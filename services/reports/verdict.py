@@ -13,7 +13,7 @@ from gaplab.services.reports.judged import SIGNIFICANT, Judged, judged_curves
 NOTHING = "There are no results yet."
 
 RULES = (
-    f"A pair differs if its p is below {SIGNIFICANT}: Student's t on the recorded fitness at the last number of "
+    f"A pair differs if its p is below {SIGNIFICANT}: Welch's t on the recorded fitness at the last number of "
     "real-world evaluations that the experiments share, corrected by Holm's method over all pairs. Experiments of one "
     "seed and one strategy draw the same random numbers; their test is the paired t, by repetition. A p above that "
     "does not show that two strategies are equal. Experiments that failed or were cancelled do not lower the number.",

@@ -144,7 +144,8 @@ def _names(pair: Comparison) -> list[str]:
 
 def _sizes(groups: Groups, pair: Comparison | None) -> list[str]:
     interval = _interval(pair.lower, pair.upper) if pair else ""
-    return [f"{groups.n_first}, {groups.n_second}", _signed(groups.difference) + interval, _signed(groups.effect_size)]
+    sizes = pair.sizes if pair else f"{groups.n_first}, {groups.n_second}"
+    return [sizes, _signed(groups.difference) + interval, _signed(groups.effect_size)]
 
 
 def _tests(groups: Groups, names: Iterable[str]) -> list[str]:

@@ -59,7 +59,7 @@ def test_latex_prints_names_as_they_are_and_rounds_p_as_papers_do() -> None:
         to_evaluations=5, n_first=9, n_second=9, difference=-0.25, effect_size=None, student=test,
         welch=test.model_copy(update={"p_holm": 0.0412}), mann_whitney=Test(),
         lower=-0.5, upper=0.0, improvement=estimate, shared_streams=False, streams="", n_paired=0,
-        trusted=Trusted(test="student"), paired_t=Test(),
+        trusted=Trusted(test="welch"), paired_t=Test(),
         wilcoxon=Test(), brown_forsythe=test, summary_first=summary, summary_second=summary,
         equivalence=equivalence,
     )  # fmt: skip

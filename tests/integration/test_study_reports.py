@@ -127,7 +127,7 @@ def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
     pairs = api.get("/comparisons", params=asked).json()
     learned = {each.id for each in experiments if not each.direct}
     compared = [pair for pair in pairs if {pair["first"], pair["second"]} <= learned]
-    differing = [pair for pair in compared if pair["student"]["p_holm"] < 0.05]
+    differing = [pair for pair in compared if pair["trusted"]["p_holm"] < 0.05]
 
     verdict = study_verdict(sqlite_store, study)
 

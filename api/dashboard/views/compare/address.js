@@ -8,7 +8,7 @@ export const AXES = { evaluations: "Real-world evaluations", rollouts: "Rollouts
 
 /** @type {Record<Page.Comparison["test"], { label: string, short: string }>} */
 export const TESTS = {
-  trusted: { label: "Student’s t, paired where streams are shared", short: "Trusted" },
+  trusted: { label: "Welch’s t, paired where streams are shared", short: "Trusted" },
   student: { label: "Student’s t, as in the paper", short: "Student" },
   welch: { label: "Welch’s t", short: "Welch" },
   mann_whitney: { label: "Mann–Whitney", short: "Mann–Whitney" },

@@ -33,7 +33,7 @@ export function pairsTable({ choice: { test, experiments }, cache }, results, op
   const rows = chosen.pairs.map((pair, index) => [
     label(pair), ...sorted.map(({ pairs }) => result(pairs[index], test)),
     `${signed(pair.difference)}${interval(pair.lower, pair.upper)}`, signed(pair.effect_size), estimated(pair.improvement),
-    `${pair.n_first}, ${pair.n_second}`, ...(hasMargin ? [pair.equivalence?.words ?? "–"] : []),
+    pair.shared_streams ? pair.n_paired : `${pair.n_first}, ${pair.n_second}`, ...(hasMargin ? [pair.equivalence?.words ?? "–"] : []),
     ...tests.map((name) => bothProbabilities(pair[name])), pair.streams,
   ]);
   return h("details", { open, class: "pairs every" }, h("summary", {}, EVERY), table("Pairs", columns, rows));
