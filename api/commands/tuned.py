@@ -36,7 +36,9 @@ def simulator(
     """Write the best tuned simulator as a robot file, or into the URDF or MJCF of the robot. It is compared before."""
     from gaplab.services.core import robot_library
     from gaplab.services.core.stored_specs import spec_of
+    from gaplab.services.plugins import folders
 
+    folders.find()
     with connect(url) as client:
         best, spec = client.results.best_simulator(id), spec_of(client.spec(id).resolved[0])
         if spec.robot.name == robot_library.IMPORTED:
@@ -134,4 +136,5 @@ def _lines(output: Path, best: SimulatorRead, written: "WrittenFile", distance_m
     yield from (f"  {change}" for change in written.changes)
     yield from (f"  not in the file: {change}" for change in written.left_out)
     yield from (f"  an import computes it: {change}" for change in written.computed)
-    yield f"Wrote {output}: rollouts are within {distance_m:.2g} m of the tuned simulator's."
+    what = "with the values that are not in it, rollouts are" if written.left_out else "rollouts are"
+    yield f"Wrote {output}: {what} within {distance_m:.2g} m of the tuned simulator's."

@@ -60,8 +60,8 @@ def correct(
     """
     if dry_run:
         with store.reading() as session:
-            _, request, repetition = _counted(session, id_)
-            _check(session, repetition, spec)
+            row, request, repetition = _counted(session, id_)
+            _check(session, repetition, _with_readings(spec, row))
             return Once(consequences(session, request, repetition, "correct"))
     asked = AddressedCorrection(answer=id_, **spec.model_dump())
 
@@ -98,6 +98,7 @@ def decide(store: Store, id_: str, spec: ConflictSpec, admitted: Admission) -> O
 
 def _correct(session: Session, id_: str, spec: CorrectionSpec, token: str | None) -> Consequences:
     row, request, repetition = _locked_and_counted(session, id_)
+    spec = _with_readings(spec, row)
     _check(session, repetition, spec)
     found = consequences(session, request, repetition, "correct")
     answer = MeasurementSpec(
@@ -184,6 +185,14 @@ def _refuse_unless_counted(row: AnswerRow) -> None:
             AnswerState.VOID: "it is void",
         }.get(row.state, "it is dismissed")
         raise Conflict(f"measurement {row.id} does not count: {why}")
+
+
+def _with_readings(spec: CorrectionSpec, row: AnswerRow) -> CorrectionSpec:
+    """Return a correction of the values alone with the readings of the answer, if it has as many repeats."""
+    kept = spec.readings is None and spec.values is not None and row.readings is not None
+    if not kept or len(row.readings or ()) != len(spec.values or ()):
+        return spec
+    return CorrectionSpec.model_validate({**spec.model_dump(exclude_none=True), "readings": row.readings})
 
 
 def _check(session: Session, repetition: RepetitionRow, spec: CorrectionSpec) -> None:

@@ -51,8 +51,17 @@ class Expected:
     until_s: float
 
 
-def evaluate_traces(store: Store, process: RolloutProcess, request: str, spec: TracesSpec) -> TracesRead:
+def evaluate_traces(
+    store: Store, process: RolloutProcess, request: str, spec: TracesSpec, *, answer: bool = False
+) -> TracesRead:
     """Return what traces say about the controller of a request; nothing is stored.
+
+    Args:
+        store: the store.
+        process: process that computes the expected motion.
+        request: id of the request.
+        spec: the traces.
+        answer: whether they answer the request, which takes a trace of each repeat.
 
     Raises:
         NotFound: the request does not exist.
@@ -68,7 +77,7 @@ def evaluate_traces(store: Store, process: RolloutProcess, request: str, spec: T
         resolved = spec_of(experiment.spec)
         robot = robot_of(resolved)
         refuse_other_bodies(robot.world)
-        tables = _tables(session, spec, resolved.reality.repeats)
+        tables = _tables(session, spec, resolved.reality.repeats, answer=answer)
         tuned = row.iteration - (row.kind is MeasurementKind.SAMPLE)
         simulators = replays.tuned_parameters(session, experiment.id, repetition.number, tuned)
         genome = tuple(row.genome)
@@ -85,7 +94,7 @@ def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec
     """Return what the traces of an answer say; None if it has none. Errors are those of `evaluate_traces`."""
     if spec.traces is None:
         return None
-    return evaluate_traces(store, process, request, TracesSpec(traces=spec.traces, lags_s=spec.lags_s))
+    return evaluate_traces(store, process, request, TracesSpec(traces=spec.traces, lags_s=spec.lags_s), answer=True)
 
 
 def expected_motion(wanted: Expected) -> tuple[FloatArray, FloatArray]:
@@ -115,10 +124,10 @@ def refuse_other_bodies(world: World) -> None:
         raise InvalidSpec([Violation("/traces", None, message)])
 
 
-def _tables(session: Session, spec: TracesSpec, repeats: int) -> list[tuple[str, str]]:
+def _tables(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) -> list[tuple[str, str]]:
     """Return the text and the pointer of each trace."""
     violations = []
-    if len(spec.traces) != repeats:
+    if len(spec.traces) > repeats or (answer and len(spec.traces) < repeats):
         message = f"an answer has one trace for each repeat: {repeats}, not {len(spec.traces)}"
         violations.append(Violation("/traces", f"traces: {len(spec.traces)}", message, f"exactly {repeats}"))
     if spec.lags_s is not None and len(spec.lags_s) != len(spec.traces):

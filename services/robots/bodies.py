@@ -179,7 +179,9 @@ class Bodies:
         touching = [at for at in geoms if self._shapes.collides(at)]
         shown = geoms if self._options.visuals or not touching else touching
         if len(shown) < len(geoms):
-            self._notes.lose("shapes that touch nothing are left out; --visuals keeps them: {}", self.name(head))
+            self._notes.lose(
+                "shapes that touch nothing are left out; `-s visuals=true` keeps them: {}", self.name(head)
+            )
         for geom in shown:
             body = int(model.geom_bodyid[geom])
             turn = rotation_of(self._data.xquat[body])

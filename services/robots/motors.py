@@ -41,8 +41,9 @@ def with_motors(joints: list[Joint], source: Source, options: ImportOptions, not
     if not chosen:
         notes.refuse(f"no joint is called like {options.motored!r}; joints: {listed((j.name for j in joints), 30)}")
     kind = options.motor or "position"
+    why = "in place of the file's" if source.model.nu else "as the file has none"
     notes.lose(
-        f"{'each' if len(chosen) == len(joints) else 'these'} joint gets a motor, as the file has none: {{}}", *chosen
+        f"{'each joint gets' if len(chosen) == len(joints) else 'these joints get'} a motor, {why}: {{}}", *chosen
     )
     inertias = joint_inertias(source)
     _refuse_unused(_OPTIONS[kind], kind, options, notes)
@@ -189,6 +190,9 @@ def _note_units(model: Any, at: int, name: str, factor: float, notes: Notes) -> 
             notes.lose(f"{field.removesuffix('poly')} of actuators is lost: {{}}", name)
 
 
+_ONE_LIMIT = "torque has the same limit to both sides, where {} is {:g} to {:g}: {{}}"
+
+
 def _note_ranges(model: Any, at: int, name: str, kind: str, notes: Notes) -> None:  # noqa: ANN401
     """Note the limits that a motor lacks: its targets have none, and its torque has the same to both sides."""
     for field in ("ctrlrange", "forcerange"):
@@ -198,7 +202,11 @@ def _note_ranges(model: Any, at: int, name: str, kind: str, notes: Notes) -> Non
         if field == "ctrlrange" and kind != "torque":
             notes.lose(f"targets have no limits, where {field} is {lower:g} to {upper:g}: {{}}", name)
         elif lower != -upper:
-            notes.lose(f"torque has the same limit to both sides, where {field} is {lower:g} to {upper:g}: {{}}", name)
+            notes.lose(_ONE_LIMIT.format(field, lower, upper), name)
+    joint = model.actuator_trnid[at, 0]
+    lower, upper = (float(value) for value in model.jnt_actfrcrange[joint])
+    if model.jnt_actfrclimited[joint] and lower != -upper:
+        notes.lose(_ONE_LIMIT.format("actuatorfrcrange", lower, upper), name)
 
 
 def _limit(model: Any, at: int, joint: Joint, gear: float, gain: float) -> float | None:  # noqa: ANN401

@@ -363,6 +363,11 @@ def test_readings_of_numpy_are_stored_with_null_where_a_sensor_failed(
     assert [set(row) for row in answer.readings[0]] == [set(row) for row in answer.readings[1]]
     assert (set(answer.readings[0][0]), set(answer.readings[0][1])) == ({0.25}, {None})
 
+    client.bench.correct(answer.id, [0.5, 0.26], reason="a slip")  # of the values alone
+
+    (_, corrected) = client.bench.request(task.id).answers
+    assert (corrected.values, corrected.readings) == ((0.5, 0.26), answer.readings)
+
 
 @pytest.mark.usefixtures("computing")
 def test_repeats_of_an_answer_with_a_mistake_are_not_lost(client: Client, tmp_path: Path) -> None:
@@ -420,6 +425,7 @@ def test_an_answer_may_be_computed_from_traces(client: Client, store: Store, tmp
     assert all((trace.match or 0.0) > 0.3 for trace in read.traces)
     assert read.unit == "m/s"
     assert read.readings is not None
+    assert client.bench.traces(request.id, hashes[:1]).values == read.values[:1]  # after the first run
     assert client.bench.pending(experiment.id)[0].answers == ()
     again = client.bench.traces(request.id, hashes, lags_s=[2.0, 7.5])
     assert again.values == pytest.approx(read.values, abs=0.02)

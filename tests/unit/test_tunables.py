@@ -345,7 +345,13 @@ def test_the_usual_tunables_follow_a_rule() -> None:
     assert usual_tunables(WORLD) == ("dynamic_friction", "mass(trunk)", "motor_gain", "joint_damping")
     assert usual_tunables(arm()) == ("mass(link_2)", "kp", "joint_damping", "joint_friction")
     assert usual_tunables(replace(arm(), observed="link_1"))[0] == "mass(link_1)"
-    for world in (WORLD, arm()):
+    feet = replace(
+        WORLD,
+        bodies=tuple(replace(each, surface="rubber" if each.touches else "") for each in WORLD.bodies),
+        surfaces=(("rubber", Material(1.1, 1.1)),),
+    )
+    assert usual_tunables(feet)[0] == "dynamic_friction(rubber)"
+    for world in (WORLD, arm(), feet):
         assert all(tunable_of(label).lack(world) is None for label in usual_tunables(world))
 
 

@@ -85,13 +85,13 @@ class Grouped(Tunable):
     def bounds(self, world: World) -> tuple[float, float]:
         """Return the default bounds: of numbers whose size depends on the robot, factors of their mean.
 
-        The upper bound of others is at least twice their mean.
+        The upper bound of others is at least twice the largest.
         """
         if self.relative or not (mean := self.read(world)):
             return self.lower, self.upper
         if self.from_the_mean:
             return self.scale.lower * mean, self.scale.upper * mean
-        return self.lower, max(self.upper, 2 * mean)
+        return self.lower, max(self.upper, 2 * max(self.number(member) for member in self._group(world)))
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
         """Return that the robot has nothing of this name."""
