@@ -1,6 +1,6 @@
 """`python -m docs.take_pictures`, or `make pictures`: take the pictures of docs/pictures from the page as it is now.
 
-A real service has the published studies and the toy; a real Chromium visits the views in light and dark, and
+A real service has the published studies and the toy; a real Chromium visits the views, and
 reports any error on the page. Look at the pictures before you keep them.
 """
 
@@ -54,6 +54,7 @@ class View(NamedTuple):
         width: its width.
         fields: values to enter, by label.
         press: the button to press first, if any.
+        dark: whether the picture is of the dark theme.
     """
 
     name: str
@@ -63,15 +64,16 @@ class View(NamedTuple):
     fields: tuple[tuple[str, str], ...] = ()
     press: str | None = None
     width: int = 1280
+    dark: bool = False
 
 
 VIEWS = (
     View("list", "", ".list tbody tr >> nth=3", 560),
     View("new", "new", ".panel .big", press="Quadruped, quickly"),
-    View("study", "studies/{study}", ".plot .scatterlayer .point >> nth=0"),
+    View("study", "studies/{study}", ".plot .scatterlayer .point >> nth=0", dark=True),
     View("experiment", "experiments/{experiment}", ".figure-predictions .scatterlayer .point >> nth=0", 1700),
     View("compare", "compare?experiments={all}", "table.matrix", 1130),
-    View("replay", "replay?experiment={experiment}", ".gait .main-svg >> nth=0", fields=(("Time", "2"),)),
+    View("replay", "replay?experiment={experiment}", ".gait .main-svg >> nth=0", fields=(("Time", "2"),), dark=True),
     View("bench", "bench?bench=table", ".gait, .motion, h2 >> nth=0", 844, width=390),
     View("toy", "toy?experiment={toy}&iteration=3", ".toy .main-svg >> nth=0"),
 )
@@ -144,11 +146,9 @@ def paint_robots() -> None:
     path = FOLDER / "robots-light.png"
     sheet({name: portrait(world, False, TILE_PX) for name, world in imported.items()}).save(path, optimize=True)
     print(f"Wrote {path}.")  # noqa: T201
-    for dark in (False, True):
-        theme = "dark" if dark else "light"
-        path = FOLDER / f"quadruped-{theme}.png"
-        path.write_bytes(portrait(Quadruped().world, dark, 640))
-        print(f"Wrote {path}.")  # noqa: T201
+    path = FOLDER / "quadruped-light.png"
+    path.write_bytes(portrait(Quadruped().world, False, 640))
+    print(f"Wrote {path}.")  # noqa: T201
 
 
 def sheet(pictures: dict[str, bytes]) -> Image.Image:
@@ -163,23 +163,18 @@ def sheet(pictures: dict[str, bytes]) -> Image.Image:
 
 
 def main() -> None:
-    """Take every picture in light and in dark."""
+    """Take every picture."""
     paint_robots()
     browser = Chromium()
     try:
         with prepared() as (url, ids):
             for view in VIEWS:
-                for dark in (False, True):
-                    path = FOLDER / f"{view.name}-{'dark' if dark else 'light'}.png"
-                    take(
-                        browser.visit(
-                            f"{url}/#/{view.address.format(**ids)}", dark=dark, width=view.width, height=view.height
-                        ),
-                        view,
-                        path,
-                    )
-                    browser.end()
-                    print(f"Wrote {path}.")  # noqa: T201
+                path = FOLDER / f"{view.name}-{'dark' if view.dark else 'light'}.png"
+                address = f"{url}/#/{view.address.format(**ids)}"
+                page = browser.visit(address, dark=view.dark, width=view.width, height=view.height)
+                take(page, view, path)
+                browser.end()
+                print(f"Wrote {path}.")  # noqa: T201
     finally:
         browser.close()
 
