@@ -11,7 +11,7 @@ def main() -> None:
     """Migrate; on failure, print the reason and exit with 1."""
     try:
         upgrade(Settings.from_environment().database_url)
-    except StoreUnavailable as error:
+    except (StoreUnavailable, ValueError) as error:
         sys.exit(str(error))
 
 

@@ -6,7 +6,6 @@ out; the slow hash that chosen passwords need would only add its time to every r
 
 import hmac
 import re
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from hashlib import sha256
@@ -16,7 +15,7 @@ from secrets import token_hex
 from sqlalchemy import func, select, update
 
 from gaplab.schemas.access import Role, TokenRead
-from gaplab.services.core.errors import Forbidden, NotFound, StoreUnavailable, Unauthenticated
+from gaplab.services.core.errors import Forbidden, NotFound, Unauthenticated
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import TokenRow
 from gaplab.services.store.queries.experiments import new_id
@@ -159,8 +158,7 @@ def _known(store: Store, shown: str) -> Caller:
     if token is None or not genuine or token.revoked_at is not None:
         raise Unauthenticated("this token is not valid: it is unknown here, or was revoked")
     if token.last_used_at is None or present - token.last_used_at > NOTED_EVERY:
-        with suppress(StoreUnavailable):  # the note of its use is welcome, but no reason to refuse
-            store.write(_note_use, token.id)
+        store.write_at_once(_note_use, token.id)  # the note of its use is welcome, but no reason to wait or to refuse
     return Caller(token.id, token.role)
 
 
@@ -172,6 +170,10 @@ def _insert(session: Session, name: str, role: Role, digest: str) -> TokenRead:
 
 
 def _note_use(session: Session, token_id: str) -> None:
+    """Note that the token is used now, unless another transaction holds its row in Postgres."""
+    free = select(TokenRow.id).where(TokenRow.id == token_id).with_for_update(skip_locked=True)
+    if session.scalar(free) is None:
+        return
     session.execute(update(TokenRow).where(TokenRow.id == token_id).values(last_used_at=now()))
 
 

@@ -1,7 +1,7 @@
 """Logs of every process of the service: readable lines in a terminal, JSON lines anywhere else.
 
 A record names its experiment and repetition by `extra=`. Anything that looks like a token, a password or an
-Authorization header is removed from messages and tracebacks.
+Authorization header is removed from messages and tracebacks, and so are the details of Postgres, which quote rows.
 """
 
 import json
@@ -19,12 +19,16 @@ HIDDEN = "…"
 _NAME = r"(?<![\w-])(?=[\w-]*(?:token|password|passwd|secret|api_?key))[\w-]*+"
 """A pattern that starts only at words and takes whole words: an address may be one very long word."""
 
+_AFTER_DETAIL = r"\n[ |+]*(?:\[SQL: |\(Background on this error|\n[ |+]*(?:The above exception|During handling of) )"
+"""What comes after the error of Postgres in a traceback; its details quote rows, over several lines."""
+
 _SECRETS = (
     (re.compile(r"(?i)\bgaplab_[a-z0-9]{1,32}_[0-9a-f]{8,}"), f"gaplab_{HIDDEN}"),
     (re.compile(r"(?i)(authorization\W{1,6})(?:(?:bearer|basic|token)\s+)?[^\s'\",;)}\]]+"), rf"\1{HIDDEN}"),
     (re.compile(r"(?i)\b(bearer|basic)\s+[\w.~+/=-]{6,}"), rf"\1 {HIDDEN}"),
     (re.compile(rf"(?i)({_NAME}['\"]?\s?[=:]\s?['\"]?)[^\s&'\",;)}}\]]+"), rf"\1{HIDDEN}"),
     (re.compile(r"(://[^:/@\s]*):[^/\s]*@"), rf"\1:{HIDDEN}@"),
+    (re.compile(rf"(?s)DETAIL:\s.*?(?={_AFTER_DETAIL}|\Z)"), f"DETAIL: {HIDDEN}"),
 )
 
 _PLACE = ("experiment", "repetition")

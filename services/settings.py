@@ -1,9 +1,27 @@
 """Settings of the service and limits of the API. Each process reads them from the environment once, at its start."""
 
-from typing import Annotated, Self
+import shlex
+from typing import Annotated, Any, Self
 
-from pydantic import Field, PositiveInt, ValidationError
+from pydantic import AfterValidator, Field, PositiveInt, ValidationError
 from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
+
+_ADDRESS = r"^https?://[^/\s]+\S*$"
+
+_WITHIN = {"0.0.0.0": "127.0.0.1", "": "127.0.0.1", "::": "::1"}  # noqa: S104 - nothing is bound here
+"""Loopback by the wildcard host that includes it."""
+
+
+class InvalidSetting(ValueError):
+    """An environment variable has a value that is not permitted; the message names both.
+
+    Attributes:
+        variable: its name.
+    """
+
+    def __init__(self, variable: str, reason: str) -> None:
+        self.variable = variable
+        super().__init__(f"{variable} {reason}")
 
 
 class _Environment(BaseSettings):
@@ -28,14 +46,14 @@ class _Environment(BaseSettings):
         """Return the values of the environment; an empty variable counts as not set.
 
         Raises:
-            ValueError: a value is not permitted; the message names its variable.
+            InvalidSetting: a value is not permitted; the message names its variable.
         """
         try:
             return cls(**EnvSettingsSource(cls)())
         except ValidationError as error:
             (first, *_) = error.errors()
             variable = f"{cls.model_config['env_prefix']}{first['loc'][0]}".upper()
-            raise ValueError(f"{variable} {cls._expectation(first['loc'][0], first['input'])}") from error
+            raise InvalidSetting(variable, cls._expectation(first["loc"][0], first["input"])) from error
 
     @classmethod
     def _expectation(cls, name: int | str, given: object) -> str:  # noqa: ARG003 - for subclasses
@@ -55,7 +73,7 @@ class Settings(_Environment):
         step_limit_s: seconds of work that a step may take. `GAPLAB_STEP_LIMIT_S`; a week.
         host: host that the API binds. `GAPLAB_HOST`; loopback.
         port: port that the API binds. `GAPLAB_PORT`; 8000.
-        url: address of the service, for the command. `GAPLAB_URL`; host and port.
+        url: address of the service, for the command and for links in notifications. `GAPLAB_URL`; host and port.
         token: token that the command sends to the service. `GAPLAB_TOKEN`; none.
     """
 
@@ -67,8 +85,25 @@ class Settings(_Environment):
     step_limit_s: PositiveInt = 604_800
     host: str = "127.0.0.1"
     port: PositiveInt = 8000
-    url: str = Field(default_factory=lambda given: address(given["host"], given["port"]))
+    url: str = Field(pattern=_ADDRESS, default_factory=lambda given: own_address(given["host"], given["port"]))
     token: Annotated[str | None, Field(repr=False)] = None
+
+    def bound(self, host: str | None, port: int | None) -> Self:
+        """Return the settings with another host or port, if given; the URL follows unless it was set."""
+        given: dict[str, Any] = {
+            "host": self.host if host is None else host,
+            "port": self.port if port is None else port,
+        }
+        if "url" not in self.model_fields_set:
+            given["url"] = own_address(**given)
+        return self.model_copy(update=given)
+
+    @classmethod
+    def _expectation(cls, name: int | str, given: object) -> str:
+        """Return what is wrong with a value, and what is permitted."""
+        if name == "url":
+            return f"is {given!r}; it must be an http or https address, like http://127.0.0.1:8000"
+        return super()._expectation(name, given)
 
 
 class Limits(_Environment):
@@ -88,6 +123,7 @@ class Limits(_Environment):
         streams: open event streams of all tokens in one API process.
         imported_rows: rows of one imported archive. On SQLite other writers wait some seconds for as many.
         requests: requests that one API process serves at once; fewer if it may open fewer than twice as many files.
+        unnamed_attachment_bytes: bytes of all files beside measurements that no answer names.
     """
 
     model_config = SettingsConfigDict(env_prefix="GAPLAB_MAX_")
@@ -103,6 +139,14 @@ class Limits(_Environment):
     streams: PositiveInt = 200
     imported_rows: PositiveInt = 250_000
     requests: PositiveInt = 1_000
+    unnamed_attachment_bytes: PositiveInt = 1_000_000_000
+
+
+def _command_line(text: str) -> str:
+    """Return the text, if it can be split into a program and its arguments."""
+    if not shlex.split(text):
+        raise ValueError("it names no program")
+    return text
 
 
 class Notify(_Environment):
@@ -118,14 +162,16 @@ class Notify(_Environment):
 
     model_config = SettingsConfigDict(env_prefix="GAPLAB_NOTIFY_")
 
-    url: Annotated[str | None, Field(pattern=r"^https?://[^/\s]+\S*$", repr=False)] = None
-    command: Annotated[str | None, Field(repr=False)] = None
+    url: Annotated[str | None, Field(pattern=_ADDRESS, repr=False)] = None
+    command: Annotated[Annotated[str, AfterValidator(_command_line)] | None, Field(repr=False)] = None
     secret: Annotated[str | None, Field(repr=False)] = None
     hosts: Annotated[str, Field(pattern=r"^[A-Za-z0-9.:,\[\]\s-]*$")] = ""
 
     @classmethod
     def _expectation(cls, name: int | str, given: object) -> str:
         """Return what is permitted, without the value, which may be secret."""
+        if name == "command":
+            return "is not a command line: it must name a program, and close its quotes"
         return "is not an http or https address" if name == "url" else f"is {given!r}; it must be hosts, with commas"
 
     @property
@@ -142,6 +188,11 @@ class Notify(_Environment):
 def address(host: str, port: int) -> str:
     """Return the URL of a service that binds this host and port."""
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+def own_address(host: str, port: int) -> str:
+    """Return the URL at which this machine reaches a service that binds the host, which may be a wildcard."""
+    return address(_WITHIN.get(host, host), port)
 
 
 def variable_of(limit: str) -> str:

@@ -4,7 +4,8 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from secrets import token_hex
 
 from gaplab.services import logs
@@ -27,15 +28,14 @@ RAY_NOTICES = {
 
 
 def serve(settings: Settings) -> int:
-    """Work until SIGTERM or SIGINT; return 1 if there is no cluster to work on, or the database was changed."""
+    """Work until SIGTERM or SIGINT; return 1 without a cluster or a usable database, or if the latter was changed."""
     choose_authentication(settings)
     pulse = PulsePipe.inherited()
     logs.adopt("ray")
     logs.configure()
     folders.load()
-    store = Store(settings.database_url, answer_s=_answer_s(settings.lease_s), pinned=True)
     try:
-        with in_use(store.file):
+        with _opened(settings) as store, in_use(store.file):
             _work(store, settings, pulse)
     except (ClusterUnusable, StoreUnavailable) as error:
         pulse.explain(str(error))
@@ -44,9 +44,21 @@ def serve(settings: Settings) -> int:
             sys.stderr.flush()
             os._exit(1)  # what Ray does at exit waits for a Ray that does not answer
         return 1
+    return 0
+
+
+@contextmanager
+def _opened(settings: Settings) -> Iterator[Store]:
+    """Open the database for as long as the context lasts.
+
+    Raises:
+        StoreUnavailable: the URL is not valid, or of another kind of database.
+    """
+    store = Store(settings.database_url, answer_s=_answer_s(settings.lease_s), pinned=True)
+    try:
+        yield store
     finally:
         store.dispose()
-    return 0
 
 
 def _work(store: Store, settings: Settings, pulse: PulsePipe) -> None:

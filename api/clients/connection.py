@@ -14,7 +14,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from gaplab.api.clients.bodies import json_of
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, error_of
 from gaplab.schemas.records import Page
-from gaplab.services.settings import Settings
+from gaplab.services.settings import InvalidSetting, Settings
 
 T = TypeVar("T")
 Parameter = str | int | float | Sequence[str] | None
@@ -67,7 +67,7 @@ class Connection:
         transport: httpx2.BaseTransport | None = None,
         pauses_s: Sequence[float] = PAUSES_S,
     ) -> None:
-        self.url = url = Settings.from_environment().url if url is None else url
+        self.url = url = _configured_url() if url is None else url
         self._pauses_s, self._timeout_s = pauses_s, timeout_s
         token = os.environ.get("GAPLAB_TOKEN") if token is None else token
         if token and not (token.isascii() and token.isprintable()):
@@ -184,6 +184,21 @@ class Connection:
     def _send(self, method: str, path: str, **request: Unpack[Request]) -> bytes:
         with self.stream(method, path, **request) as answer:
             return answer.read()
+
+
+def _configured_url() -> str:
+    """Return the address of the environment's settings.
+
+    Raises:
+        ServiceUnreachable: GAPLAB_URL is no address.
+        InvalidSetting: another setting is not permitted.
+    """
+    try:
+        return Settings.from_environment().url
+    except InvalidSetting as error:
+        if error.variable == "GAPLAB_URL":
+            raise ServiceUnreachable(str(error)) from error
+        raise
 
 
 def _without_scheme(url: str) -> str:

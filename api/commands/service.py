@@ -1,7 +1,7 @@
 """Commands that run the service."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -21,8 +21,7 @@ def serve(
     """Run the service: migrate the database, answer over HTTP and run queued experiments. Ctrl-C ends it."""
     from gaplab.api.process.service import serve as run
 
-    given: dict[str, Any] = {name: value for name, value in {"host": host, "port": port}.items() if value is not None}
-    run(Settings.from_environment().model_copy(update=given), workers=workers)
+    run(Settings.from_environment().bound(host, port), workers=workers)
 
 
 @app.command(rich_help_panel=RUNNING)

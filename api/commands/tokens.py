@@ -31,11 +31,11 @@ def create(
     name: Annotated[str | None, typer.Option(help="name of the user", show_default=False)] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Create a token, and print it this once: only its digest is stored."""
+    """Create a token, and print it this once: only its digest is stored. A new database gets its tables first."""
     from gaplab.api.process.service import migrate
     from gaplab.services import access
 
-    migrate(Settings.from_environment().database_url)
+    migrate(Settings.from_environment().database_url, only_new=True)  # an older service may run on an existing one
     with _store() as store:
         made = access.create_token(store, role, name)
     if as_json:

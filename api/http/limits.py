@@ -22,7 +22,7 @@ SPARE = 16
 
 ALIVE = "/livez"
 
-MOST_BYTES_OF = {"/import": 64 * 2**20, "/attachments": 20_000_000, "/robots": 2_000_000}
+MOST_BYTES_OF = {"/import": 2**30, "/attachments": 20_000_000, "/robots": 2_000_000}
 """Limits of the addresses that take more than a spec."""
 
 

@@ -111,8 +111,10 @@ class _StoreCollector(Collector):
                 family.add_metric([state.value], counts.get(state, 0))
             yield family
         yield GaugeMetricFamily("gaplab_rollouts_queued", "Rollouts still to be done", value=stored.rollouts_queued)
-        yield CounterMetricFamily("gaplab_rollouts", "Recorded rollouts", value=stored.rollouts_done)
-        yield CounterMetricFamily("gaplab_steps", "Recorded steps", value=stored.steps)
+        of_stored = "of experiments that are stored: a deletion takes its own away"
+        done, steps = f"Recorded rollouts {of_stored}", f"Recorded steps {of_stored}"
+        yield GaugeMetricFamily("gaplab_rollouts_done", done, value=stored.rollouts_done)
+        yield GaugeMetricFamily("gaplab_steps_done", steps, value=stored.steps)
         ages_s = stored.supervisor_ages_s
         yield GaugeMetricFamily("gaplab_supervisors", "Supervisors that have not ended in order", value=len(ages_s))
         if ages_s:

@@ -41,26 +41,36 @@ def listen(host: str, port: int) -> socket.socket:
         raise CommandError(f"cannot serve on {host}:{port}: {reason.lower()}") from error
 
 
-def serve_api(settings: Settings, listener: socket.socket, supervisor: SupervisorProcess | None = None) -> None:
+def serve_api(
+    settings: Settings,
+    listener: socket.socket,
+    supervisor: SupervisorProcess | None = None,
+    *,
+    limits: Limits | None = None,
+    notify: Notify | None = None,
+) -> None:
     """Serve until SIGINT or SIGTERM, then finish the requests under way.
 
     Args:
         settings: of the service.
         listener: where requests come in.
         supervisor: that this process keeps, whose troubles `/readyz` tells.
+        limits: left out: those of the environment.
+        notify: settings of notifications; left out: those of the environment.
 
     Raises:
         Unauthenticated: other machines can reach the host, and no token exists.
         StoreUnavailable: the database does not answer.
+        ValueError: a limit or a setting of notifications is not permitted.
     """
+    limits, notify = limits or Limits.from_environment(), notify or Notify.from_environment()
     exit_on_signals()
     folders.load()
     require_token(settings)
     store = Store(settings.database_url)
     try:
         with in_use(store.file):
-            notify = Notify.from_environment()
-            app = create_app(store, settings, Limits.from_environment(), notify)
+            app = create_app(store, settings, limits, notify)
             app.state.supervisor, app.state.lease_s = supervisor, settings.lease_s
             with courier(store, notify, settings.url):
                 Server(app).run([listener])

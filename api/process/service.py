@@ -4,16 +4,14 @@ The supervisor that runs them is a separate process. The two meet only in the da
 """
 
 import logging
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from gaplab.api.process.server import exit_on_signals, listen, require_token, serve_api
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.services import logs
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.plugins import folders
-from gaplab.services.settings import Settings, address
+from gaplab.services.settings import Limits, Notify, Settings, address
 from gaplab.services.store.engine import parse
 from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import file_of, is_open_to_others
@@ -32,7 +30,9 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
         CommandError: the address is invalid or taken.
         StoreUnavailable: the database cannot be migrated.
         Unauthenticated: other machines can reach the host, and no token exists.
+        ValueError: a limit or a setting of notifications is not permitted.
     """
+    limits, notify = Limits.from_environment(), Notify.from_environment()  # before anything is changed or started
     logs.configure()
     exit_on_signals()
     folders.load()
@@ -43,10 +43,10 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     url = address(settings.host, settings.port)
     log.info("gaplab serves on %s (/docs documents the API; Ctrl-C ends the service)", url)
     if not workers:
-        serve_api(settings, listener)
+        serve_api(settings, listener, limits=limits, notify=notify)
         return
     with _kept_supervisor(settings) as supervisor:
-        serve_api(settings, listener, supervisor)
+        serve_api(settings, listener, supervisor, limits=limits, notify=notify)
 
 
 @contextmanager
@@ -62,22 +62,19 @@ def _kept_supervisor(settings: Settings) -> Iterator[SupervisorProcess]:
         store.dispose()
 
 
-def migrate(database_url: str) -> None:
+def migrate(database_url: str, *, only_new: bool = False) -> None:
     """Migrate the database to the schema of this version.
+
+    Args:
+        database_url: its URL.
+        only_new: whether a database that has a schema already stays as it is.
 
     Raises:
         StoreUnavailable: the database does not answer or cannot be changed.
     """
     from gaplab.migrations import upgrade
 
-    try:
-        upgrade(database_url)
-    except StoreUnavailable:
-        raise
-    except Exception as error:  # each database driver has errors of its own
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        url = re.sub(r"(://[^:/@]*):[^@]*@", r"\1:…@", database_url)  # without the password
-        raise StoreUnavailable(f"the database {url} cannot be migrated: {reason}") from error
+    upgrade(database_url, only_new=only_new)
 
 
 def warn_of_readers(database_url: str) -> None:

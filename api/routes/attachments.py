@@ -11,6 +11,7 @@ from gaplab.api.http.dependencies import Id, Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.measurements import AttachmentRead
 from gaplab.services.bench import attachments
+from gaplab.services.settings import Limits
 
 router = APIRouter(prefix="/attachments", tags=["bench"])
 
@@ -29,7 +30,7 @@ class AttachmentQuery(Parameters):
     "",
     status_code=201,
     summary="Store an attachment",
-    responses=documented(413, 422),
+    responses=documented(413, 422, 429),
     openapi_extra={"requestBody": {"required": True, "content": _BINARY}},
 )
 async def store_attachment(
@@ -37,7 +38,9 @@ async def store_attachment(
 ) -> AttachmentRead:
     """Store a file, sent as the body, under the hash of its content; answers name it by that."""
     content, media_type = await request.body(), request.headers.get("content-type", "application/octet-stream")
-    return await run_sync(attachments.store_attachment, store, content, query.name, media_type[:100])
+    limits: Limits = request.app.state.limits
+    most = limits.unnamed_attachment_bytes
+    return await run_sync(attachments.store_attachment, store, content, query.name, media_type[:100], most)
 
 
 @router.get("/{id}", summary="Read an attachment", response_class=Response, responses={**_FILE, **documented(404)})

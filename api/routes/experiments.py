@@ -92,7 +92,7 @@ class SimulatorFilter(Paging):
     status_code=202,
     summary="Submit an experiment",
     response_description="Queued; its address is in `Location`",
-    responses={202: links.leading_to(*links.FROM_EXPERIMENT), **documented(413, 415, 422, 429)},
+    responses={202: links.leading_to(*links.FROM_EXPERIMENT), **documented(404, 413, 415, 422, 429)},
 )
 def submit_experiment(
     spec: Annotated[ExperimentSpec, Body(openapi_examples=ExperimentSpec.EXAMPLES)],

@@ -46,7 +46,7 @@ class StudyFilter(Paging):
     status_code=202,
     summary="Submit a study",
     response_description="Queued; its address is in `Location`",
-    responses={202: links.leading_to(*links.FROM_STUDY), **documented(413, 415, 422, 429)},
+    responses={202: links.leading_to(*links.FROM_STUDY), **documented(404, 413, 415, 422, 429)},
 )
 def submit_study(
     spec: Annotated[StudySpec, Body(openapi_examples=StudySpec.EXAMPLES)],

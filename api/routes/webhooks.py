@@ -29,7 +29,7 @@ def read_experiment_webhook(id: Id, store: StoreDep) -> WebhookRead:
     return webhooks.experiment_webhook(store, id)
 
 
-@_experiment.put("", summary="Set an experiment's webhook", responses=documented(404, 413, 415, 422))
+@_experiment.put("", summary="Set an experiment's webhook", responses=documented(404, 409, 413, 415, 422))
 def set_experiment_webhook(id: Id, spec: Spec, store: StoreDep, hosts: HostsDep) -> WebhookRead:
     """Send a POST to this address when the experiment has ended; `GAPLAB_NOTIFY_HOSTS` lists the permitted hosts."""
     return webhooks.set_experiment_webhook(store, id, spec, hosts)
@@ -47,7 +47,7 @@ def read_study_webhook(id: Id, store: StoreDep) -> WebhookRead:
     return webhooks.study_webhook(store, id)
 
 
-@_study.put("", summary="Set a study's webhook", responses=documented(404, 413, 415, 422))
+@_study.put("", summary="Set a study's webhook", responses=documented(404, 409, 413, 415, 422))
 def set_study_webhook(id: Id, spec: Spec, store: StoreDep, hosts: HostsDep) -> WebhookRead:
     """Send a POST to this address when all experiments of the study have ended, as `GAPLAB_NOTIFY_HOSTS` permits."""
     return webhooks.set_study_webhook(store, id, spec, hosts)

@@ -1,6 +1,6 @@
 """Saved views. Each function is one transaction, and raises StoreUnavailable while the database cannot be used."""
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import delete, func, select, update
 
 from gaplab.schemas.views import ViewRead, ViewSpec
 from gaplab.services.core.errors import InvalidSpec, LimitReached, NotFound
@@ -8,7 +8,7 @@ from gaplab.services.experiments.query import conditions
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ViewRow
 from gaplab.services.store.session import Session, snapshot, transaction
-from gaplab.services.store.statements import storable
+from gaplab.services.store.statements import insert_new, storable
 
 MOST = 200
 """Views of a service."""
@@ -42,15 +42,16 @@ def save_view(session: Session, name: str, spec: ViewSpec) -> ViewRead:
         conditions.check(spec.query, of_studies=spec.shows != "experiments")
     except InvalidSpec as error:
         raise InvalidSpec(violation.moved("q", "/query") for violation in error.violations) from error
-    row = session.get(ViewRow, name, with_for_update=True)
-    if row is None:
+    query = storable(spec.query) if spec.query else None
+    shown = {"shows": spec.shows, "query": query, "sort": spec.sort}
+    if session.get(ViewRow, storable(name)) is None:
         if session.execute(select(func.count()).select_from(ViewRow)).scalar_one() >= MOST:
             raise LimitReached(f"this service has {MOST} saved views already: delete one first")
-        row = ViewRow(name=storable(name), created_at=moment(session))
-    row.shows, row.query, row.sort = spec.shows, storable(spec.query) if spec.query else None, spec.sort
-    session.add(row)
-    session.flush()
-    return _view(row)
+        new = insert_new(session, ViewRow).values(name=storable(name), created_at=moment(session), **shown)
+        session.execute(new)  # waits for another one of this name, which is replaced like an earlier one
+    row = ViewRow
+    session.execute(update(row).where(row.name == storable(name)).values(shown))
+    return _view(_get(session, name))
 
 
 @transaction

@@ -3,6 +3,9 @@
 All functions raise StoreUnavailable while the database cannot be used.
 """
 
+from collections.abc import Callable
+from typing import TypeVar
+
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
@@ -15,8 +18,10 @@ from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts
 from gaplab.services.store.models import ExperimentRow, StudyRow
-from gaplab.services.store.queries.experiments import Extent, insert_experiment, insert_study
+from gaplab.services.store.queries.experiments import Extent, get_experiment, get_study, insert_experiment, insert_study
 from gaplab.services.store.session import Session, Store
+
+R = TypeVar("R", ExperimentRead, StudyRead)
 
 
 def submit_experiment(store: Store, spec: ExperimentSpec) -> ExperimentRead:
@@ -35,6 +40,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
         InvalidSpec: the spec is invalid; the error has every violation.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
+        NotFound: the key's experiment was deleted.
     """
     resolved = resolved_here(store, spec, resolve_experiment)
     check_extent([resolved], admitted.limits)
@@ -45,7 +51,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
         queue_for(session, [row])
         return view_experiments(session, [row])[0]
 
-    return once(store, admitted, spec, ExperimentRead, create)
+    return _unless_deleted(store, once(store, admitted, spec, ExperimentRead, create), get_experiment)
 
 
 def submit_study(store: Store, spec: StudySpec) -> StudyRead:
@@ -64,6 +70,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
         InvalidSpec: the spec is invalid; the error has every violation.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
+        NotFound: the key's study was deleted.
     """
     resolved = resolved_here(store, spec, resolve_study)
     check_extent(resolved, admitted.limits)
@@ -75,7 +82,19 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
         queue_for(session, rows)
         return view_studies(session, [study])[0]
 
-    return once(store, admitted, spec, StudyRead, create)
+    return _unless_deleted(store, once(store, admitted, spec, StudyRead, create), get_study)
+
+
+def _unless_deleted(store: Store, done: Once[R], get: Callable[[Session, str], object]) -> Once[R]:
+    """Return the answer, unless it is a stored one of what was deleted since.
+
+    Raises:
+        NotFound: it was; the message says when.
+    """
+    if done.replayed:
+        with store.reading() as session:
+            get(session, done.answer.id)
+    return done
 
 
 def _insert(

@@ -106,7 +106,9 @@ def run(command: str, message: Notification) -> Attempt:
 
     Nothing that users write is an argument of it. Its environment has no secrets of gaplab.
     """
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("GAPLAB_")}
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith("GAPLAB_") and name != "PGPASSWORD"
+    }
     environment |= {
         "GAPLAB_NOTIFICATION": message.id,
         "GAPLAB_STATE": message.state.value,

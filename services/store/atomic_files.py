@@ -1,6 +1,7 @@
 """Files that appear under their name when complete."""
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -13,6 +14,21 @@ PRIVATE = 0o600
 def private(path: str, flags: int) -> int:
     """Open a file as `open(…, opener=private)` does; if it is new, only its owner may read it."""
     return os.open(path, flags, PRIVATE)
+
+
+def hand_over(descriptor: int, like: Path) -> None:
+    """As root, give an open file to the owner of another one, or of its folder if that is absent; else do nothing.
+
+    What root creates for a service must be open to the user that runs the service.
+
+    Raises:
+        OSError: root may not do it here.
+    """
+    if sys.platform == "win32" or os.geteuid() != 0:
+        return
+    owner, now = (like if like.exists() else like.parent).stat(), os.fstat(descriptor)
+    if (owner.st_uid, owner.st_gid) != (now.st_uid, now.st_gid):
+        os.fchown(descriptor, owner.st_uid, owner.st_gid)
 
 
 @contextmanager
@@ -44,6 +60,8 @@ def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
 def replacing(file: Path, mode: int) -> Iterator[Path]:
     """Open a part file to write into; it takes the name, from another file too, when the context ends well.
 
+    As root, it belongs to the owner of the file that has the name, or of the folder.
+
     Args:
         file: its name.
         mode: permissions, restricted by the process's umask.
@@ -51,7 +69,7 @@ def replacing(file: Path, mode: int) -> Iterator[Path]:
     Raises:
         OSError: it cannot be written.
     """
-    part = _part_of(file, mode)
+    part = _part_of(file, mode, like=file)
     try:
         yield part
         _sync(part)
@@ -61,9 +79,17 @@ def replacing(file: Path, mode: int) -> Iterator[Path]:
     _sync(file.parent)
 
 
-def _part_of(file: Path, mode: int) -> Path:
+def _part_of(file: Path, mode: int, *, like: Path | None = None) -> Path:
     part = file.with_name(f"{file.name}.{token_hex(4)}.part")
-    os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+    descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode)
+    try:
+        if like:
+            hand_over(descriptor, like)
+    except OSError:
+        part.unlink()
+        raise
+    finally:
+        os.close(descriptor)
     return part
 
 

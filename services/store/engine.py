@@ -13,8 +13,14 @@ from gaplab.services.store.postgres import postgres_engine
 WRITES = "gaplab_writes"
 """Execution option of a connection whose transactions will write."""
 
+HASTENS = "gaplab_hastens"
+"""Execution option of a connection whose transactions fail rather than wait for another's lock, in SQLite."""
+
 PATIENCE_S = 30
 """Longest wait of a transaction for another's lock, in SQLite."""
+
+_INVALID = "the database URL is not valid; write one like sqlite:///gaplab.db or postgresql://user@host/db"
+_ENCODED = "in a user or a password write @ as %40, : as %3A, / as %2F and % as %25, or set PGPASSWORD instead"
 
 _WAL_IS_SOUND = (3, 51, 3)
 """Before this, SQLite's write-ahead log can be corrupted when it is reset. Source: https://sqlite.org/wal.html.
@@ -40,6 +46,8 @@ def open_engine(url: str, *, enforce_foreign_keys: bool = True, answer_s: float 
     parsed = parse(url)
     if parsed.get_backend_name() == "postgresql":
         return postgres_engine(parsed, answer_s=answer_s)
+    if file := sqlite_file.file_of(parsed):  # a link that leads elsewhere later does not lead connections there
+        parsed = parsed.set(database=str(file))
     engine = create_engine(parsed, pool_pre_ping=True, connect_args={"timeout": PATIENCE_S}, hide_parameters=True)
     _prepare_sqlite(engine, enforce_foreign_keys=enforce_foreign_keys)
     return engine
@@ -49,13 +57,16 @@ def parse(url: str) -> URL:
     """Return a database URL with its driver.
 
     Raises:
-        StoreUnavailable: it is no URL, or of another kind of database.
+        StoreUnavailable: it is no URL, or of another kind of database; the message has no part of a password.
     """
     try:
         parsed = make_url(url)
     except ArgumentError as error:
-        msg = "the database URL is not valid; write one like sqlite:///gaplab.db or postgresql://user@host/db"
-        raise StoreUnavailable(msg) from error
+        raise StoreUnavailable(_INVALID) from error
+    except ValueError:  # whose message has a part of the URL, maybe of its password
+        raise StoreUnavailable(f"{_INVALID}; {_ENCODED}") from None
+    if "@" in (parsed.host or ""):
+        raise StoreUnavailable(f"the host in the database URL has an '@'; {_ENCODED}")
     if parsed.drivername in {"postgres", "postgresql"}:
         return parsed.set(drivername="postgresql+psycopg")
     if parsed.get_backend_name() not in {"sqlite", "postgresql"}:
@@ -85,5 +96,7 @@ def _prepare_sqlite(engine: Engine, *, enforce_foreign_keys: bool) -> None:
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
-        writes = connection.get_execution_options().get(WRITES)
-        connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+        options = connection.get_execution_options()
+        patience_ms = 0 if options.get(HASTENS) else PATIENCE_S * 1_000
+        connection.connection.cursor().execute(f"PRAGMA busy_timeout={patience_ms}")
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if options.get(WRITES) else "BEGIN")

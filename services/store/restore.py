@@ -8,14 +8,22 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from sqlalchemy import URL
+
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.store.atomic_files import PRIVATE, replacing
 from gaplab.services.store.backup import copy_checked
 from gaplab.services.store.engine import parse
 from gaplab.services.store.models import REVISION
+from gaplab.services.store.revisions import is_later
 from gaplab.services.store.sqlite_file import COMPANIONS, file_of, unused
 
-PG_RESTORE = 'pg_restore --clean --if-exists --dbname="postgresql:${{GAPLAB_DATABASE_URL#*:}}" {file}'
+PG_RESTORE = (
+    "dropdb {server}{database} && createdb {server}--owner={owner} {database} && "
+    "pg_restore --single-transaction --exit-on-error --no-owner "
+    '--dbname="postgresql:${{GAPLAB_DATABASE_URL#*:}}" {file}'
+)
+"""A new, empty database, and all of the dump in it or nothing: `--clean` keeps tables that the dump does not know."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +69,8 @@ def _place(url: str, source: Path) -> Path:
     parsed = parse(url)
     if parsed.get_backend_name() != "sqlite":
         msg = (
-            f"a Postgres database is restored by Postgres' own tool: {PG_RESTORE.format(file=shlex.quote(str(source)))}"
+            "a Postgres database is restored by Postgres' own tools, once every service on it has ended; "
+            f"dropdb and createdb are for the server's administrator: {_postgres_line(parsed, source)}"
         )
         raise Unsupported(msg)
     if (file := file_of(parsed)) is None:
@@ -71,6 +80,19 @@ def _place(url: str, source: Path) -> Path:
     if file.exists() and file.samefile(source):
         raise StoreUnavailable(f"{source} is the database itself, not a backup of it")
     return file
+
+
+def _postgres_line(url: URL, source: Path) -> str:
+    """Return the command line that restores a dump, without the password."""
+    given = {"host": url.host or url.query.get("host"), "port": url.port or url.query.get("port")}
+    server = "".join(f"--{name}={shlex.quote(str(value))} " for name, value in given.items() if value)
+    owner = url.username or "gaplab"
+    return PG_RESTORE.format(
+        server=server,
+        owner=shlex.quote(owner),
+        database=shlex.quote(url.database or owner),
+        file=shlex.quote(str(source)),
+    )
 
 
 def _copy(source: Path, part: Path) -> None:
@@ -88,11 +110,13 @@ def _check(source: Path, copy: Path) -> str:
     """Return the revision of the copy's schema, if it is a whole database of gaplab."""
     with closing(sqlite3.connect(copy)) as connection:
         try:
-            (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone() or ("none",)
+            (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone() or (None,)
             connection.execute("SELECT 1 FROM experiment, repetition LIMIT 1")
         except sqlite3.OperationalError as error:
             raise StoreUnavailable(f"{source} is no database of gaplab: {error}") from error
-        if revision > REVISION:
+        if revision is None:
+            raise StoreUnavailable(f"{source} is no database of gaplab: its schema has no revision")
+        if is_later([revision]):
             msg = f"{source} is of a later version of gaplab: its revision is {revision}, this version knows {REVISION}"
             raise StoreUnavailable(msg)
         if broken := connection.execute("PRAGMA foreign_key_check").fetchone():

@@ -15,10 +15,11 @@ from sqlalchemy.orm import sessionmaker
 from gaplab.services.core import robot_library
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
 from gaplab.services.store import database_errors
-from gaplab.services.store.engine import WRITES, open_engine
+from gaplab.services.store.engine import HASTENS, WRITES, open_engine
 from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION, Base
 from gaplab.services.store.queries import events, robots
+from gaplab.services.store.revisions import other_schema
 from gaplab.services.store.sqlite_file import create, file_of
 
 P = ParamSpec("P")
@@ -55,6 +56,7 @@ class Store:
         snapshot = {"isolation_level": "REPEATABLE READ"} if self._engine.name == "postgresql" else {}
         self._writer = sessionmaker(self._engine.execution_options(**{WRITES: True}), expire_on_commit=False)
         event.listen(self._writer, "before_commit", events.write)
+        self._hasty = self._engine.execution_options(**{WRITES: True, HASTENS: True})
         self._reader = sessionmaker(self._engine.execution_options(**snapshot), expire_on_commit=False)
         robot_library.add_source(self)
 
@@ -99,6 +101,22 @@ class Store:
             with self._writer.begin() as session:
                 return work(session, *args, **kwargs)
 
+    def write_at_once(
+        self, work: Callable[Concatenate[Session, P], object], /, *args: P.args, **kwargs: P.kwargs
+    ) -> bool:
+        """Run `work(session, *args, **kwargs)` in a separate transaction, unless that would wait for another in SQLite.
+
+        Returns:
+            Whether it was run and committed; a database that cannot be used now is no error.
+        """
+        try:
+            self._guard.admit()
+            with database_errors.named(), self._writer(bind=self._hasty) as session, session.begin():
+                work(session, *args, **kwargs)
+        except StoreUnavailable:
+            return False
+        return True
+
     def robot_text(self, sha256: str) -> str | None:
         """Return the text of a robot file; None if it is not stored here, or the database cannot be used now."""
         try:
@@ -117,10 +135,7 @@ class Store:
         with self.reading() as session:
             revisions = session.scalars(text("SELECT version_num FROM alembic_version")).all()
         if list(revisions) != [REVISION]:
-            found = ", ".join(revisions) or "none"
-            later = all(revision > REVISION for revision in revisions) and revisions
-            what = "use the version of gaplab that it is of" if later else "run `python -m migrations`"
-            self._guard.change(f"the database is at revision {found}, this version needs {REVISION}: {what}")
+            self._guard.change(other_schema(revisions))
 
     @contextmanager
     def _named(self) -> Iterator[None]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from sqlalchemy import URL
 
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
-from gaplab.services.store.atomic_files import PRIVATE
+from gaplab.services.store.atomic_files import PRIVATE, hand_over
 
 try:
     import fcntl
@@ -26,11 +26,14 @@ COMPANIONS = ("-journal", "-wal", "-shm")
 
 
 def file_of(url: URL) -> Path | None:
-    """Return the file of a SQLite URL; None for Postgres, and for a database in memory."""
+    """Return the file of a SQLite URL, at the end of symbolic links; None for Postgres, and for a database in memory.
+
+    Its lock, its journals and what a restore replaces are beside this file, whichever link leads to it.
+    """
     name = url.database or ""
     if url.get_backend_name() != "sqlite" or name in {"", ":memory:"} or name.startswith("file:"):
         return None
-    return Path(name)
+    return Path(os.path.realpath(name))
 
 
 def identity(file: Path) -> tuple[int, int] | None:
@@ -43,9 +46,13 @@ def identity(file: Path) -> tuple[int, int] | None:
 
 
 def create(file: Path) -> None:
-    """Create an absent file for its owner alone; SQLite gives its companions the same permissions."""
+    """Create an absent file for its owner alone; SQLite gives its companions the same owner and permissions."""
     with suppress(OSError):  # SQLite says what is wrong
-        os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, PRIVATE))
+        descriptor = os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, PRIVATE)
+        try:
+            hand_over(descriptor, file.parent)
+        finally:
+            os.close(descriptor)
 
 
 def is_damage(error: BaseException | None) -> bool:
@@ -83,7 +90,7 @@ def in_use(file: Path | None) -> Iterator[None]:
     """Mark the database as used by a service for as long as the context lasts, so that no restore replaces it.
 
     Raises:
-        StoreUnavailable: a restore replaces it right now.
+        StoreUnavailable: a restore replaces it right now, or its lock cannot be opened.
     """
     with _locked(file, exclusive=False) as held:
         if not held:
@@ -96,7 +103,7 @@ def unused(file: Path) -> Iterator[None]:
     """Keep services from the database for as long as the context lasts.
 
     Raises:
-        StoreUnavailable: a service runs on it.
+        StoreUnavailable: a service runs on it, or its lock cannot be opened.
     """
     with _locked(file, exclusive=True) as held:
         if not held:
@@ -126,9 +133,39 @@ def _locked(file: Path | None, *, exclusive: bool) -> Iterator[bool]:
 
 
 def _lock_file(file: Path | None) -> int | None:
-    """Return the open lock file of a database; None where there can be none, as in a folder that is read only."""
+    """Return the open lock file of a database; None where there can be none, as in a folder that is read only.
+
+    Raises:
+        StoreUnavailable: there is one, and this user may not open it.
+    """
     if file is None or fcntl is None:
         return None
-    with suppress(OSError):
-        return os.open(file.with_name(f"{file.name}.lock"), os.O_CREAT | os.O_RDWR, PRIVATE)
+    lock = file.with_name(f"{file.name}.lock")
+    try:
+        return _open_lock(lock, file)
+    except PermissionError as error:
+        if os.path.exists(lock):
+            raise StoreUnavailable(_closed(lock, file)) from error
+    except OSError:
+        pass
     return None
+
+
+def _open_lock(lock: Path, file: Path) -> int:
+    """Open the lock file; a new one belongs to the owner of the database."""
+    try:
+        descriptor = os.open(lock, os.O_CREAT | os.O_EXCL | os.O_RDWR, PRIVATE)
+    except FileExistsError:
+        return os.open(lock, os.O_RDWR)
+    with suppress(OSError):
+        hand_over(descriptor, file)
+    return descriptor
+
+
+def _closed(lock: Path, file: Path) -> str:
+    """Return the sentence about a lock that another user created."""
+    owner = (file if file.exists() else file.parent).stat()
+    return (
+        f"this user may not open {lock}, the lock of the database: "
+        f"`sudo chown {owner.st_uid}:{owner.st_gid} {lock}` gives it to the owner of the database"
+    )

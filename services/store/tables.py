@@ -6,7 +6,7 @@ from enum import StrEnum
 from functools import cache
 from typing import Any, get_args, get_type_hints
 
-from sqlalchemy import JSON, BigInteger, Boolean, Integer, String
+from sqlalchemy import JSON, BigInteger, Boolean, Integer, LargeBinary, String
 from sqlalchemy import Column as TableColumn
 
 from gaplab.services.store.clock import UtcDateTime
@@ -27,6 +27,7 @@ class Kind(StrEnum):
     VECTOR = "vector"
     READINGS = "readings"
     NESTED = "nested"
+    BINARY = "binary"
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,7 @@ def _kind(column: TableColumn[Any]) -> Kind:
         Number: Kind.REAL,
         String: Kind.TEXT,
         Reason: Kind.TEXT,
+        LargeBinary: Kind.BINARY,
         JSON: _kind_of_json(column),
     }
     return next(kind for type_, kind in kinds.items() if isinstance(column.type, type_))

@@ -3,12 +3,17 @@
 import logging
 import re
 import sys
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
+from alembic import command as alembic
 from fastapi.testclient import TestClient
+from sqlalchemy import select, update
 
+from gaplab import migrations
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError
@@ -18,6 +23,8 @@ from gaplab.services import access
 from gaplab.services.access import authenticate, create_token, is_loopback
 from gaplab.services.core.errors import Forbidden, NotFound, Unauthenticated
 from gaplab.services.settings import Settings
+from gaplab.services.store.engine import PATIENCE_S, WRITES, open_engine
+from gaplab.services.store.models import TokenRow
 from gaplab.services.store.session import Store
 
 TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 1}
@@ -157,6 +164,49 @@ def test_a_secret_is_stored_nowhere_and_a_use_is_noted(store: Store) -> None:
     assert made.secret.rpartition("_")[2] not in str(rows)
 
 
+def test_a_request_does_not_wait_until_its_use_can_be_noted(store: Store) -> None:
+    made = create_token(store, Role.READER)
+
+    with store.transaction() as session:
+        session.execute(update(TokenRow).values(name="held"))
+        began = time.monotonic()
+        caller = authenticate(store, made.secret, required=True)
+        waited_s = time.monotonic() - began
+    held = access.list_tokens(store)[0]
+    authenticate(store, made.secret, required=True)
+
+    assert (caller.token, held.name, held.last_used_at) == (made.token.id, "held", None)
+    assert waited_s < PATIENCE_S / 2
+    assert access.list_tokens(store)[0].last_used_at is not None
+    assert store.errors == 0
+
+
+def test_a_request_does_not_wait_for_those_who_read_a_database(sqlite_store: Store) -> None:
+    made = create_token(sqlite_store, Role.READER)
+
+    with sqlite_store.reading() as session:
+        session.execute(select(TokenRow)).all()
+        began = time.monotonic()
+        authenticate(sqlite_store, made.secret, required=True)
+        waited_s = time.monotonic() - began
+
+    assert waited_s < PATIENCE_S / 2
+
+
+def test_others_wait_as_long_as_before_after_a_use_was_noted_at_once(sqlite_store: Store) -> None:
+    made = create_token(sqlite_store, Role.READER)
+    authenticate(sqlite_store, made.secret, required=True)
+
+    with ThreadPoolExecutor(1) as pool:
+        with sqlite_store.transaction() as session:
+            session.execute(update(TokenRow).values(name="held"))
+            second = pool.submit(create_token, sqlite_store, Role.READER)
+            time.sleep(0.5)
+        second.result()
+
+    assert len(access.list_tokens(sqlite_store)) == 2
+
+
 def test_secrets_have_256_bits_and_differ(sqlite_store: Store) -> None:
     secrets = {create_token(sqlite_store, Role.READER).secret.rpartition("_")[2] for _ in range(20)}
 
@@ -262,6 +312,25 @@ def test_the_command_makes_lists_and_revokes_tokens_in_the_database_itself(
     assert len(re.findall(r"\d{4}-\d\d-\d\d", after)) == 3
     with pytest.raises(Unauthenticated):
         authenticate(sqlite_store, secret.strip(), required=True)
+
+
+def test_a_token_is_refused_where_it_would_migrate_a_database_that_a_service_may_use(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    url = f"sqlite:///{tmp_path / 'old.db'}"
+    engine = open_engine(url, enforce_foreign_keys=False)
+    with engine.execution_options(**{WRITES: True}).begin() as connection:
+        alembic.upgrade(migrations.configuration(connection), "0013")
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", url)
+
+    code, secret, said = command(monkeypatch, capsys, "token", "create", "--role", "admin")
+
+    with engine.connect() as connection:
+        found = connection.exec_driver_sql("SELECT version_num FROM alembic_version").scalars().all()
+    engine.dispose()
+    assert (code, secret, found) == (1, "", ["0013"])
+    assert "at revision 0013" in said
+    assert "run `python -m migrations`" in said
 
 
 def test_a_first_token_can_be_made_before_the_database_was_ever_used(

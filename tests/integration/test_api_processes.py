@@ -3,8 +3,10 @@
 import json
 import os
 import re
+import shlex
 import signal
 import socket
+import sqlite3
 import subprocess
 import sys
 import time
@@ -45,6 +47,17 @@ def serve(environment: dict[str, str], *arguments: str) -> "subprocess.Popen[str
     )
 
 
+def ended(environment: dict[str, str], *arguments: str) -> tuple[int, str]:
+    """Return the exit code and the output of a service that does not start; one that does is ended, and fails."""
+    process = serve(environment, *arguments)
+    try:
+        said, _ = process.communicate(timeout=60)
+    finally:
+        process.terminate()
+        process.wait(60)
+    return process.returncode, said
+
+
 @pytest.fixture
 def port() -> int:
     with socket.socket() as probe:
@@ -68,6 +81,86 @@ def test_a_service_migrates_its_database_answers_and_ends_in_order(
     assert json.loads(said)["message"].startswith(f"gaplab serves on http://127.0.0.1:{port}")
     assert said.count("\n") == 1
     assert (tmp_path / "new.db").stat().st_size > 0
+
+
+def test_links_of_notifications_have_the_port_of_the_command(
+    tmp_path: Path, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("GAPLAB_URL", raising=False)
+    told = tmp_path / "told"
+    environment = {
+        "GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'new.db'}",
+        "GAPLAB_NOTIFY_COMMAND": shlex.join(["sh", "-c", f"cat > {told}.part && mv {told}.part {told}"]),
+    }
+    process = serve(environment, "--no-workers", "--port", str(port))
+    try:
+        with Client(f"http://127.0.0.1:{port}") as client:
+            wait_until(client.ready)
+            wait_until(lambda: seen(tmp_path / "new.db"))
+            spec = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 1}
+            made = client.submit(spec).id
+            client.cancel(made)
+            wait_until(told.exists)
+    finally:
+        process.terminate()
+        process.communicate(timeout=60)
+
+    assert json.loads(told.read_text())["url"] == f"http://127.0.0.1:{port}/#/experiments/{made}"
+
+
+def seen(file: Path) -> bool:
+    """Return whether notifications are on: what ended before is not told."""
+    connection = sqlite3.connect(file, timeout=30)
+    found = connection.execute("SELECT after FROM notifier").fetchone()
+    connection.close()
+    return found is not None and found[0] is not None
+
+
+@pytest.mark.parametrize(
+    ("variable", "value"),
+    [("GAPLAB_MAX_STREAMS", "many"), ("GAPLAB_NOTIFY_COMMAND", '"unclosed'), ("GAPLAB_NOTIFY_URL", "ftp://x")],
+)
+def test_a_setting_that_is_none_ends_the_start_before_the_database_is_touched(
+    tmp_path: Path, port: int, variable: str, value: str
+) -> None:
+    environment = {"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'new.db'}", variable: value}
+
+    code, said = ended(environment, "--port", str(port))
+
+    assert code == 1
+    assert re.fullmatch(rf"gaplab: {variable} is [^\n]+\n", said)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_service_on_a_database_of_a_later_version_says_what_to_do(
+    sqlite_url: str, sqlite_store: Store, port: int
+) -> None:
+    with sqlite_store.transaction() as session:
+        session.connection().exec_driver_sql("UPDATE alembic_version SET version_num = '0099'")
+
+    code, said = ended({"GAPLAB_DATABASE_URL": sqlite_url}, "--port", str(port))
+
+    assert code == 1
+    assert "the database is at revision 0099" in said
+    assert "use the version of gaplab that it is of" in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("url", ["foo", "mysql://me:secret@127.0.0.1/x"])
+@pytest.mark.parametrize("command", ["serve", "check"])
+def test_a_supervisor_on_no_database_of_a_known_kind_ends_with_a_sentence(url: str, command: str) -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "gaplab.workers", command],
+        env=os.environ | {"GAPLAB_DATABASE_URL": url},
+        capture_output=True,
+        text=True,
+        timeout=180,
+        check=False,
+    )
+
+    assert run.returncode == 1
+    assert re.fullmatch(r"the database [^\n]+\n", run.stderr)
+    assert "secret" not in run.stderr
 
 
 @pytest.mark.parametrize("module", ["gaplab", "gaplab.api"])

@@ -89,6 +89,33 @@ def test_only_the_owner_may_read_a_copy_and_nothing_else_is_left(sqlite_url: str
     assert [each.name for each in tmp_path.iterdir()] == ["copy.db"]
 
 
+def with_space_left(url: str) -> Path:
+    """Store two megabytes in a database, delete them, and return its file: it stays large."""
+    file = Path(url.removeprefix("sqlite:///"))
+    with sqlite3.connect(file) as connection:
+        connection.execute("CREATE TABLE large AS SELECT randomblob(2000000) AS content")
+    with connection:
+        connection.execute("DROP TABLE large")
+    connection.close()
+    return file
+
+
+def test_a_copy_lacks_the_space_that_deletion_left(sqlite_url: str, tmp_path: Path) -> None:
+    store = Store(sqlite_url)
+    submission.submit_experiment(store, toy())
+    file = with_space_left(sqlite_url)
+
+    size = backup(sqlite_url, tmp_path / "copy.db")
+
+    copy = Store(f"sqlite:///{tmp_path / 'copy.db'}")
+    copy.check()
+    assert file.stat().st_size > 2_000_000 > 2 * size
+    assert listing.list_experiments(copy) == listing.list_experiments(store)
+    assert (tmp_path / "copy.db").stat().st_mode & 0o777 == 0o600
+    copy.dispose()
+    store.dispose()
+
+
 def test_a_file_that_is_there_stays_as_it_is(sqlite_url: str, tmp_path: Path) -> None:
     file = tmp_path / "precious.db"
     file.write_text("precious")

@@ -158,3 +158,23 @@ def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: 
         made = client.submit(TOY)
 
     assert [each.id for each in listing.list_experiments(sqlite_store).items] == [made.id]
+
+
+@pytest.mark.parametrize(("path", "body"), [("/experiments", TOY), ("/studies", STUDY)])
+def test_a_repeated_submission_of_what_was_deleted_is_told_so(
+    api: TestClient, path: str, body: dict[str, object]
+) -> None:
+    key = {"Idempotency-Key": "k"}
+    made = api.post(path, json=body, headers=key)
+    address = made.headers["location"]
+    api.post(f"{address}/cancel")
+    archive = api.get(f"{address}/export").content
+    assert api.delete(address).status_code == 200
+
+    again, read = api.post(path, json=body, headers=key), api.get(address)
+    api.post("/import", content=archive)
+    back = api.post(path, json=body, headers=key)
+
+    assert (again.status_code, again.json()) == (404, read.json())
+    assert "was deleted at" in again.json()["detail"]
+    assert (back.status_code, back.json()["id"]) == (202, made.json()["id"])

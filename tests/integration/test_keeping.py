@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from inspect import unwrap
 from io import BytesIO
+from time import sleep
 from typing import Any
 
 import pytest
@@ -17,18 +18,20 @@ from gaplab.schemas.keeping import DeletionRead
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
+from gaplab.schemas.views import ViewSpec
 from gaplab.services import access, events
 from gaplab.services.archives import export_experiment, export_study, import_archive
 from gaplab.services.archives.writing import Archive
 from gaplab.services.core.errors import Conflict, Forbidden, NotFound
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import archiving, deletion, lifecycle, reading, submission
+from gaplab.services.experiments import archiving, deletion, lifecycle, reading, saved_views, submission
 from gaplab.services.experiments.deletion import Deleter
 from gaplab.services.experiments.extension import extend_experiment
 from gaplab.services.experiments.notes import render
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Failure
-from gaplab.services.store.models import Base, RepetitionRow
+from gaplab.services.store.clock import moment
+from gaplab.services.store.models import Base, RepetitionRow, ViewRow
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, some_log, toy
 
@@ -314,6 +317,19 @@ def test_what_an_open_service_stored_only_an_admin_deletes_once_there_are_tokens
     with pytest.raises(Forbidden):
         deletion.delete_experiment(sqlite_store, made.id, Deleter("a token"))
     deletion.delete_experiment(sqlite_store, made.id, Deleter("an admin's", may_delete_all=True))
+
+
+def test_a_view_that_two_save_at_the_same_time_is_that_of_the_second(store: Store) -> None:
+    with ThreadPoolExecutor(1) as pool:
+        with store.transaction() as session:
+            session.add(ViewRow(name="mine", shows="all", sort="name", created_at=moment(session)))
+            session.flush()
+            second = pool.submit(saved_views.save_view, store, "mine", ViewSpec(query="strategy = random"))
+            sleep(1.0)  # until it waits for this one
+        saved = second.result()
+
+    assert saved.query == "strategy = random"
+    assert saved_views.list_views(store) == (saved,)
 
 
 def test_saved_views_are_shared_replaced_and_deleted(api: TestClient) -> None:

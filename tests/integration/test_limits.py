@@ -1,10 +1,12 @@
 """Limits: beyond each there is a problem that names it, and what is within is let in."""
 
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
+from sqlalchemy import update
 
 from gaplab.api.app import create_app
 from gaplab.api.http.limits import Streams
@@ -14,6 +16,8 @@ from gaplab.services.core.errors import LimitReached
 from gaplab.services.experiments import reading
 from gaplab.services.running import execution
 from gaplab.services.settings import Limits, Settings, variable_of
+from gaplab.services.store.models import AttachmentRow
+from gaplab.services.store.queries.attachments import UNNAMED_LIVE
 from gaplab.services.store.session import Store
 from tests.experiments import run
 
@@ -195,6 +199,31 @@ def test_the_service_is_looked_for_where_it_binds(monkeypatch: pytest.MonkeyPatc
     assert Settings.from_environment().url == url
 
 
+@pytest.mark.parametrize(
+    ("host", "url"), [("0.0.0.0", "http://127.0.0.1:8600"), ("::", "http://[::1]:8600"), ("lab", "http://lab:8600")]
+)
+def test_the_address_of_the_service_follows_host_and_port_unless_it_is_set(
+    monkeypatch: pytest.MonkeyPatch, host: str, url: str
+) -> None:
+    monkeypatch.delenv("GAPLAB_URL", raising=False)
+
+    followed = Settings.from_environment().bound(host, 8600)
+    monkeypatch.setenv("GAPLAB_URL", "https://gaplab.example.org")
+    given = Settings.from_environment().bound(host, 8600)
+
+    assert (followed.host, followed.port, followed.url) == (host, 8600, url)
+    assert (given.host, given.port, given.url) == (host, 8600, "https://gaplab.example.org")
+    assert Settings().bound(None, None) == Settings()
+
+
+@pytest.mark.parametrize("address", ["nonsense", "ftp://127.0.0.1", "gaplab.example.org:8000", "http://"])
+def test_an_address_without_http_is_refused(monkeypatch: pytest.MonkeyPatch, address: str) -> None:
+    monkeypatch.setenv("GAPLAB_URL", address)
+
+    with pytest.raises(ValueError, match=f"GAPLAB_URL is '{address}'; it must be an http or https address"):
+        Settings.from_environment()
+
+
 def test_a_number_that_is_none_is_said_with_its_variable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GAPLAB_PORT", "8²")
 
@@ -213,3 +242,29 @@ def test_the_papers_whole_figure_is_let_in(sqlite_store: Store) -> None:
     answer = served(sqlite_store).post("/studies", json={"direct_repetitions": 100})
 
     assert answer.status_code == 202
+
+
+def test_files_that_no_answer_names_have_a_limit_that_frees_itself(store: Store) -> None:
+    api = TestClient(create_app(store, limits=Limits(unnamed_attachment_bytes=10)))
+
+    first, refused, again = (
+        api.post("/attachments?name=a", content=each) for each in (b"1234567", b"1234", b"1234567")
+    )
+    old = update(AttachmentRow).values(created_at=datetime.now(UTC) - UNNAMED_LIVE - timedelta(minutes=1))
+    store.write(lambda session: session.execute(old))
+    let_in = api.post("/attachments?name=a", content=b"1234")
+
+    assert [each.status_code for each in (first, refused, again, let_in)] == [201, 429, 201, 201]
+    assert refused.json()["type"] == "urn:gaplab:problem:limit-reached"
+    assert "11 bytes" in refused.json()["detail"]
+    assert "at most 10 are permitted (GAPLAB_MAX_UNNAMED_ATTACHMENT_BYTES)" in refused.json()["detail"]
+    assert api.get(f"/attachments/{first.json()['id']}").status_code == 404
+
+
+def test_files_that_are_sent_at_once_keep_the_limit(store: Store) -> None:
+    api = TestClient(create_app(store, limits=Limits(unnamed_attachment_bytes=30)))
+
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda n: api.post("/attachments?name=a", content=b"x" * 9 + bytes([n])), range(8)))
+
+    assert sorted(each.status_code for each in answers) == [201] * 3 + [429] * 5

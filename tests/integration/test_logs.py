@@ -12,8 +12,13 @@ from typing import Any
 
 import httpx2
 import pytest
+from sqlalchemy import text
+from sqlalchemy.exc import IntegrityError
 
 from gaplab.services import logs
+from gaplab.services.experiments import submission
+from gaplab.services.store.session import Store
+from tests.experiments import toy
 from tests.waiting import wait_until
 
 SECRET = "Zm9vYmFyLTEyMzQ1"
@@ -102,6 +107,32 @@ def test_a_traceback_has_no_secrets_either() -> None:
 
     assert "ConnectionError" in json.loads(said)["exception"]
     assert SECRET not in said
+
+
+@pytest.mark.usefixtures("restored")
+@pytest.mark.parametrize("kind", [io.StringIO, Terminal])
+def test_values_of_a_row_that_postgres_quotes_are_left_out(postgres_store: Store, kind: Any) -> None:
+    submission.submit_experiment(postgres_store, toy(name="peculiar\nname"))
+    stream = kind()
+    try:
+        postgres_store.write(lambda session: session.execute(text("UPDATE experiment SET state = 'NONSENSE'")))
+    except IntegrityError:
+        logged(stream, "incident", exc_info=True)
+    said = stream.getvalue()
+
+    assert "peculiar" not in said
+    assert "static_friction" not in said
+    assert said.count("DETAIL: …") == 2
+    assert "violates check constraint" in said
+    assert "The above exception was the direct cause" in said
+    assert "[SQL: UPDATE experiment SET state" in said
+
+
+@pytest.mark.parametrize("before", ["", "  | ", "'duplicate key\\n"])
+def test_details_of_postgres_are_left_out_in_groups_and_messages(before: str) -> None:
+    said = logs.without_secrets(f"{before}duplicate key\n{before}DETAIL:  Key (name)=({SECRET}) already exists.")
+
+    assert said == f"{before}duplicate key\n{before}DETAIL: …"
 
 
 @pytest.mark.usefixtures("restored")

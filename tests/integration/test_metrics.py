@@ -40,8 +40,8 @@ def test_it_counts_what_the_database_holds(store: Store) -> None:
     assert {state: found["gaplab_repetitions", state] for state in states} == states
     assert found["gaplab_experiments", "RUNNING"] == found["gaplab_experiments", "CANCELLED"] == 1
     progress = reading.read_experiment(store, first.experiment_id).progress
-    assert found["gaplab_rollouts_total",] == progress.rollouts_done
-    assert found["gaplab_steps_total",] == 13
+    assert found["gaplab_rollouts_done",] == progress.rollouts_done
+    assert found["gaplab_steps_done",] == 13
     assert found["gaplab_rollouts_queued",] == progress.rollouts * 2 / 3
     assert found["gaplab_supervisors",] == 1
     assert 0 <= found["gaplab_supervisor_heartbeat_age_seconds",] < 180
@@ -99,5 +99,23 @@ def test_without_a_database_it_says_so_and_counts_the_errors() -> None:
 
     assert found["gaplab_database_up",] == 0
     assert found["gaplab_database_errors_total",] >= 1
-    assert ("gaplab_steps_total",) not in found
+    assert ("gaplab_steps_done",) not in found
     store.dispose()
+
+
+def test_what_a_deletion_takes_away_is_no_counter(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(metrics, "CACHED_S", 0.0)
+    id_ = submission.submit_experiment(store, toy(repetitions=1)).id
+    (claim,) = execution.claim(store, "me", 1)
+    run(store, claim)
+    api = TestClient(create_app(store))
+    before = read(api)
+
+    api.delete(f"/experiments/{id_}")
+
+    names = ("gaplab_rollouts_done", "gaplab_steps_done")
+    assert all(before[name,] > 0 for name in names)
+    assert all(read(api)[name,] == 0 for name in names)
+    kinds = {each.name: each.type for each in text_string_to_metric_families(api.get("/metrics").text)}
+    assert [kinds[name] for name in names] == ["gauge", "gauge"]
+    assert not [name for name in kinds if name in {"gaplab_rollouts", "gaplab_steps"}]

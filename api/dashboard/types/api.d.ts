@@ -818,7 +818,7 @@ declare namespace Api {
     sentence: string;
   }
   interface Trusted {
-    test: "student" | "paired_t";
+    test: "welch" | "paired_t";
     p: number | null;
     p_holm: number | null;
   }
