@@ -32,7 +32,7 @@ LONGEST_LINE = 8 * 2**20
 GREATEST, GREATEST_LARGE = 2**30, 2**48
 """Limits of whole numbers of 32 and 64 bits: far from overflow, since some continue to count or are added up."""
 
-_ID = r"^[A-Za-z0-9]{1,32}$"
+_ID = r"^[A-Za-z0-9]{1,64}$"
 _IDS = {"id", "study_id", "experiment_id", EXPERIMENT}
 _MAY_BE_NEGATIVE = {"precedence", "tuning_saved", "rollouts_saved"}
 """An order by priority, and savings, since tuners could once exceed their budget."""

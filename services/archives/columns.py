@@ -26,6 +26,7 @@ EXPORTED = (
     "simulator",
     "attempt",
     "request",
+    "attachment",
     "answer",
     "branch",
 )
@@ -42,12 +43,11 @@ LEFT_OUT: Mapping[str, str] = {
     "notifier": "is a place in the events of one service",
     "deletion": "tells what one service no longer has",
     "view": "is a list of one service",
-    "attachment": "may be large, and private; answers name it by its hash",
     "checkpoint": "is part of an unfinished step, which only its own service continues",
 }
 """Tables that are left out, each with the reason."""
 
-ONLY_IF_USED = {"robot"}
+ONLY_IF_USED = {"robot", "attachment"}
 """Tables that an archive has only if its experiments use a row; earlier versions read the others."""
 
 COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
@@ -81,6 +81,10 @@ COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
         "taken_by": "belongs to a take, and an archive has none",
         "taken_until": "belongs to a take, and an archive has none",
         "lease_s": "belongs to a take, and an archive has none",
+    },
+    "attachment": {
+        "content": "is a member of its own, which has the hash as its name",
+        "created_at": "says when one service got the file",
     },
     "answer": {"token_id": "names a token of one service"},
 }

@@ -21,7 +21,8 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.specs.resolution import takes_samples
-from gaplab.services.store.queries import provenance
+from gaplab.services.store.queries import attachments, provenance
+from gaplab.services.store.session import Session
 from gaplab.services.store.texts import pack_tags, unpack_tags
 
 MOST_EXPERIMENTS = 1_000
@@ -70,11 +71,13 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
     """
     if table in {"study", "experiment"}:
         _check_tags(table, row)
-    if table in {"study", "robot"}:
+    if table in {"study", "robot", "attachment"}:
         return
     if table == "provenance":
         _check_provenance(row)
         return
+    if table == "answer" and not _is_list_of_texts(row.get("attachments")):
+        raise InvalidArchive(f"the attachments of answer {row['id']!r} are no list of hashes")
     owner = experiments.get(row["id"] if table == "experiment" else row.get(EXPERIMENT) or row["experiment_id"])
     number = row.get(REPETITION, row["number"] if table == "repetition" else 0)
     iteration = row.get("iteration", row["number"] if table == "iteration" else 0)
@@ -87,6 +90,23 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
         raise InvalidArchive(f"a row of {table} does not fit its experiment: {str(row)[:200]}")
 
 
+def check_attachments(session: Session, opened: OpenedArchive) -> None:
+    """Refuse files without a row, rows without a file, and files that no answer names.
+
+    Args:
+        session: session of the private database, which has all rows.
+        opened: the archive.
+
+    Raises:
+        InvalidArchive: the message names the first of them.
+    """
+    rows, files = {row["id"] for row in opened.rows("attachment")}, set(opened.attachments)
+    if unpaired := sorted(rows ^ files):
+        raise InvalidArchive(f"the attachment {unpaired[0]!r} has a row or a file, but not both")
+    if unnamed := sorted(files - attachments.named(session)):
+        raise InvalidArchive(f"no answer names the attachment {unnamed[0]!r}")
+
+
 def _check_tags(table: str, row: Row) -> None:
     try:
         tags = Edit(tags=unpack_tags(row.get("tags"))).tags or ()
@@ -94,6 +114,10 @@ def _check_tags(table: str, row: Row) -> None:
         raise InvalidArchive(f"the tags of {table} {row['id']!r} are invalid") from error
     if pack_tags(tags) != row.get("tags"):
         raise InvalidArchive(f"the tags of {table} {row['id']!r} are not as this service stores them")
+
+
+def _is_list_of_texts(value: object) -> bool:
+    return value is None or (isinstance(value, list) and all(isinstance(each, str) for each in value))
 
 
 def _check_provenance(row: Row) -> None:

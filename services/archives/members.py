@@ -1,6 +1,7 @@
 """The members of an archive: their names, and how the rows of a table are written."""
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from itertools import islice
@@ -13,6 +14,7 @@ MANIFEST, CURVES, SPEC = "manifest.json", "curves.json", "spec.json"
 
 Row = dict[str, Any]
 
+_FILE = re.compile(r"attachments/([0-9a-f]{64})")
 _VECTORS = {Kind.VECTOR, Kind.READINGS}
 _AT_ONCE = 1_000
 
@@ -20,6 +22,17 @@ _AT_ONCE = 1_000
 def member_of(table: str) -> str:
     """Return the name of the member that has the rows of the table."""
     return f"{table}.jsonl" if is_nested(table) else f"{table}.parquet"
+
+
+def file_member_of(digest: str) -> str:
+    """Return the name of the member that is the file with this hash."""
+    return f"attachments/{digest}"
+
+
+def digest_of(member: str) -> str | None:
+    """Return the hash of the file that a member is; None for another member."""
+    found = _FILE.fullmatch(member)
+    return found[1] if found else None
 
 
 def write(table: str, rows: Iterable[Row], target: IO[bytes]) -> int:

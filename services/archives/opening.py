@@ -23,14 +23,22 @@ from pydantic import ValidationError
 from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.services.archives.checking import Row, checked, first_error
 from gaplab.services.archives.columns import EXPORTED
-from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, member_of
+from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, digest_of, member_of
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.settings import variable_of
+from gaplab.services.store.queries import attachments
 
 MOST_BYTES = 512 * 2**20
-"""Size of all members, unpacked; a study of the paper's size has about ten million bytes."""
+"""Size of all members, unpacked, without files; a study of the paper's size has about ten million bytes."""
 
-MOST_BYTES_OF_MANIFEST = 100_000
+MOST_BYTES_OF_FILES = 2**30
+"""Size of all files beside measurements, unpacked."""
+
+MOST_FILES = 10_000
+"""Files beside measurements."""
+
+MOST_BYTES_OF_MANIFEST = 4_000_000
+MOST_BYTES_OF_DIRECTORY = 4 * 2**20
 _UNPACKING = Path(__file__).with_name("unpacking.py")
 _CHUNK = 2**16
 
@@ -42,10 +50,12 @@ class OpenedArchive:
     Attributes:
         manifest: manifest of the archive.
         files: files of the tables' rows, as JSON Lines.
+        attachments: files beside measurements, by their hashes.
     """
 
     manifest: Manifest
     files: Mapping[str, Path]
+    attachments: Mapping[str, Path]
 
     def rows(self, table: str) -> Iterator[Row]:
         """Yield the rows of a table, checked; none if the archive does not have it.
@@ -68,6 +78,7 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive
     Raises:
         InvalidArchive: the file is damaged, harmful, not an archive, or written by a later version.
     """
+    (folder / "attachments").mkdir()
     with readable_zip(file) as archive:
         members = _members(archive)
         manifest = _manifest(archive, members)
@@ -79,7 +90,25 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive
         }
     _read_parquet({file: manifest.members[name].rows for name, file in files.items() if name.endswith(".parquet")})
     tables = {table: _lines_of(files[member_of(table)]) for table in EXPORTED if member_of(table) in files}
-    return OpenedArchive(manifest, tables)
+    return OpenedArchive(manifest, tables, {hash_: file for name, file in files.items() if (hash_ := digest_of(name))})
+
+
+class _Bounded:
+    """A file whose parts are read with a limit: `zipfile` reads the directory of a zip at once, and keeps it."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self.seek, self.tell, self.seekable = file.seek, file.tell, file.seekable
+
+    def read(self, size: int = -1) -> bytes:
+        """Return the next bytes.
+
+        Raises:
+            InvalidArchive: too many are asked for.
+        """
+        if size > MOST_BYTES_OF_DIRECTORY:
+            raise InvalidArchive(f"its directory has {size:,} bytes; {MOST_BYTES_OF_DIRECTORY:,} are permitted")
+        return self._file.read(size)
 
 
 @contextmanager
@@ -91,7 +120,7 @@ def readable_zip(file: IO[bytes] | Path) -> Iterator[ZipFile]:
         OSError: the file cannot be read.
     """
     try:
-        with ZipFile(file) as archive:
+        with ZipFile(file if isinstance(file, Path) else _Bounded(file)) as archive:
             yield archive
     except (BadZipFile, ZlibError, EOFError, NotImplementedError, RuntimeError, ValueError, OverflowError) as error:
         raise InvalidArchive(f"it is not a readable zip: {type(error).__name__}") from error
@@ -105,16 +134,32 @@ def _members(archive: ZipFile) -> dict[str, ZipInfo]:
     known = {MANIFEST, CURVES, SPEC, *map(member_of, EXPORTED)}
     found: dict[str, ZipInfo] = {}
     for info in archive.infolist():
-        if info.filename not in known:
-            raise InvalidArchive(f"unknown member {info.filename[:64]!r}; permitted: {', '.join(sorted(known))}")
+        if info.filename not in known and digest_of(info.filename) is None:
+            raise InvalidArchive(
+                f"unknown member {info.filename[:64]!r}; permitted: {', '.join(sorted(known))}, attachments/SHA-256"
+            )
         if info.filename in found:
             raise InvalidArchive(f"it has {info.filename} twice")
         if info.compress_type not in {ZIP_STORED, ZIP_DEFLATED} or info.flag_bits & 1:
             raise InvalidArchive(f"{info.filename} is encrypted, or compressed by another method than deflate")
         found[info.filename] = info
-    if (size := sum(each.file_size for each in found.values())) > MOST_BYTES:
-        raise InvalidArchive(f"unpacked it has {size:,} bytes; {MOST_BYTES:,} are permitted")
+    _refuse_too_large(found)
     return found
+
+
+def _refuse_too_large(members: Mapping[str, ZipInfo]) -> None:
+    sizes = {name: info.file_size for name, info in members.items()}
+    files = {name: size for name, size in sizes.items() if digest_of(name)}
+    if (size := sum(sizes.values()) - sum(files.values())) > MOST_BYTES:
+        raise InvalidArchive(f"unpacked it has {size:,} bytes; {MOST_BYTES:,} are permitted")
+    less = "export its experiments one by one"
+    if len(files) > MOST_FILES:
+        raise InvalidArchive(f"it has {len(files):,} attachments; {MOST_FILES:,} are permitted: {less}")
+    if (size := sum(files.values())) > MOST_BYTES_OF_FILES:
+        raise InvalidArchive(f"its attachments have {size:,} bytes; {MOST_BYTES_OF_FILES:,} are permitted: {less}")
+    for name, size in files.items():
+        if not 0 < size <= attachments.MOST_BYTES:
+            raise InvalidArchive(f"{name} has {size:,} bytes; 1 to {attachments.MOST_BYTES:,} are permitted")
 
 
 def _manifest(archive: ZipFile, members: dict[str, ZipInfo]) -> Manifest:
@@ -151,6 +196,8 @@ def _unpack(archive: ZipFile, info: ZipInfo, promised: Member, target: Path) -> 
             file.write(chunk)
     if size != promised.bytes or hashed.hexdigest() != promised.sha256:
         raise InvalidArchive(f"{info.filename} differs from the manifest: it was damaged or changed")
+    if digest_of(info.filename) not in (None, hashed.hexdigest()):
+        raise InvalidArchive(f"the content of {info.filename} has another hash than its name: it was changed")
     return target
 
 

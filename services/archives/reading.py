@@ -22,7 +22,7 @@ from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.measurements import RequestState
 from gaplab.services.archives.checking import Row
 from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, columns_of
-from gaplab.services.archives.consistency import check_row, checked_experiments
+from gaplab.services.archives.consistency import check_attachments, check_row, checked_experiments
 from gaplab.services.archives.logs import check_logs
 from gaplab.services.archives.opening import OpenedArchive, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
@@ -40,6 +40,9 @@ from gaplab.services.store.session import Session, Store, private_store
 _REQUEST_IDS = {"id", "request_id", "same_as", "replaces"}
 """Columns with the ids of requests and answers."""
 
+_OF_NO_EXPERIMENT = {"study", "provenance", "robot", "attachment"}
+"""Tables whose rows belong to no single experiment."""
+
 AT_ONCE = 4
 """Archives that one process reads at the same time: each takes a core, memory and disk."""
 
@@ -54,11 +57,13 @@ class CheckedArchive:
         store: the private database.
         study: id of the study in the archive; None if it has none.
         experiments: the rows of the experiments in the archive, by their ids.
+        attachments: files beside measurements, by their hashes; the private database has them without content.
     """
 
     store: Store
     study: str | None
     experiments: Mapping[str, Row]
+    attachments: Mapping[str, Path]
 
 
 def import_archive(store: Store, file: IO[bytes], *, most_rows: int | None = None) -> ImportRead:
@@ -108,8 +113,10 @@ def _check(session: Session, private: Store, opened: OpenedArchive, now: datetim
     for table in EXPORTED:
         rows = _fitting(table, opened.rows(table), experiments)
         _insert(session, table, (_arriving(table, row, experiments, now) for row in rows))
+    check_attachments(session, opened)
     check_logs(session, experiments)
-    return CheckedArchive(private, opened.manifest.id if opened.manifest.kind == "study" else None, experiments)
+    study = opened.manifest.id if opened.manifest.kind == "study" else None
+    return CheckedArchive(private, study, experiments, opened.attachments)
 
 
 def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
@@ -123,7 +130,8 @@ def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
         for table in EXPORTED:
             owners = [*studies] if table == "study" else list(ids)
             rows = archives.read_rows(source, table, [column.name for column in columns_of(table)], owners)
-            _insert(session, table, (_renamed(table, row, renamed, ids) for row in rows))
+            arriving = (_renamed(table, row, renamed, ids) for row in rows)
+            _insert(session, table, _with_content(checked, arriving) if table == "attachment" else arriving)
     archives.forget_deletions(session, [*studies - taken_studies, *ids.values()])
     for id_ in ids.values():
         note(session, EventKind.IMPORTED, id_)
@@ -156,7 +164,9 @@ def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetim
     row = dict(row)
     if table == "experiment":
         row["spec"] = experiments[row["id"]]["spec"]
-    goes_on = table not in {"study", "provenance", "robot"} and _is_physical(experiments[_owner(table, row)])
+    if table == "attachment":
+        row["content"] = b""
+    goes_on = table not in _OF_NO_EXPERIMENT and _is_physical(experiments[_owner(table, row)])
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:
         row |= {"state": _resting(State(row["state"]))} if goes_on else {"state": State.CANCELLED, "ended_at": now}
     if table == "attempt" and row.get("ended_at") is None:
@@ -164,6 +174,12 @@ def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetim
     if table == "request" and row["state"] == RequestState.TAKEN:
         row |= {"state": RequestState.OPEN}
     return row
+
+
+def _with_content(checked: CheckedArchive, rows: Iterable[Row]) -> Iterator[Row]:
+    """Yield the rows of files with their contents, one in memory at a time."""
+    for row in rows:
+        yield row | {"content": checked.attachments[row["id"]].read_bytes()}
 
 
 def _owner(table: str, row: Row) -> str:

@@ -15,13 +15,13 @@ from pydantic import TypeAdapter
 from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.schemas.curves import Curve
 from gaplab.services.archives.columns import EXPORTED, ONLY_IF_USED, columns_of
-from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, Row, member_of, write
+from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, Row, file_member_of, member_of, write
 from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
 from gaplab.services.results.zip_entries import entry_of
 from gaplab.services.specs.shortening import experiment_spec, study_spec
 from gaplab.services.store.models import REVISION, ExperimentRow
-from gaplab.services.store.queries import archives, experiments
+from gaplab.services.store.queries import archives, attachments, experiments
 from gaplab.services.store.session import Session, Store
 from gaplab.services.store.stored_specs import without_truth
 
@@ -79,6 +79,7 @@ def _export(
                     count = write(table, _rows(session, table, study, ids, hidden), part)
                     if count or table not in ONLY_IF_USED:
                         members[member_of(table)] = _add(archive, member_of(table), part, count)
+            members |= _add_files(session, archive, ids)
             points = TypeAdapter(tuple[Curve, ...]).dump_json(curves.curves_of(session, ids))
             members[CURVES] = _add(archive, CURVES, BytesIO(points), len(ids))
             members[SPEC] = _add(archive, SPEC, BytesIO(_spec(session, study, owners, hidden)), 0)
@@ -110,6 +111,17 @@ def _rows(
         if table == "experiment":
             row |= {"study_id": study} | ({"spec": without_truth(row["spec"])} if row["id"] in hidden else {})
         yield row
+
+
+def _add_files(session: Session, archive: ZipFile, experiments: Sequence[str]) -> dict[str, Member]:
+    """Add the files that answers name, one in memory at a time."""
+    digests = [row["id"] for row in archives.read_rows(session, "attachment", ["id"], experiments)]
+    return {
+        file_member_of(digest): _add(
+            archive, file_member_of(digest), BytesIO(attachments.content_of(session, digest)), 0
+        )
+        for digest in digests
+    }
 
 
 def _add(archive: ZipFile, name: str, content: BufferedIOBase, rows: int) -> Member:

@@ -1,6 +1,6 @@
 """Rows of whole tables, for archives: read in a stable order, and inserted in bulk."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import Enum
 from itertools import islice
 from typing import Any
@@ -10,6 +10,7 @@ from sqlalchemy.exc import DataError, IntegrityError
 from sqlalchemy.orm import Session
 
 from gaplab.services.store.models import (
+    AttachmentRow,
     Base,
     DeletionRow,
     ExperimentProvenanceRow,
@@ -18,7 +19,7 @@ from gaplab.services.store.models import (
     RobotRow,
     StudyRow,
 )
-from gaplab.services.store.queries import provenance, robots
+from gaplab.services.store.queries import attachments, provenance, robots
 
 Row = dict[str, Any]
 
@@ -31,6 +32,11 @@ REPETITION_ID, EXPERIMENT, REPETITION = "repetition_id", "experiment", "repetiti
 _AT_ONCE = 1_000
 _LOCK = 0x67617069  # among the advisory locks of a Postgres database
 _REPETITIONS = Base.metadata.tables["repetition"]
+_SHARED: dict[str, Callable[[Session, Sequence[Row]], None]] = {
+    "provenance": provenance.insert_unless_there,
+    "robot": robots.insert_unless_there,
+    "attachment": attachments.insert_unless_there,
+}
 _REPLACED = {EXPERIMENT: _REPETITIONS.c.experiment_id, REPETITION: _REPETITIONS.c.number}
 
 
@@ -43,10 +49,7 @@ def read_rows(session: Session, name: str, columns: Iterable[str], owners: Seque
         columns: their names, with `EXPERIMENT` and `REPETITION` in place of the id of a repetition.
         owners: ids of experiments, or of studies if the table is `study`; rows have this order.
     """
-    names = list(columns)
-    shared = {"provenance": _provenances, "robot": _robots}
-    queries = [shared[name](names, owners)] if name in shared else [_query(name, names, each) for each in owners]
-    for query in queries:
+    for query in _queries(session, name, list(columns), owners):
         for row in session.execute(query, execution_options={"yield_per": _AT_ONCE}).mappings():
             yield {key: value.value if isinstance(value, Enum) else value for key, value in row.items()}
 
@@ -72,15 +75,24 @@ def insert_rows(session: Session, name: str, rows: Iterable[Row]) -> int:
         KeyError: a row belongs to a repetition that does not exist.
     """
     table, count, incoming = Base.metadata.tables[name], 0, iter(rows)
-    while some := list(islice(incoming, _AT_ONCE)):
+    while some := list(islice(incoming, 1 if name == "attachment" else _AT_ONCE)):
         count += len(some)
-        if name == "provenance":
-            provenance.insert_unless_there(session, some)
-        elif name == "robot":
-            robots.insert_unless_there(session, some)
+        if name in _SHARED:
+            _SHARED[name](session, some)
         else:
             session.execute(insert(table), _with_ids(session, some) if REPETITION_ID in table.c else some)
     return count
+
+
+def _queries(session: Session, name: str, columns: Sequence[str], owners: Sequence[str]) -> list[Select[Any]]:
+    match name:
+        case "provenance":
+            return [_provenances(columns, owners)]
+        case "robot":
+            return [_robots(columns, owners)]
+        case "attachment":
+            return _attachments(session, columns, owners)
+    return [_query(name, columns, owner) for owner in owners]
 
 
 def _with_ids(session: Session, rows: Sequence[Row]) -> list[Row]:
@@ -108,6 +120,16 @@ def _robots(columns: Sequence[str], experiments: Sequence[str]) -> Select[Any]:
     table, hash_ = RobotRow.__table__, ExperimentRow.spec["robot"]["options"]["sha256"].as_string()
     used = select(hash_).where(ExperimentRow.id.in_(experiments), hash_.is_not(None))
     return select(*(table.c[each] for each in columns)).where(table.c.sha256.in_(used)).order_by(table.c.sha256)
+
+
+def _attachments(session: Session, columns: Sequence[str], experiments: Sequence[str]) -> list[Select[Any]]:
+    """Return the queries for files that answers name, by hash; experiments share them."""
+    row = RepetitionRow
+    repetitions = select(row.id).where(row.experiment_id.in_(experiments)).scalar_subquery()
+    ids, table = sorted(attachments.named(session, repetitions)), AttachmentRow.__table__
+    query = select(*(table.c[each] for each in columns)).order_by(table.c.id)
+    parts = [ids[start : start + _AT_ONCE] for start in range(0, len(ids), _AT_ONCE)]
+    return [query.where(table.c.id.in_(part)) for part in parts]
 
 
 def _query(name: str, columns: Sequence[str], owner: str) -> Select[Any]:

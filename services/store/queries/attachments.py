@@ -1,17 +1,24 @@
 """Attachments, and the answers that name them."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from datetime import timedelta
 from itertools import chain
+from typing import Any
 
-from sqlalchemy import ScalarSelect, delete, select
+from sqlalchemy import ScalarSelect, delete, func, select, text
 
-from gaplab.services.store.clock import moment
+from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import AnswerRow, AttachmentRow
 from gaplab.services.store.session import Session
+from gaplab.services.store.statements import insert_new
+
+MOST_BYTES = 20_000_000
+"""Largest attachment."""
 
 UNNAMED_LIVE = timedelta(days=7)
 """Time for which a file is kept at least before an answer names it."""
+
+_LOCK = 0x67617066  # among the advisory locks of a Postgres database
 
 
 def present(session: Session, names: Collection[str]) -> set[str]:
@@ -43,3 +50,24 @@ def remove_unnamed(session: Session, once_named: Collection[str]) -> None:
     if candidates := set(session.scalars(unnamed)):
         for each in sorted(candidates - named(session)):
             session.execute(delete(row).where(row.id == each))
+
+
+def content_of(session: Session, id_: str) -> bytes:
+    """Return the content of a file that is stored."""
+    return session.execute(select(AttachmentRow.content).where(AttachmentRow.id == id_)).scalar_one()
+
+
+def insert_unless_there(session: Session, rows: Iterable[dict[str, Any]]) -> None:
+    """Insert files with their contents; one that is there already stays as it is, until the transaction has ended."""
+    for row in rows:
+        if not present(session, [row["id"]]):
+            session.execute(insert_new(session, AttachmentRow).values(**row, created_at=now()))
+
+
+def unnamed_bytes(session: Session) -> int:
+    """Return the size of all files that no answer names; a concurrent caller waits until this transaction ends."""
+    if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write ever overlap
+        session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
+    row = AttachmentRow
+    sizes: dict[str, int] = dict(session.execute(select(row.id, func.length(row.content))).all())
+    return sum(sizes[each] for each in sizes.keys() - named(session))

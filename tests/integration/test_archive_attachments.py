@@ -1,0 +1,215 @@
+"""Files beside measurements go with the archive of the answers that name them, and come back with it."""
+
+import json
+import zipfile
+from hashlib import sha256
+from io import BytesIO
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import select
+
+from gaplab.api.app import create_app
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.archives import export_experiment, export_study, import_archive, opening
+from gaplab.services.bench import attachments
+from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.experiments.deletion import Deleter, delete_experiment
+from gaplab.services.experiments.listing import list_experiments
+from gaplab.services.experiments.submission import submit_experiment, submit_study
+from gaplab.services.store.models import AttachmentRow
+from gaplab.services.store.session import Store
+from tests.integration.test_archives import exported
+from tests.integration.test_archives import other as other
+from tests.integration.test_archives_bad import packed
+from tests.integration.test_archives_bad import unpacked_here as unpacked_here
+from tests.integration.test_bench import bench, compute, measure, pending
+
+PHOTO, TRACE = b"\xff\xd8 a photograph" * 9_000, b"time_s,x\n0,1\n"
+
+
+def stored(store: Store) -> set[str]:
+    with store.reading() as session:
+        return set(session.scalars(select(AttachmentRow.id)))
+
+
+def send(store: Store, content: bytes, name: str, media_type: str = "image/jpeg") -> str:
+    return attachments.store_attachment(store, content, name, media_type).id
+
+
+def measured(store: Store) -> Any:
+    """A complete experiment on a bench, and the hashes of its photograph and its trace."""
+    experiment = submit_experiment(store, bench(iterations=1, reality={"probes": "never"}))
+    compute(store)
+    files = [send(store, PHOTO, "größe.jpg"), send(store, TRACE, "trace.csv", "text/csv")]
+    (request,) = pending(store)
+    measure(store, request, 0.5, attachments=files)
+    compute(store)
+    return experiment.id, files
+
+
+def members_of(archive: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(BytesIO(archive)) as opened:
+        return {name: opened.read(name) for name in opened.namelist()}
+
+
+def test_what_was_exported_and_deleted_comes_back_with_its_files(store: Store, other: Store) -> None:
+    experiment, files = measured(store)
+    unnamed = send(store, b"no answer names it", "x")
+    before = [attachments.read_attachment(store, each) for each in files]
+    archive = exported(export_experiment(store, experiment))
+    delete_experiment(store, experiment, Deleter(None))
+    assert stored(store) == {unnamed}
+
+    for place in (store, other):
+        import_archive(place, BytesIO(archive))
+        assert [attachments.read_attachment(place, each) for each in files] == before
+        assert exported(export_experiment(place, experiment)) == archive
+
+    manifest = json.loads(members_of(archive)["manifest.json"])["members"]
+    named = {name for name in manifest if name.startswith("attachments/")}
+    assert named == {f"attachments/{each}" for each in files}
+    assert all(manifest[f"attachments/{each}"]["sha256"] == each for each in files)
+    assert manifest["attachment.parquet"]["rows"] == 2
+    delete_experiment(other, experiment, Deleter(None))
+    assert stored(other) == set()
+
+
+def test_a_file_that_is_there_already_stays_as_it_is(
+    sqlite_store: Store, postgres_store: Store, unpacked_here: None
+) -> None:
+    experiment, (photo, trace) = measured(sqlite_store)
+    archive = exported(export_experiment(sqlite_store, experiment))
+    send(postgres_store, PHOTO, "mine.png", "image/png")
+
+    import_archive(postgres_store, BytesIO(archive))
+    import_archive(postgres_store, BytesIO(archive))  # under another id
+
+    assert attachments.read_attachment(postgres_store, photo)[0].name == "mine.png"
+    assert stored(postgres_store) == {photo, trace}
+
+
+def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store, unpacked_here: None) -> None:
+    alike = bench(iterations=1, reality={"probes": "never"}).model_dump(mode="json", exclude={"strategy", "name"})
+    study = submit_study(sqlite_store, StudySpec.model_validate(alike | {"strategies": ["random", "known_fit"]}))
+    compute(sqlite_store)
+    shared = send(sqlite_store, PHOTO, "shared")
+    own = [send(sqlite_store, name, "own") for name in (b"first", b"second")]
+    for request, file in zip(pending(sqlite_store), own, strict=True):
+        measure(sqlite_store, request, 0.5, attachments=[shared, file])
+    compute(sqlite_store)
+
+    archive = exported(export_study(sqlite_store, study.id))
+
+    assert [name for name in members_of(archive) if name.startswith("attachments/")] == [
+        f"attachments/{each}" for each in sorted([shared, *own])
+    ]
+    assert import_archive(sqlite_store, BytesIO(archive)).study != study.id
+
+
+def test_an_archive_without_its_files_is_read_as_before(
+    sqlite_store: Store, postgres_store: Store, unpacked_here: None
+) -> None:
+    experiment, _ = measured(sqlite_store)
+    members = members_of(exported(export_experiment(sqlite_store, experiment)))
+    manifest = json.loads(members["manifest.json"])
+    old = {name: content for name, content in members.items() if not name.startswith("attachment")}
+    manifest["members"] = {name: member for name, member in manifest["members"].items() if name in old}
+
+    import_archive(postgres_store, BytesIO(packed(old | {"manifest.json": json.dumps(manifest).encode()})))
+
+    assert [each.id for each in list_experiments(postgres_store).items] == [experiment]
+    assert stored(postgres_store) == set()
+
+
+@pytest.fixture
+def good(sqlite_store: Store) -> dict[str, bytes]:
+    """The members of an archive with files; the database has it no more."""
+    experiment, _ = measured(sqlite_store)
+    archive = exported(export_experiment(sqlite_store, experiment))
+    delete_experiment(sqlite_store, experiment, Deleter(None))
+    return members_of(archive)
+
+
+def with_file(members: dict[str, bytes], name: str, content: bytes | None) -> bytes:
+    """An archive with another content of a member, whose manifest is true; without the member if there is none."""
+    manifest = json.loads(members["manifest.json"])
+    changed = {each: old for each, old in members.items() if each != name}
+    manifest["members"].pop(name, None)
+    if content is not None:
+        changed[name] = content
+        manifest["members"][name] = {"sha256": sha256(content).hexdigest(), "bytes": len(content), "rows": 0}
+    return packed(changed | {"manifest.json": json.dumps(manifest).encode()}, honest=False)  # type: ignore[no-any-return]
+
+
+def refused(store: Store, archive: bytes, what: str) -> None:
+    with pytest.raises(InvalidArchive, match=what):
+        import_archive(store, BytesIO(archive))
+    assert list_experiments(store).items == ()
+    assert stored(store) == set()
+
+
+def of(content: bytes) -> str:
+    return f"attachments/{sha256(content).hexdigest()}"
+
+
+def test_a_file_that_does_not_fit_its_hash_is_refused(
+    sqlite_store: Store, good: dict[str, bytes], unpacked_here: None
+) -> None:
+    refused(sqlite_store, with_file(good, of(PHOTO), b"forged"), f"content of {of(PHOTO)} has another hash")
+    refused(sqlite_store, packed(good | {of(TRACE): b"forged"}, honest=False), "differs from the manifest")
+
+
+def test_a_file_without_a_row_or_a_row_without_a_file_is_refused(
+    sqlite_store: Store, good: dict[str, bytes], unpacked_here: None
+) -> None:
+    refused(sqlite_store, with_file(good, of(PHOTO), None), "has a row or a file, but not both")
+    refused(sqlite_store, with_file(good, of(b"more"), b"more"), "has a row or a file, but not both")
+    refused(sqlite_store, with_file(good, "attachments/../x", b"x"), "unknown member")
+
+
+def test_a_file_that_no_answer_names_is_refused(
+    sqlite_store: Store, good: dict[str, bytes], unpacked_here: None
+) -> None:
+    (answer,) = map(json.loads, good["answer.jsonl"].splitlines())
+
+    for names, what in (([sha256(TRACE).hexdigest()], "no answer names"), ([{}], "no list of hashes")):
+        changed = json.dumps(answer | {"attachments": names}).encode() + b"\n"
+        refused(sqlite_store, packed(good | {"answer.jsonl": changed}), what)
+
+
+@pytest.mark.parametrize(
+    ("limit", "most", "what"),
+    [
+        ("MOST_FILES", 1, "it has 2 attachments; 1 are permitted: export its experiments one by one"),
+        ("MOST_BYTES_OF_FILES", 100_000, "its attachments have 135,013 bytes; 100,000 are permitted"),
+        ("MOST_BYTES_OF_DIRECTORY", 100, "its directory has .* bytes; 100 are permitted"),
+    ],
+)
+def test_more_files_than_are_permitted(
+    sqlite_store: Store, good: dict[str, bytes], monkeypatch: pytest.MonkeyPatch, limit: str, most: int, what: str
+) -> None:
+    monkeypatch.setattr(opening, limit, most)
+
+    refused(sqlite_store, packed(good), what)
+
+
+def test_a_file_larger_than_one_that_is_stored(sqlite_store: Store, good: dict[str, bytes]) -> None:
+    large = bytes(20_000_001)
+
+    refused(sqlite_store, with_file(good, of(large), large), "has 20,000,001 bytes; 1 to 20,000,000 are permitted")
+    refused(sqlite_store, with_file(good, of(b""), b""), "has 0 bytes")
+
+
+def test_an_archive_with_photographs_is_let_in_over_http(store: Store, unpacked_here: None) -> None:
+    experiment, (photo, _) = measured(store)
+    with TestClient(create_app(store)) as api:
+        archive = api.get(f"/experiments/{experiment}/export").content
+        api.delete(f"/experiments/{experiment}")
+        gone = api.get(f"/attachments/{photo}").status_code
+
+        answer = api.post("/import", content=archive)
+
+        assert (gone, answer.status_code) == (404, 201)
+        assert api.get(f"/attachments/{photo}").content == PHOTO
