@@ -85,7 +85,7 @@ class Grouped(Tunable):
     def bounds(self, world: World) -> tuple[float, float]:
         """Return the default bounds: of numbers whose size depends on the robot, factors of their mean.
 
-        The upper bound of others is at least twice the largest.
+        The upper bound of others is at least twice the largest number of the group.
         """
         if self.relative or not (mean := self.read(world)):
             return self.lower, self.upper
