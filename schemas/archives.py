@@ -9,6 +9,9 @@ from gaplab.schemas.base import Frozen, Id
 FORMAT = 1
 """Version of the archive format: exports write it, and imports read it and all before it."""
 
+MOST_BYTES_OF_IMPORT = 2**30
+"""Size of an archive that an import reads."""
+
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Extent = Annotated[int, Field(strict=True, ge=0)]
 

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from gaplab.schemas.base import TAG_PATTERN
@@ -49,6 +49,11 @@ LENGTHS = {
     "string_too_long": ("at most", "max_length", "character"),
 }
 """Bound, limit and unit of a length, by pydantic's type of error."""
+
+
+def pointer_to(path: Iterable[object]) -> str:
+    """Return the JSON pointer (RFC 6901) of a place, given the names and numbers on the way to it."""
+    return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in path)
 
 
 def permitted_by(error: Mapping[str, Any]) -> tuple[str, ...] | str | None:

@@ -7,6 +7,7 @@ import typer
 
 from gaplab.api.commands.app import KEEPING, AsJson, Id, Url, app, connect
 from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.schemas.archives import MOST_BYTES_OF_IMPORT
 from gaplab.services.settings import Settings
 from gaplab.services.store.atomic_files import PRIVATE, appearing
 
@@ -23,7 +24,11 @@ def export(
         file = to or Path(f"gaplab-{client.find(id).id}.zip")  # the service's id, never a path that was typed
         with appearing(file, PRIVATE) as part, part.open("wb") as target:
             client.export(id, target)
-    print_result({"file": str(file), "bytes": file.stat().st_size}, f"Wrote {file}.", as_json=as_json)
+    size = file.stat().st_size
+    print_result({"file": str(file), "bytes": size}, f"Wrote {file}.", as_json=as_json)
+    if size > MOST_BYTES_OF_IMPORT:
+        most = f"{size:,} bytes; gaplab import takes {MOST_BYTES_OF_IMPORT:,}. gaplab backup copies any size"
+        typer.echo(f"{file} has {most}", err=True)
 
 
 @app.command("import", rich_help_panel=KEEPING)

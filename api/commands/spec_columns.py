@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from gaplab.api.clients.submission import is_experiment
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.submission import read_spec
-from gaplab.schemas.mistakes import sentence
+from gaplab.schemas.mistakes import pointer_to, sentence
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives.members import member_of
 from gaplab.services.archives.opening import readable_zip
@@ -42,7 +42,7 @@ def column_of(file: Path) -> SpecColumn:
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror or error}", Exit.FILE) from error
     except ValidationError as error:
-        mistakes = (f"/{'/'.join(map(str, wrong['loc']))}: {sentence(dict(wrong))}" for wrong in error.errors())
+        mistakes = (f"{pointer_to(wrong['loc']) or '/'}: {sentence(dict(wrong))}" for wrong in error.errors())
         raise CommandError(f"{file} is not a valid spec: {'; '.join(mistakes)}", Exit.INVALID) from error
     except InvalidSpec as error:
         raise CommandError(f"{file} is not a valid spec: {error}", Exit.INVALID) from error

@@ -11,6 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from gaplab.api.http.problems import FRAMEWORK, problem, response
+from gaplab.schemas.archives import MOST_BYTES_OF_IMPORT
 from gaplab.services.core.errors import LimitReached
 from gaplab.services.settings import Limits, variable_of
 
@@ -22,7 +23,7 @@ SPARE = 16
 
 ALIVE = "/livez"
 
-MOST_BYTES_OF = {"/import": 2**30, "/attachments": 20_000_000, "/robots": 2_000_000}
+MOST_BYTES_OF = {"/import": MOST_BYTES_OF_IMPORT, "/attachments": 20_000_000, "/robots": 2_000_000}
 """Limits of the addresses that take more than a spec."""
 
 

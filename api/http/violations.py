@@ -10,7 +10,7 @@ from typing import Any, Union, get_args, get_origin
 from fastapi import Request
 from pydantic import BaseModel
 
-from gaplab.schemas.mistakes import permitted_by, sentence
+from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
 from gaplab.schemas.problems import SpecError
 from gaplab.services.core.errors import Violation
 
@@ -81,7 +81,7 @@ def _pointer(place: str, path: Sequence[str | int]) -> str:
     """Return a JSON pointer (RFC 6901) into the body, or the name of a query or path parameter."""
     if place != "body":
         return "/".join(str(part) for part in path)
-    return "".join("/" + _text(part).replace("~", "~0").replace("/", "~1") for part in path)
+    return pointer_to(_text(part) for part in path)
 
 
 def _text(part: object) -> str:

@@ -189,8 +189,12 @@ def _refuse_unless_counted(row: AnswerRow) -> None:
 
 def _with_readings(spec: CorrectionSpec, row: AnswerRow) -> CorrectionSpec:
     """Return a correction of the values alone with the readings of the answer, if it has as many repeats."""
-    kept = spec.readings is None and spec.values is not None and row.readings is not None
-    if not kept or len(row.readings or ()) != len(spec.values or ()):
+    if (
+        spec.readings is not None
+        or spec.values is None
+        or row.readings is None
+        or len(row.readings) != len(spec.values)
+    ):
         return spec
     return CorrectionSpec.model_validate({**spec.model_dump(exclude_none=True), "readings": row.readings})
 

@@ -36,7 +36,7 @@ class Motion:
     start_tilt_rad: Tilt = LEVEL
 
     def observed_at(self, times_s: FloatArray) -> "Motion":
-        """Return the same motion, observed at other times."""
+        """Return the same motion, observed at other times `(t,)`."""
         return replace(self, observe_s=times_s)
 
 
@@ -69,7 +69,7 @@ class Loop:
     start_tilt_rad: Tilt = LEVEL
 
     def observed_at(self, times_s: FloatArray) -> "Loop":
-        """Return the same loop, whose trajectory is observed at other times."""
+        """Return the same loop, whose trajectory is observed at other times `(t,)`."""
         return replace(self, observe_s=times_s)
 
     @property

@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from gaplab.schemas.mistakes import permitted_by, sentence
+from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
 from gaplab.services.core.errors import Violation, unknown_name
 
 
@@ -23,7 +23,7 @@ def option_violation(name: str, options: type[BaseModel], error: Mapping[str, An
         error: an item of `ValidationError.errors()`.
         pointer: place of the options in the spec.
     """
-    place = "".join(f"/{part}" for part in error["loc"])
+    place = pointer_to(error["loc"])
     if error["type"] == "extra_forbidden":
         kind = f"option of {name!r}"
         return unknown_name(pointer + place, kind, str(error["loc"][-1]), given_names(options) or ["none"])

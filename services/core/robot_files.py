@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, StringConstraints, ValidationError
 
 from gaplab.schemas.base import Frozen
-from gaplab.schemas.mistakes import permitted_by, sentence
+from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import MOST_LOSSES, RobotSource
 from gaplab.services.core.errors import InvalidSpec, Violation
@@ -162,7 +162,7 @@ def _violations(error: ValidationError, content: Any) -> Iterator[Violation]:  #
     for each in error.errors():
         place, meant = _place(each["loc"], content, is_missing=each["type"] == "missing")
         if meant:
-            pointer = "".join(f"/{str(part).replace('~', '~0').replace('/', '~1')}" for part in place)
+            pointer = pointer_to(place)
             message, permitted = _MESSAGES.get(each["type"], (sentence(dict(each), place), permitted_by(dict(each))))
             if each["type"] in _MESSAGES:
                 message = message.format(place[-1])

@@ -92,7 +92,7 @@ class Space:
         return frozen(found)
 
     def contain(self, vectors: FloatArray) -> FloatArray:
-        """Return the vectors moved into the box: periodic coordinates wrap, the others clip."""
+        """Return the vectors `(..., g)` moved into the box: periodic coordinates wrap, the others clip."""
         wrapped = self.lower + np.mod(vectors - self.lower, self.extent)
         return np.minimum(np.maximum(np.where(self.periodic, wrapped, vectors), self.lower), self.upper)
 

@@ -76,7 +76,10 @@ def brown_forsythe(first: FloatArray, second: FloatArray) -> Test:
 
 @np.errstate(over="ignore", invalid="ignore")
 def effect_size(first: FloatArray, second: FloatArray) -> float | None:
-    """Return Cohen's d: difference of the means over the pooled standard deviation; None if that is 0 or unknown."""
+    """Return Cohen's d of groups `(n,)` and `(m,)`: difference of the means over the pooled standard deviation.
+
+    None if that deviation is 0 or unknown. Numbers that are not finite do not count.
+    """
     first, second = finite(first), finite(second)
     freedom = len(first) + len(second) - 2
     if min(len(first), len(second)) < 2 or (constant(first) and constant(second)):
@@ -132,13 +135,13 @@ def constant_difference(first: FloatArray, second: FloatArray) -> bool:
 
 
 def varies(first: FloatArray, second: FloatArray, shift: float = 0.0) -> bool:
-    """Return whether values of a group differ by more than the rounding of `moved` groups."""
+    """Return whether values of a group, `(n,)` or `(m,)`, differ by more than the rounding of `moved` groups."""
     scale = _scale(first, second, shift)
     return not (constant(first, scale) and constant(second, scale))
 
 
 def moved(first: FloatArray, second: FloatArray, shift: float = 0.0) -> tuple[FloatArray, FloatArray]:
-    """Return groups whose means differ by `shift` more; a constant group becomes 0.
+    """Return groups `(n,)` and `(m,)` whose means differ by `shift` more; a constant group becomes 0.
 
     The variance of equal numbers may differ from 0 by rounding. That of zeros is 0. A group counts as constant if its
     variation is below the rounding of the largest number that is added or subtracted.

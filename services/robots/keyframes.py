@@ -28,7 +28,7 @@ class Keyframe:
     base: FloatArray | None
 
     def qpos(self, model: Any) -> FloatArray:  # noqa: ANN401
-        """Return MuJoCo's `qpos` of a model whose joints are not those of the file."""
+        """Return MuJoCo's `qpos`, `(nq,)`, of a model whose joints are not those of the file."""
         qpos = np.array(model.qpos0)
         if self.base is not None and model.jnt_type[0] == 0:
             qpos[:7] = self.base

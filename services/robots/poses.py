@@ -22,7 +22,7 @@ ROUNDED = 1e-4
 
 
 def start_angles(source: Source, options: ImportOptions, notes: Notes) -> FloatArray:
-    """Return MuJoCo's `qpos` at the start: of a keyframe, or the reference angles; the user may turn the base."""
+    """Return MuJoCo's `qpos`, `(nq,)`, at the start: a keyframe or the reference angles; the user may turn the base."""
     qpos = _angles_of_the_file(source, options, notes)
     if options.turn is not None:
         if source.model.jnt_type[0] != FREE:
@@ -87,7 +87,7 @@ def base_pose(
         bodies: the model's bodies.
         world_bodies: the same bodies of the World.
         joints: joints with their starts.
-        qpos: MuJoCo's start.
+        qpos: `(nq,)`: MuJoCo's start.
         fixed: whether the base never moves.
     """
     model, data = bodies.model, mujoco_library().MjData(bodies.model)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gaplab.schemas.differences import DiffColumn, SettingRead, SpecDiff, Values
+from gaplab.schemas.mistakes import pointer_to
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.stored_specs import spec_of
 
@@ -92,8 +93,7 @@ def _leaves(path: Path, pointer: str, value: Any) -> Iterator[tuple[Path, tuple[
         yield path, (pointer, value)
         return
     for name, inner in value.items():
-        escaped = name.replace("~", "~0").replace("/", "~1")
-        yield from _leaves((*path, name), f"{pointer}/{escaped}", inner)
+        yield from _leaves((*path, name), pointer + pointer_to([name]), inner)
 
 
 def _pointers(table: Iterable[Mapping[Path, tuple[str, Any]]]) -> dict[Path, str]:

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from gaplab.schemas.mistakes import pointer_to
 from gaplab.schemas.plugin import TunableRef
 from gaplab.schemas.resolved import ResolvedBudget
 from gaplab.schemas.spec import ExperimentSpec
@@ -149,7 +150,7 @@ def reality_violations(
         message = f"{strategy.name} evolves in reality itself, and the engine {engine.name!r} may move hardware"
         yield Violation("/strategy", strategy.name, message, "another strategy, or an engine with `repeatable = True`")
     for name, value in spec.reality.parameters.items():
-        pointer = f"/reality/parameters/{name}"
+        pointer = pointer_to(["reality", "parameters", name])
         try:
             tunable = tunable_of(name, pointer)
         except InvalidSpec as error:
@@ -170,7 +171,7 @@ def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[V
         yield Violation("/reality/engine", reality.engine.name, message, "left out")
     for name, value in reality.parameters.items():
         message = "a physical reality has no hidden parameters; what they are is the question"
-        yield Violation(f"/reality/parameters/{name}", value, message, "left out")
+        yield Violation(pointer_to(["reality", "parameters", name]), value, message, "left out")
     if reality.probes == "never" and not strategy.takes_samples:
         message = f"{strategy.name} takes no samples, so without probes nothing would be measured"
         yield Violation("/reality/probes", reality.probes, message, ["each", "last"])

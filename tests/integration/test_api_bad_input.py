@@ -134,6 +134,19 @@ def test_a_value_out_of_its_range_is_refused_with_its_place(
 @pytest.mark.parametrize(
     ("change", "pointer"),
     [
+        ({"reality": {"parameters": {"static/frction~": 0.9}}}, "/reality/parameters/static~1frction~0"),
+        ({"optimizer": {"name": "cma_es", "options": {"a/b": 1}}}, "/optimizer/options/a~1b"),
+    ],
+)
+def test_a_name_with_a_slash_or_a_tilde_is_one_part_of_a_pointer(
+    api: TestClient, change: dict[str, Any], pointer: str
+) -> None:
+    assert only_error(api.post("/experiments", json=LEAST | change))["pointer"] == pointer
+
+
+@pytest.mark.parametrize(
+    ("change", "pointer"),
+    [
         ({"points": 4}, "/points"),
         ({"points": "17"}, "/points"),
         ({"evaluations": 10**9}, "/evaluations"),

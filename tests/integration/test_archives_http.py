@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
 from gaplab.api.clients.archives import Archives
+from gaplab.api.commands import archives as archive_commands
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
@@ -79,6 +80,17 @@ def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: s
     assert str(file) in written.out
     assert f"{submitted} is taken here" in read.err
     assert gaplab("show", read.out.strip()).code == 0
+
+
+def test_the_command_says_that_an_archive_is_too_large_to_import(
+    gaplab: Gaplab, submitted: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = gaplab("export", submitted, "--to", str(tmp_path / "small.zip"))
+    monkeypatch.setattr(archive_commands, "MOST_BYTES_OF_IMPORT", 1_000)
+    large = gaplab("export", submitted, "--to", str(tmp_path / "large.zip"))
+
+    assert (small.code, small.err, large.code) == (0, "", 0)
+    assert "bytes; gaplab import takes 1,000. gaplab backup copies any size" in large.err
 
 
 def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submitted: str, tmp_path: Path) -> None:

@@ -36,11 +36,16 @@ class Discrepancy(Plugin):
         return None
 
     def residuals(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
-        """Return `(n, m, r)`: differences whose squares sum to the terms, if it `squares`."""
+        """Return `(n, m, r)`: differences whose squares sum to the terms, if it `squares`; arguments as of `terms`."""
         raise NotImplementedError(f"{self.name} is no sum of squares")
 
     def noise(self, measured: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG002 - for those that know it
-        """Return the variance of a residual if the simulator is right; 0 if it is unknown."""
+        """Return the variance of a residual if the simulator is right; 0 if it is unknown.
+
+        Args:
+            measured: `(n, 1 + q)`: fitness and readings of n samples in reality.
+            times_s: `(q,)`: time of each reading, in seconds.
+        """
         return 0.0
 
     def floor(self, error: float) -> float:
