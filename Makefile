@@ -2,10 +2,11 @@
 
 PYTHON ?= python3.11
 BIN := .venv/bin
+PYTEST := $(BIN)/python -m pytest --numprocesses 4 --dist loadgroup --no-loadscope-reorder
 DENO := DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 help:  ## list the commands
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
 demo: .venv/installed  ## tune a toy and a quadruped with every strategy, and draw the curves
 	$(BIN)/gaplab demo
@@ -13,8 +14,11 @@ demo: .venv/installed  ## tune a toy and a quadruped with every strategy, and dr
 serve: .venv/installed  ## start the service on http://127.0.0.1:8000, with its workers
 	$(BIN)/gaplab serve
 
-test: .venv/prepared  ## run all tests: on SQLite, on a real Postgres, and of the page in a real Chromium
-	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+test: .venv/prepared  ## run the tests that every change must pass: ten minutes on two quiet cores
+	$(PYTEST)
+
+test-all: .venv/prepared  ## run all tests, as before a release: also on Postgres, the documents as written, and the bare machine
+	$(PYTEST) --all
 
 lint: .venv/installed-dev  ## check style, types, dependencies and the imports between layers
 	$(BIN)/ruff check
@@ -56,4 +60,4 @@ clean:  ## remove the environment and caches; results stay
 	$(BIN)/python -m tests.e2e.prepare_machine
 	touch $@
 
-.PHONY: help demo serve test lint bench docs pictures soak clean
+.PHONY: help demo serve test test-all lint bench docs pictures soak clean

@@ -1,9 +1,10 @@
 """Fixtures of all tests.
 
-`store` is a Store at head on SQLite and on a real Postgres in turn: a test that takes it runs on both; `sqlite_store`
-is one on SQLite alone, for tests that want some database. `store_url` and `sqlite_url` are the URLs of the same, and
-`database_url` is an empty database of either kind, for migrations. Each test has a database of its own: a copy of one
-that was migrated once. All test processes share one Postgres server.
+`store` is a Store at head on SQLite; a test marked `dialects` runs on a real Postgres too, and with `--all` every test does.
+`sqlite_store` is one on SQLite alone, for tests in which the database does not matter. `store_url` and `sqlite_url` are
+the URLs of the same, and `database_url` is an empty database of either kind, for migrations. Each test has a database of
+its own: a copy of one that was migrated once. All test processes share one Postgres server. `tests/tiers.py` decides which
+tests a run has.
 """
 
 import os
@@ -23,6 +24,8 @@ from gaplab.services.core import external_plugins
 from gaplab.services.plugins import folders
 from gaplab.services.store.session import Store
 from tests import postgres as servers
+
+pytest_plugins = ["tests.tiers"]
 
 _DATABASES = ("sqlite", "postgres")
 _SHARED = pytest.StashKey[str]()
