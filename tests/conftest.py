@@ -1,10 +1,10 @@
 """Fixtures of all tests.
 
-`store` is a Store at head on SQLite; a test marked `dialects` runs on a real Postgres too, and with `--all` every test does.
-`sqlite_store` is one on SQLite alone, for tests in which the database does not matter. `store_url` and `sqlite_url` are
-the URLs of the same, and `database_url` is an empty database of either kind, for migrations. Each test has a database of
-its own: a copy of one that was migrated once. All test processes share one Postgres server. `tests/tiers.py` decides which
-tests a run has.
+`store` is a Store at head on SQLite; a test marked `dialects` runs on a real Postgres too, and with `--all` every test
+does. `sqlite_store` is one on SQLite alone, for tests in which the database does not matter. `store_url` and
+`sqlite_url` are the URLs of the same, and `database_url` is an empty database of either kind, for migrations. Each test
+has a database of its own: a copy of one that was migrated once. All test processes share one Postgres server.
+`tests/tiers.py` decides which tests a run has.
 """
 
 import os

@@ -1,8 +1,8 @@
 """Which tests a run has, on which databases, in which process, and how long they took.
 
-`make test` is what every change must pass. `make test-all`, with the option `--all`, has the rest: tests marked `release`,
-and Postgres for every test of a store. In `make test`, a test of a store runs on SQLite; one marked `dialects`, because the
-databases may differ there, runs on both.
+`make test` is what every change must pass. `make test-all`, with the option `--all`, has the rest: tests marked
+`release`, and Postgres for every test of a store. In `make test`, a test of a store runs on SQLite; one marked
+`dialects`, because the databases may differ there, runs on both.
 
 Tests that share something that is slow to start run in one process: `SHARED` names the fixtures and marks. Other tests
 stay together by file, except those of a file marked `apart`.
