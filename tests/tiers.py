@@ -4,19 +4,18 @@
 `release`, and Postgres for every test of a store. In `make test`, a test of a store runs on SQLite; one marked
 `dialects`, because the databases may differ there, runs on both.
 
-Tests that share something that is slow to start run in one process: `SHARED` names the fixtures and marks. Other tests
-stay together by file, except those of a file marked `apart`.
+Tests that share something that is slow to start run in one process. Other tests stay together by file, except those of
+a file marked `apart`.
 """
 
 import resource
 from collections import Counter
-from collections.abc import Iterable
 from typing import Any
 
 import pytest
 
-SHARED = {"ray": "ray", "browser": "browser"}
-"""Marks and fixtures whose tests share one process, with the name of their group."""
+SHARED = ("ray", "browser", "mujoco")
+"""What starts slowly: a mark, a fixture, and an engine that compiles its law. Their groups come first."""
 
 STORES = ("store_url", "database_url")
 """Fixtures that have a parameter for each database."""
@@ -54,7 +53,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if name := _group(item):
             item.add_marker(pytest.mark.xdist_group(name))
-    items.sort(key=lambda item: list(SHARED.values()).index(name) if (name := _shared(item)) else len(SHARED))
+    items.sort(key=lambda item: SHARED.index(name) if (name := _shared(item)) else len(SHARED))
 
 
 def _is_for_a_release(item: pytest.Item) -> bool:
@@ -66,8 +65,8 @@ def _is_for_a_release(item: pytest.Item) -> bool:
 
 
 def _shared(item: pytest.Item) -> str | None:
-    used: Iterable[str] = (*getattr(item, "fixturenames", ()), *(mark.name for mark in item.iter_markers()))
-    return next((SHARED[name] for name in used if name in SHARED), None)
+    used = {*getattr(item, "fixturenames", ()), *(mark.name for mark in item.iter_markers())}
+    return next((name for name in SHARED if name in used), "mujoco" if "mujoco" in item.nodeid else None)
 
 
 def _group(item: pytest.Item) -> str | None:

@@ -21,6 +21,7 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Body, Inertia, Material, PDMotor, World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.engines.stepping import WARM_SCENES
 from gaplab.services.engines.uses import USES
 
 
@@ -280,6 +281,66 @@ def test_a_trajectory_has_a_pose_for_each_observation(pair: Pair) -> None:
     assert trajectory.positions_m.shape == (count, 3)
     assert trajectory.orientations.shape == (count, 4)
     assert np.isfinite(pair.robot.fitness(trajectory))
+
+
+def test_static_friction_below_dynamic_friction_acts_as_if_equal_to_it(embodied: Pair) -> None:
+    below, equal = (
+        embodied.roll(replace(embodied.robot.world, material=Material(static, 0.8))) for static in (0.2, 0.8)
+    )
+
+    assert np.array_equal(below, equal)
+
+
+def test_more_worlds_than_are_kept_warm_give_the_same_numbers(embodied: Pair) -> None:
+    worlds = [replace(embodied.robot.world, gravity_m_s2=9.0 + number / 10) for number in range(WARM_SCENES + 3)]
+    expected = [embodied.roll(world) for world in worlds]
+
+    assert np.array_equal([embodied.roll(world) for world in worlds], expected)
+
+
+def test_targets_may_change_between_time_steps_and_after_the_last_observation(embodied: Pair) -> None:
+    motion = open_loop(embodied.robot.motion(embodied.robot.known))
+    late = replace(
+        motion,
+        times_s=np.append(motion.times_s, [100.0, 100.0001]),
+        targets=np.vstack([motion.targets, motion.targets[:2]]),
+    )
+
+    changed, expected = (embodied.engine.rollout(embodied.robot.world, each) for each in (late, motion))
+
+    assert np.array_equal(flat(changed), flat(expected))
+
+
+def test_looking_more_often_changes_nothing_that_is_seen_and_time_zero_is_the_start(embodied: Pair) -> None:
+    world, motion = embodied.robot.world, open_loop(embodied.robot.motion(embodied.robot.known))
+    often = replace(motion, observe_s=np.arange(0.0, 3.0001, 0.1))
+
+    seen, expected = (embodied.engine.rollout(world, each) for each in (often, motion))
+
+    numbers = np.round(motion.observe_s / 0.1).astype(int)
+    assert np.array_equal(seen.positions_m[numbers], expected.positions_m)
+    assert seen.positions_m[0] == pytest.approx([0.0, 0.0, world.start_height_m])
+    assert seen.orientations[0] == pytest.approx([0.0, 0.0, 0.0, 1.0])
+
+
+def test_the_pose_is_of_the_bodys_frame_not_of_its_center_of_mass(embodied: Pair) -> None:
+    box = Body("box", 1.0, Box((0.1, 0.1, 0.1)), center_m=(0.0, 0.0, 0.05))
+    still = Motion(np.zeros(1), np.zeros((1, 0)), np.array([0.0, 1.0]))
+
+    heights = embodied.engine.rollout(World(bodies=(box,), start_height_m=0.0), still).positions_m[:, 2]
+
+    assert heights == pytest.approx(0.0, abs=2e-3)
+
+
+def test_importing_the_engines_loads_none_of_their_libraries() -> None:
+    script = """
+import sys
+from gaplab.services.engines import engines
+assert list(engines)
+assert not {"pybullet", "mujoco", "numba", "sapien"} & set(sys.modules)
+"""
+
+    subprocess.run([sys.executable, "-c", script], check=True)
 
 
 def test_a_robot_left_alone_stands_still_at_the_height_of_its_legs(embodied: Pair) -> None:

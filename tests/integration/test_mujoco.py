@@ -24,7 +24,6 @@ from gaplab.services.engines.mujoco.model import named
 from gaplab.services.engines.mujoco.models import Models
 from gaplab.services.engines.mujoco.pool import in_force
 from gaplab.services.engines.mujoco.scene import ROWS
-from gaplab.services.engines.stepping import WARM_SCENES
 
 mujoco = pytest.importorskip("mujoco")
 structs = pytest.importorskip("mujoco.introspect.structs")
@@ -148,15 +147,6 @@ def test_its_fields_are_where_mujocos_description_of_itself_says() -> None:
         assert number(first + index * size + contact["efc_address"], c_int32) == point.efc_address  # type: ignore[arg-type]
 
 
-def test_importing_the_engine_does_not_load_its_libraries() -> None:
-    script = (
-        "import sys; from gaplab.services.engines import engines; list(engines);"
-        "assert not {'mujoco', 'numba'} & set(sys.modules)"
-    )
-
-    subprocess.run([sys.executable, "-c", script], check=True)
-
-
 @pytest.mark.parametrize("missing", ["mujoco", "numba"])
 def test_it_is_listed_with_its_install_line_where_one_of_its_libraries_is_missing(
     missing: str, monkeypatch: pytest.MonkeyPatch
@@ -168,12 +158,6 @@ def test_it_is_listed_with_its_install_line_where_one_of_its_libraries_is_missin
 
     assert not described.available
     assert "gaplab[mujoco]" in (described.note or "")
-
-
-def test_static_friction_below_dynamic_friction_acts_as_if_equal_to_it(engine: MuJoCo) -> None:
-    below, equal = path(engine, in_material(Material(0.2, 0.8))), path(engine, in_material(Material(0.8, 0.8)))
-
-    assert np.array_equal(below, equal)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
@@ -199,13 +183,6 @@ def test_worlds_of_several_kinds_may_share_a_call(engine: MuJoCo) -> None:
     together = engine.rollouts(worlds, [MOTION]).positions_m[0]
 
     assert np.array_equal(together, [path(engine, world) for world in worlds])
-
-
-def test_more_worlds_than_are_kept_warm_give_the_same_numbers(engine: MuJoCo) -> None:
-    worlds = [replace(ROBOT.world, gravity_m_s2=9.0 + number / 10) for number in range(WARM_SCENES + 3)]
-    expected = [path(engine, world) for world in worlds]
-
-    assert np.array_equal([path(engine, world) for world in worlds], expected)
 
 
 def test_a_rollout_that_fails_does_not_harm_the_others_of_its_call(engine: MuJoCo) -> None:
@@ -274,36 +251,6 @@ def test_what_belongs_to_the_process_is_as_it_was_after_a_rollout(engine: MuJoCo
     assert mujoco.get_mjcb_time() is None
     assert mujoco.get_mjcb_sensor() is None
     assert mujoco.MjLogConfig.get().logto_file
-
-
-def test_targets_may_change_after_the_last_observation(engine: MuJoCo) -> None:
-    late = replace(
-        MOTION, times_s=np.append(MOTION.times_s, 100.0), targets=np.vstack([MOTION.targets, MOTION.targets[:1]])
-    )
-
-    assert np.array_equal(path(engine, ROBOT.world, late), path(engine, ROBOT.world))
-
-
-def test_an_observation_at_time_zero_sees_the_start(engine: MuJoCo) -> None:
-    trajectory = engine.rollout(ROBOT.world, replace(MOTION, observe_s=np.array([0.0, 0.5])))
-
-    assert trajectory.positions_m[0] == pytest.approx([0.0, 0.0, ROBOT.world.start_height_m])
-    assert trajectory.orientations[0] == pytest.approx([0.0, 0.0, 0.0, 1.0])
-
-
-def test_looking_more_often_changes_nothing_that_is_seen(engine: MuJoCo) -> None:
-    often = replace(MOTION, observe_s=np.arange(0.0, 3.0001, 0.1))
-
-    assert np.array_equal(path(engine, ROBOT.world, often)[[5, 30]], path(engine, ROBOT.world))
-
-
-def test_the_pose_is_of_the_bodys_frame_not_of_its_center_of_mass(engine: MuJoCo) -> None:
-    box = Body("box", 1.0, Box((0.1, 0.1, 0.1)), center_m=(0.0, 0.0, 0.05))
-    still = Motion(np.zeros(1), np.zeros((1, 0)), np.array([0.0, 1.0]))
-
-    heights = path(engine, World(bodies=(box,), start_height_m=0.0), still)[:, 2]
-
-    assert heights == pytest.approx(0.0, abs=2e-3)
 
 
 def test_every_body_has_the_mass_and_the_inertia_of_its_solid_shape(engine: MuJoCo) -> None:

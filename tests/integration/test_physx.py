@@ -16,7 +16,6 @@ from gaplab.services.core.shapes import Box, Sphere, Vector
 from gaplab.services.core.world import Body, Joint, Material, Motor, World
 from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.physx.scene import PhysXScene
-from gaplab.services.engines.stepping import WARM_SCENES
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 
@@ -62,14 +61,6 @@ def turned(engine: PhysX, world: World, target: float, steps: int) -> PhysXScene
     return scene
 
 
-def test_importing_the_engine_does_not_load_its_library() -> None:
-    script = (
-        "import sys; from gaplab.services.engines import engines; list(engines); assert 'sapien' not in sys.modules"
-    )
-
-    subprocess.run([sys.executable, "-c", script], check=True)
-
-
 def test_a_rollout_says_nothing_and_warns_of_nothing() -> None:
     script = """
 from dataclasses import replace
@@ -83,12 +74,6 @@ for gravity in (9.81, 1e9):
     said = subprocess.run([sys.executable, "-W", "error", "-c", script], capture_output=True, text=True, check=True)
 
     assert said.stdout + said.stderr == ""
-
-
-def test_static_friction_below_dynamic_friction_acts_as_if_equal_to_it(engine: PhysX) -> None:
-    below, equal = path(engine, in_material(Material(0.2, 0.8))), path(engine, in_material(Material(0.8, 0.8)))
-
-    assert np.array_equal(below, equal)
 
 
 def test_what_the_process_makes_the_librarys_defaults_is_neither_used_nor_changed(engine: PhysX) -> None:
@@ -108,15 +93,6 @@ def test_what_the_process_makes_the_librarys_defaults_is_neither_used_nor_change
         physx.set_body_config(before[2])
 
 
-def test_more_worlds_than_are_kept_warm_give_the_same_numbers(engine: PhysX) -> None:
-    worlds = [replace(ROBOT.world, gravity_m_s2=9.0 + number / 10) for number in range(WARM_SCENES + 3)]
-    expected = [path(engine, world) for world in worlds]
-
-    again = [path(engine, world) for world in worlds]
-
-    assert np.array_equal(again, expected)
-
-
 def test_a_start_in_the_middle_of_anything_is_a_fresh_start(engine: PhysX) -> None:
     """Also after a few steps near the start, when the contacts that PhysX might remember are much the same."""
     rng = np.random.default_rng(0)
@@ -132,15 +108,6 @@ def test_a_start_in_the_middle_of_anything_is_a_fresh_start(engine: PhysX) -> No
                 replace(motion, observe_s=np.array([steps / 100])),
             )
             assert np.array_equal(path(engine, ROBOT.world, motion), fresh)
-
-
-def test_the_pose_is_of_the_bodys_frame_not_of_its_center_of_mass(engine: PhysX) -> None:
-    box = Body("box", 1.0, Box((0.1, 0.1, 0.1)), center_m=(0.0, 0.0, 0.05))
-    still = Motion(np.zeros(1), np.zeros((1, 0)), np.array([0.0, 1.0]))
-
-    heights = path(engine, World(bodies=(box,), start_height_m=0.0), still)[:, 2]
-
-    assert heights == pytest.approx(0.0, abs=2e-3)
 
 
 def test_every_body_has_the_mass_and_the_inertia_of_its_solid_shape(engine: PhysX) -> None:

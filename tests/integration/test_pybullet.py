@@ -1,7 +1,5 @@
 """What is particular to the PyBullet engine, beyond the contract that every engine keeps."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from gc import collect
@@ -20,7 +18,6 @@ from gaplab.services.core.shapes import Box, Hull, Part, Sphere
 from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, World
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
-from gaplab.services.engines.stepping import WARM_SCENES
 from gaplab.services.specs.default_engines import default_engine
 
 pytest.importorskip("pybullet")
@@ -62,14 +59,6 @@ def test_a_robot_with_more_links_than_bullet_permits_is_refused(engine: PyBullet
     assert default_engine(imported) == "mujoco"
 
 
-def test_importing_the_engine_does_not_load_its_library() -> None:
-    script = (
-        "import sys; from gaplab.services.engines import engines; list(engines); assert 'pybullet' not in sys.modules"
-    )
-
-    subprocess.run([sys.executable, "-c", script], check=True)
-
-
 def test_a_server_closes_when_nothing_refers_to_its_scene() -> None:
     bullet, engine = import_module("pybullet"), PyBullet()
     engine.rollout(ROBOT.world, MOTION)
@@ -81,12 +70,6 @@ def test_a_server_closes_when_nothing_refers_to_its_scene() -> None:
     collect()
 
     assert not bullet.getConnectionInfo(client)["isConnected"]
-
-
-def test_static_friction_below_dynamic_friction_acts_as_if_equal_to_it(engine: PyBullet) -> None:
-    below, equal = path(engine, in_material(Material(0.2, 0.8))), path(engine, in_material(Material(0.8, 0.8)))
-
-    assert np.array_equal(below, equal)
 
 
 def test_equal_frictions_cost_no_look_at_the_contacts(engine: PyBullet, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,47 +87,6 @@ def test_a_robot_in_its_gait_sticks_and_slides(engine: PyBullet, monkeypatch: py
 
     assert len(slid) > 10
     assert len(set(slid)) == 4, "every foot slides at times"
-
-
-def test_more_worlds_than_are_kept_warm_give_the_same_numbers(engine: PyBullet) -> None:
-    worlds = [replace(ROBOT.world, gravity_m_s2=9.0 + number / 10) for number in range(WARM_SCENES + 3)]
-    expected = [path(engine, world) for world in worlds]
-
-    again = [path(engine, world) for world in worlds]
-
-    assert np.array_equal(again, expected)
-
-
-def test_targets_may_change_between_time_steps_and_after_the_last_observation(engine: PyBullet) -> None:
-    late = replace(
-        MOTION,
-        times_s=np.append(MOTION.times_s, [100.0, 100.0001]),
-        targets=np.vstack([MOTION.targets, MOTION.targets[:2]]),
-    )
-
-    assert np.array_equal(path(engine, ROBOT.world, late), path(engine, ROBOT.world))
-
-
-def test_an_observation_at_time_zero_sees_the_start(engine: PyBullet) -> None:
-    trajectory = engine.rollout(ROBOT.world, replace(MOTION, observe_s=np.array([0.0, 0.5])))
-
-    assert trajectory.positions_m[0] == pytest.approx([0.0, 0.0, ROBOT.world.start_height_m])
-    assert trajectory.orientations[0] == pytest.approx([0.0, 0.0, 0.0, 1.0])
-
-
-def test_looking_more_often_changes_nothing_that_is_seen(engine: PyBullet) -> None:
-    often = replace(MOTION, observe_s=np.arange(0.0, 3.0001, 0.1))
-
-    assert np.array_equal(path(engine, ROBOT.world, often)[[5, 30]], path(engine, ROBOT.world))
-
-
-def test_the_pose_is_of_the_bodys_frame_not_of_its_center_of_mass(engine: PyBullet) -> None:
-    box = Body("box", 1.0, Box((0.1, 0.1, 0.1)), center_m=(0.0, 0.0, 0.05))
-    still = Motion(np.zeros(1), np.zeros((1, 0)), np.array([0.0, 1.0]))
-
-    heights = path(engine, World(bodies=(box,), start_height_m=0.0), still)[:, 2]
-
-    assert heights == pytest.approx(0.0, abs=2e-3)
 
 
 def test_every_body_has_the_mass_and_the_inertia_of_its_solid_shape(engine: PyBullet) -> None:

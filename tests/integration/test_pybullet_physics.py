@@ -8,11 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion
 from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.world import Body, Joint, Material, World
-from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 
@@ -147,35 +144,3 @@ def test_a_sledge_broken_loose_accelerates_against_the_dynamic_friction(sledge: 
 
     expected = (pull - material.dynamic_friction) * G
     assert (sledge.speed() - before) / (20 * STEP_S) == pytest.approx(expected, rel=0.1)
-
-
-def fall(material: Material) -> tuple[FloatArray, FloatArray]:
-    """Times and heights of a ball's lowest point, dropped from 1 m."""
-    times = np.arange(0, 1.2, STEP_S)
-    still = Motion(np.zeros(1), np.zeros((1, 0)), times)
-    return times, PyBullet().rollout(replace(BALL, material=material), still).positions_m[:, 2] - 0.05
-
-
-def test_a_dropped_ball_falls_freely() -> None:
-    times, heights = fall(Material())
-
-    falling = times < 0.4
-    # Bullet adds speed before it moves, which is ahead of the parabola by half a step's worth of speed
-    expected = 1 - 0.5 * G * times * (times + STEP_S)
-    assert heights[falling] == pytest.approx(expected[falling], abs=1e-6)
-
-
-@pytest.mark.parametrize("restitution", [0.3, 0.6, 0.85])
-def test_a_dropped_ball_bounces_with_the_restitution(restitution: float) -> None:
-    _, heights = fall(Material(restitution=restitution))
-
-    landed = int(np.argmax(heights < 0.02))
-    rebound = np.sqrt(heights[landed:].max() / 1.0)
-    assert rebound == pytest.approx(restitution, rel=0.08)  # within the speed that one step adds
-
-
-def test_a_ball_without_restitution_stays_down() -> None:
-    _, heights = fall(Material(restitution=0.0))
-
-    landed = int(np.argmax(heights < 0.02))
-    assert heights[landed:].max() < 0.02
