@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Run the README's two commands on a machine that has python3.11, make, git and package registries, and nothing else.
+# Run `make demo` and `make test` on a machine that has python3.11, make, git and package registries, and nothing else.
 #
 #   tests/bare_machine.sh                   # as root: make demo, then make test
 #   tests/bare_machine.sh make lint         # another command

@@ -20,7 +20,8 @@ from gaplab.services.engines.mujoco.settings import FALL, PD, Servo, Settings, s
 
 ROTOR = 8.0
 """Inertia of a servo's rotor, relative to that of what its joint carries in the zero pose: in one step a free limb
-reaches eight ninths of the target speed. docs/engines.md has results for other values."""
+reaches eight ninths of the target speed. The rank correlation with PyBullet over random gaits was 0.78; with 2, 4, 16
+and 32 it was 0.41, 0.72, 0.66 and 0.57."""
 
 WEAK = PDLaw(0.0, 0.0, 0.0, 0.0)
 """The law of a motor without strength."""
