@@ -1,1 +1,1 @@
-"""Evidence that the quadruped is worth tuning: the figures of docs/robot.md."""
+"""Evidence that the quadruped is worth tuning: the tables of docs/robot.md."""

@@ -1,4 +1,4 @@
-"""Evidence that the quadruped is worth tuning: each command prints figures of docs/robot.md in full.
+"""Evidence that the quadruped is worth tuning: each command prints one table of docs/robot.md.
 
 The code of experiments computes all numbers, with addressed random streams, so a command always prints the same ones.
 Ratios are to the direct baseline: the mean fitness of controllers evolved in reality on the same budget.
