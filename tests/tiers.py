@@ -9,7 +9,7 @@ a file marked `apart`.
 """
 
 import resource
-from collections import Counter
+from collections import defaultdict
 from typing import Any
 
 import pytest
@@ -23,7 +23,7 @@ STORES = ("store_url", "database_url")
 SLOWEST = 10
 """Files that the closing table lists."""
 
-_seconds: Counter[str] = Counter()
+_seconds: dict[str, float] = defaultdict(float)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -84,13 +84,13 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     """Print the slowest files and the sums by folder."""
     if hasattr(config, "workerinput") or len(_seconds) == 1:
         return
-    folders: Counter[str] = Counter()
+    folders: dict[str, float] = defaultdict(float)
     for file, seconds in _seconds.items():
         folders["/".join(file.split("/")[:2])] += seconds
     terminalreporter.section("seconds of all processes together")
-    for title, rows in (("by folder", folders.most_common()), ("slowest files", _seconds.most_common(SLOWEST))):
+    for title, rows in (("by folder", folders), ("slowest files", _seconds)):
         terminalreporter.line(f"{title}:")
-        for name, seconds in rows:
+        for name, seconds in sorted(rows.items(), key=lambda row: -row[1])[:SLOWEST]:
             terminalreporter.line(f"{seconds:8.1f}  {name}")
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     minutes = sum(each.ru_utime + each.ru_stime for each in used) / 60
