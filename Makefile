@@ -49,11 +49,11 @@ clean:  ## remove the environment and caches; results stay
 
 .venv/installed: pyproject.toml constraints.txt | .venv/bin/pip
 	@echo "Installing gaplab and its libraries in .venv; this takes one to five minutes."
-	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
+	$(BIN)/pip install --quiet --quiet --disable-pip-version-check --constraint constraints.txt --editable .
 	touch $@
 
 .venv/installed-dev: .venv/installed
-	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/pip install --quiet --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	touch $@
 
 .venv/prepared: .venv/installed-dev
