@@ -56,8 +56,13 @@ def confirm(estimate: EstimateRead, ask: Ask | None) -> None:
         NotSubmitted: the answer is not yes.
     """
     print(f"{sentence(estimate)}.", file=sys.stderr, flush=True)  # noqa: T201 - for a person
-    if estimate.seconds > LONG_S and ask is not None and ask(QUESTION).strip().lower() not in {"y", "yes"}:
+    if estimate.seconds > LONG_S and ask is not None and not is_yes(ask(QUESTION)):
         raise NotSubmitted
+
+
+def is_yes(answer: str) -> bool:
+    """Return whether a person agreed."""
+    return answer.strip().lower() in {"y", "yes"}
 
 
 def can_ask() -> bool:
