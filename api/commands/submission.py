@@ -27,7 +27,7 @@ SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or -
 def submit(
     spec: SpecFile,
     watch: Annotated[bool, typer.Option("--watch", help="show the progress until it ends")] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, however long it takes")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="print the complete spec and the estimated cost; submit nothing")
     ] = False,
@@ -59,8 +59,8 @@ def submit_confirmed(client: Client, spec: Mapping[str, Any], *, yes: bool) -> R
         NotSubmitted: the person declined.
     """
     with keyboard() as ask:
-        confirm(client.estimate(spec), None if yes else ask)
-    return client.submit(spec, yes=True)
+        agreed = confirm(client.estimate(spec), None if yes else ask)
+    return client.submission.send(spec, confirm_cost=yes or agreed)
 
 
 def _print_estimate(estimate: EstimateRead, *, as_json: bool) -> None:

@@ -41,11 +41,20 @@ def test_a_dry_run_prints_the_complete_spec_and_submits_nothing(gaplab: Gaplab, 
 
 
 def test_a_program_without_a_terminal_is_not_asked(gaplab: Gaplab, sqlite_store: Store) -> None:
-    said = gaplab("submit", "-", stdin="{}")
+    said = gaplab("submit", "-", stdin='{"engine": "mujoco"}')
 
     assert said.code == 0
     assert "7 experiments, 280 repetitions" in said.err
     assert len(listing.list_studies(sqlite_store).items) == 1
+
+
+def test_thousands_of_core_hours_need_a_yes_without_a_terminal_too(gaplab: Gaplab, sqlite_store: Store) -> None:
+    refused = gaplab("submit", "-", stdin="{}")
+
+    assert refused.code == Exit.INVALID
+    assert "core-hours; above 1,000 (GAPLAB_MAX_UNCONFIRMED_CORE_HOURS), confirm_cost=true or --yes" in refused.err
+    assert listing.list_studies(sqlite_store).items == ()
+    assert gaplab("submit", "-", "--yes", stdin="{}").code == Exit.OK
 
 
 @pytest.mark.parametrize(("answer", "studies"), [("n", 0), ("y", 1)])
@@ -82,8 +91,8 @@ def test_only_yes_is_yes(url: str) -> None:
         estimate: EstimateRead = client.estimate({})
 
     assert estimate.seconds > confirmation.LONG_S
-    confirm(estimate, None)
-    confirm(estimate, lambda _: " Yes\n")
+    assert not confirm(estimate, None)
+    assert confirm(estimate, lambda _: " Yes\n")
     for answer in ("", "n", "yesterday"):
         with pytest.raises(NotSubmitted):
             confirm(estimate, lambda _: answer)  # noqa: B023 - asked at once
