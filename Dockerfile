@@ -6,10 +6,10 @@ RUN useradd --create-home gaplab
 
 COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY api api
-COPY gaplab gaplab
 COPY migrations migrations
 COPY schemas schemas
 COPY services services
+COPY src src
 COPY workers workers
 RUN pip install --no-cache-dir --constraint constraints.txt .
 

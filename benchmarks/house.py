@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
-FOLDERS = ("api", "benchmarks", "docs", "gaplab", "migrations", "schemas", "services", "workers")
+FOLDERS = ("api", "benchmarks", "docs", "migrations", "schemas", "services", "src", "workers")
 
 Trees = Mapping[Path, ast.Module]
 Graph = Mapping[str, set[str]]

@@ -115,6 +115,7 @@ class Limits(_Environment):
         body_bytes: bytes of one request.
         iterations: iterations of one experiment.
         repetitions: repetitions of one submission, over all experiments of a study.
+        unconfirmed_core_hours: expected hours of one core for a submission that does not confirm its cost.
         experiments_per_token: experiments of one token that have not ended.
         experiments: experiments of all tokens that have not ended.
         rollouts_per_token: remaining rollouts of one token, in experiments that have not ended.
@@ -131,6 +132,7 @@ class Limits(_Environment):
     body_bytes: PositiveInt = 1_000_000
     iterations: PositiveInt = 1_000
     repetitions: PositiveInt = 10_000
+    unconfirmed_core_hours: PositiveInt = 1_000
     experiments_per_token: PositiveInt = 1_000
     experiments: PositiveInt = 5_000
     rollouts_per_token: PositiveInt = 100_000_000_000

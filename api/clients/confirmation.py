@@ -45,8 +45,8 @@ def duration(seconds: float) -> str:
     return f"about {seconds:.0f} s"
 
 
-def confirm(estimate: EstimateRead, ask: Ask | None) -> None:
-    """Show the cost on standard error, and ask if it is long and a person can answer.
+def confirm(estimate: EstimateRead, ask: Ask | None) -> bool:
+    """Show the cost on standard error, and ask if it is long and a person can answer; return whether one agreed.
 
     Args:
         estimate: expected cost.
@@ -56,8 +56,16 @@ def confirm(estimate: EstimateRead, ask: Ask | None) -> None:
         NotSubmitted: the answer is not yes.
     """
     print(f"{sentence(estimate)}.", file=sys.stderr, flush=True)  # noqa: T201 - for a person
-    if estimate.seconds > LONG_S and ask is not None and ask(QUESTION).strip().lower() not in {"y", "yes"}:
+    if estimate.seconds <= LONG_S or ask is None:
+        return False
+    if not is_yes(ask(QUESTION)):
         raise NotSubmitted
+    return True
+
+
+def is_yes(answer: str) -> bool:
+    """Return whether a person agreed."""
+    return answer.strip().lower() in {"y", "yes"}
 
 
 def can_ask() -> bool:

@@ -31,6 +31,9 @@ PASSING = {502, 503, 504}
 BUSY = 429
 """Status of a GET whose turn has not come: others compute replays or draw figures. The answer says how long to wait."""
 
+CONFIRMED = "?confirm_cost=true"
+"""Query that lets a request take any number of core-hours."""
+
 FINAL = (httpx2.ConnectError, httpx2.InvalidURL, httpx2.UnsupportedProtocol)
 """Errors of a request that a repetition would meet again."""
 

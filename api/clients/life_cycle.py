@@ -1,6 +1,6 @@
 """Requests that change the state or the size of experiments and studies."""
 
-from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.connection import CONFIRMED, Connection, segment
 from gaplab.api.clients.records import Record, Records, path_of
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
@@ -34,11 +34,19 @@ class LifeCycle:
         return self._apply(id, Verb.RETRY)
 
     def extend(
-        self, id: str, *, iterations: int | None = None, repetitions: int | None = None
+        self, id: str, *, iterations: int | None = None, repetitions: int | None = None, yes: bool = False
     ) -> ExperimentRead | StudyRead:
-        """Extend a completed experiment, or those of a study that are smaller, to these totals."""
+        """Extend a completed experiment, or those of a study that are smaller, to these totals.
+
+        Args:
+            id: id of the experiment or the study.
+            iterations: new total; left out: unchanged.
+            repetitions: new total; left out: unchanged.
+            yes: extend it whatever it costs.
+        """
         totals = {"iterations": iterations, "repetitions": repetitions}
-        return self._apply(id, Verb.EXTEND, {name: total for name, total in totals.items() if total is not None})
+        given = {name: total for name, total in totals.items() if total is not None}
+        return self._apply(id, Verb.EXTEND, given, CONFIRMED if yes else "")
 
     def schedule(self, id: str, **changes: int | None) -> ExperimentRead:
         """Change the `priority` or `max_parallel` of an experiment."""
@@ -48,6 +56,6 @@ class LifeCycle:
         """Let an experiment continue under other versions of engines or plug-ins than it started with."""
         return self._connection.change(ExperimentRead, "POST", f"/experiments/{segment(id)}/accept-versions")
 
-    def _apply(self, id: str, verb: Verb, body: dict[str, int] | None = None) -> Record:
+    def _apply(self, id: str, verb: Verb, body: dict[str, int] | None = None, query: str = "") -> Record:
         record = self._records.find(id)
-        return self._connection.change(type(record), "POST", f"{path_of(record)}/{verb}", json=body)
+        return self._connection.change(type(record), "POST", f"{path_of(record)}/{verb}{query}", json=body)

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from gaplab.api.clients.confirmation import can_ask, confirm
-from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.connection import CONFIRMED, Connection, segment
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.sensitivity import SensitivityRead, SensitivitySpec
@@ -35,17 +35,19 @@ class Submission:
 
         Args:
             spec: spec of an experiment or a study.
-            yes: submit without estimate and question.
+            yes: submit without estimate and question, whatever it costs.
 
         Raises:
             NotSubmitted: the person declined.
         """
-        if not yes and can_ask():
-            confirm(self.estimate(spec), input)
-        body = _body(spec)
+        return self.send(spec, confirm_cost=yes or (can_ask() and confirm(self.estimate(spec), input)))
+
+    def send(self, spec: Spec, *, confirm_cost: bool = False) -> ExperimentRead | StudyRead:
+        """Submit without estimate and question; the service refuses a high cost unless it is confirmed."""
+        body, query = _body(spec), CONFIRMED if confirm_cost else ""
         if is_experiment(body):
-            return self._connection.post(ExperimentRead, "/experiments", body)
-        return self._connection.post(StudyRead, "/studies", body)
+            return self._connection.post(ExperimentRead, f"/experiments{query}", body)
+        return self._connection.post(StudyRead, f"/studies{query}", body)
 
     def estimate(self, spec: Spec) -> EstimateRead:
         """Return the rollouts, the duration and the resolved specs of an experiment or a study; nothing is stored."""

@@ -28,7 +28,7 @@ from gaplab.api.process.local_service import start_service
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
 
-SPECS = Path(__file__).parents[3] / "examples"
+SPECS = Path(__file__).parents[4] / "examples"
 STUDIES = ("toy", "quadruped")
 SIZED = "quadruped"
 """The study whose size depends on the speed of this machine."""

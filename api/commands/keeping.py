@@ -1,6 +1,5 @@
 """Commands that tag, archive and delete studies and experiments, and those of saved views."""
 
-import sys
 from typing import Annotated
 
 import typer
@@ -9,8 +8,8 @@ from rich.markup import escape
 from gaplab.api.clients.progress.text import console
 from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands.app import KEEPING, RESULTS, AsJson, Id, Url, app, connect
-from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.questions import demand_yes
 from gaplab.api.commands.tables import table
 from gaplab.schemas.records import StudyRead
 from gaplab.schemas.views import Order, Shown, ViewRead
@@ -59,15 +58,15 @@ def unarchive(id: Id, as_json: AsJson = False, url: Url = None) -> None:
 @app.command(rich_help_panel=KEEPING)
 def delete(
     id: Id,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask; without a terminal nothing is asked")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask; needed without a terminal")] = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Delete a study or an experiment that has ended, with its results, for good; `gaplab export` saves it first."""
     with connect(url) as client:
         record = client.find(id)
-        if not yes and in_terminal():
-            _ask(record)
+        if not yes:
+            demand_yes(f"delete {_size(record)}", "deleted")
         deleted = client.delete(id)
     print_result(deleted, f"{deleted.name} ({deleted.id}) is deleted.", as_json=as_json)
 
@@ -129,25 +128,8 @@ def _sentence(view: ViewRead, done: str) -> str:
     return f"The view {view.name!r} {done}: {view.query or 'all'}"
 
 
-def in_terminal() -> bool:
-    """Return whether a person can be asked."""
-    return sys.stdin.isatty() and sys.stdout.isatty()
-
-
-def _ask(record: Record) -> None:
-    """Ask a person whether to delete the record.
-
-    Raises:
-        CommandError: the answer is not yes, or none: Ctrl-C or the end of the input.
-    """
+def _size(record: Record) -> str:
     experiments = experiments_of(record)
     repetitions = sum(experiment.progress.repetitions for experiment in experiments)
-    what = f"{record.name!r} with {repetitions} repetitions"
-    if isinstance(record, StudyRead):
-        what += f" in {len(experiments)} experiments"
-    try:
-        confirmed = typer.confirm(f"Delete {what} for good?", err=True)
-    except typer.Abort:
-        confirmed = False
-    if not confirmed:
-        raise CommandError("nothing was deleted", Exit.INTERRUPTED)
+    within = f" in {len(experiments)} experiments" if isinstance(record, StudyRead) else ""
+    return f"{record.name!r} with {repetitions} repetitions{within}"

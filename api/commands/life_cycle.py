@@ -52,12 +52,13 @@ def extend(
     id: Id,
     iterations: Annotated[int | None, Total] = None,
     repetitions: Annotated[int | None, Total] = None,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="extend it whatever it costs")] = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Add iterations or repetitions to a completed experiment, or to those of a study; results are kept."""
     with connect(url) as client:
-        _print_state(client.extend(id, iterations=iterations, repetitions=repetitions), as_json=as_json)
+        _print_state(client.extend(id, iterations=iterations, repetitions=repetitions, yes=yes), as_json=as_json)
 
 
 @app.command("accept-versions", rich_help_panel=LIFE)

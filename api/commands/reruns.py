@@ -28,7 +28,7 @@ def rerun(
     repetitions: Annotated[
         int | None, typer.Option(min=1, help="of each experiment to verify; left out: all", show_default=False)
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, however long it takes")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")] = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:

@@ -2,21 +2,21 @@
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.confirmation import Ask, confirm, sentence
+from gaplab.api.clients.confirmation import confirm, sentence
 from gaplab.api.clients.progress.text import console, counts, state_text
 from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json
+from gaplab.api.commands.questions import keyboard
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import State
 
@@ -27,7 +27,7 @@ SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or -
 def submit(
     spec: SpecFile,
     watch: Annotated[bool, typer.Option("--watch", help="show the progress until it ends")] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, however long it takes")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="print the complete spec and the estimated cost; submit nothing")
     ] = False,
@@ -58,29 +58,9 @@ def submit_confirmed(client: Client, spec: Mapping[str, Any], *, yes: bool) -> R
     Raises:
         NotSubmitted: the person declined.
     """
-    with _keyboard() as ask:
-        confirm(client.estimate(spec), None if yes else ask)
-    return client.submit(spec, yes=True)
-
-
-@contextmanager
-def _keyboard() -> Iterator[Ask | None]:
-    """Yield what asks the person at the terminal, even if standard input is the spec; None without a terminal."""
-    if not sys.stdout.isatty():
-        yield None
-        return
-    try:
-        terminal = open("/dev/tty", "r+b", buffering=0)  # noqa: SIM115 - closed below
-    except OSError:
-        yield input if sys.stdin.isatty() else None
-        return
-    with terminal:
-
-        def ask(question: str) -> str:
-            terminal.write(question.encode())
-            return terminal.readline().decode(errors="replace")
-
-        yield ask
+    with keyboard() as ask:
+        agreed = confirm(client.estimate(spec), None if yes else ask)
+    return client.submission.send(spec, confirm_cost=yes or agreed)
 
 
 def _print_estimate(estimate: EstimateRead, *, as_json: bool) -> None:

@@ -116,6 +116,19 @@ class Paging(Parameters):
     cursor: str | None = Field(default=None, max_length=2_000, description="`next` of the previous part")
 
 
+class Confirmation(Parameters):
+    """Whether a submission takes long on purpose."""
+
+    confirm_cost: bool = Field(
+        default=False,
+        description="submit it even if it takes more core-hours than `GAPLAB_MAX_UNCONFIRMED_CORE_HOURS`, else refused",
+    )
+
+    def given(self, admitted: Admission) -> Admission:
+        """Return the admission with this confirmation."""
+        return replace(admitted, cost_known=self.confirm_cost)
+
+
 class Revealing(Parameters):
     """Whether to show reality's parameters before the experiment ends."""
 

@@ -20,6 +20,7 @@ from gaplab.services.core.errors import (
     Changed,
     ConditionMissing,
     Conflict,
+    CostUnconfirmed,
     EngineInterrupted,
     EngineUnavailable,
     Forbidden,
@@ -45,6 +46,7 @@ MEDIA_TYPE = "application/problem+json"
 
 KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     InvalidSpec: (422, "invalid-spec", "The spec is invalid"),
+    CostUnconfirmed: (422, "cost-unconfirmed", "The cost needs a confirmation"),
     InvalidRobotFile: (422, "invalid-robot-file", "The robot file is invalid"),
     NotFound: (404, "not-found", "Not found"),
     Conflict: (409, "conflict", "The present state forbids this"),
@@ -120,7 +122,8 @@ def of_gaplab(request: Request, error: Exception) -> Response:
         return _shown(request, refused, _headers(request, error))
     errors = [_spec_error(violation) for violation in error.violations]
     in_body = any(each.pointer.startswith("/") or not each.pointer for each in errors)
-    return response(problem(*(kind if in_body else INVALID_REQUEST), _sentence(errors, len(errors)), errors))
+    is_named = in_body or isinstance(error, CostUnconfirmed)
+    return response(problem(*(kind if is_named else INVALID_REQUEST), _sentence(errors, len(errors)), errors))
 
 
 def _shown(request: Request, refused: Problem, headers: dict[str, str]) -> Response:

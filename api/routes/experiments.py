@@ -6,7 +6,17 @@ from fastapi import APIRouter, Body, Path, Query, Request, Response
 from pydantic import Field
 
 from gaplab.api.http import conditional, links
-from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Id, Paging, Parameters, Revealing, StoreDep, created
+from gaplab.api.http.dependencies import (
+    AdmissionDep,
+    CallerDep,
+    Confirmation,
+    Id,
+    Paging,
+    Parameters,
+    Revealing,
+    StoreDep,
+    created,
+)
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import State
@@ -98,11 +108,12 @@ def submit_experiment(
     spec: Annotated[ExperimentSpec, Body(openapi_examples=ExperimentSpec.EXAMPLES)],
     store: StoreDep,
     admitted: AdmissionDep,
+    query: Annotated[Confirmation, Query()],
     request: Request,
     response: Response,
 ) -> ExperimentRead:
     """Queue an experiment. Whatever the spec leaves out has the paper's value."""
-    done = submission.admit_experiment(store, spec, admitted)
+    done = submission.admit_experiment(store, spec, query.given(admitted))
     return created(done, response, request.app.url_path_for("read_experiment", id=done.answer.id))
 
 

@@ -2,9 +2,9 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body
+from fastapi import APIRouter, Body, Query
 
-from gaplab.api.http.dependencies import Id, LimitedDep, StoreDep
+from gaplab.api.http.dependencies import Confirmation, Id, LimitedDep, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
@@ -73,13 +73,14 @@ def extend_experiment(
     totals: Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)],
     store: StoreDep,
     admitted: LimitedDep,
+    query: Annotated[Confirmation, Query()],
 ) -> ExperimentRead:
     """Set new totals of iterations or repetitions for a completed experiment.
 
     Existing results stay, and the whole equals an experiment that was submitted with these totals. A stopped experiment
     that is given its own totals is completed.
     """
-    return extension.extend_experiment(store, id, totals, admitted)
+    return extension.extend_experiment(store, id, totals, query.given(admitted))
 
 
 @_experiment.patch(
@@ -137,13 +138,14 @@ def extend_study(
     totals: Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)],
     store: StoreDep,
     admitted: LimitedDep,
+    query: Annotated[Confirmation, Query()],
 ) -> StudyRead:
     """Set new totals of iterations or repetitions for the completed experiments of a study that are smaller.
 
     Existing results stay. An experiment that is larger keeps its size, and one that takes no samples has no iterations
     to add. A stopped experiment is completed.
     """
-    return extension.extend_study(store, id, totals, admitted)
+    return extension.extend_study(store, id, totals, query.given(admitted))
 
 
 router = APIRouter()

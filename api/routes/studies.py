@@ -6,7 +6,7 @@ from fastapi import APIRouter, Body, Query, Request, Response
 from pydantic import Field
 
 from gaplab.api.http import conditional, links
-from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Id, Paging, Revealing, StoreDep, created
+from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Confirmation, Id, Paging, Revealing, StoreDep, created
 from gaplab.api.http.problems import documented
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import State
@@ -52,11 +52,12 @@ def submit_study(
     spec: Annotated[StudySpec, Body(openapi_examples=StudySpec.EXAMPLES)],
     store: StoreDep,
     admitted: AdmissionDep,
+    query: Annotated[Confirmation, Query()],
     request: Request,
     response: Response,
 ) -> StudyRead:
     """Queue one experiment for each strategy, all else equal. Whatever the spec leaves out has the paper's value."""
-    done = submission.admit_study(store, spec, admitted)
+    done = submission.admit_study(store, spec, query.given(admitted))
     return created(done, response, request.app.url_path_for("read_study", id=done.answer.id))
 
 

@@ -82,6 +82,10 @@ class InvalidRobotFile(InvalidSpec):
     """A robot file that cannot be stored, with all its violations."""
 
 
+class CostUnconfirmed(InvalidSpec):
+    """The request takes long, and does not say that this is meant."""
+
+
 class NotFound(GaplabError):
     """No object has this name or id."""
 

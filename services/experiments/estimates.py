@@ -1,27 +1,31 @@
 """Estimates: the cost of a study or an experiment that is checked and resolved as if submitted, and not stored."""
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from gaplab.schemas.estimates import EngineCost, EstimateRead, ExperimentCost
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.core.errors import CostUnconfirmed, Violation
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.engines import engines
-from gaplab.services.experiments.limits import check_extent
+from gaplab.services.experiments.limits import Admission, check_extent
 from gaplab.services.experiments.stored_robots import resolved_here
-from gaplab.services.settings import Limits
+from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts
 from gaplab.services.store.queries import costs, supervisors
-from gaplab.services.store.session import Store
+from gaplab.services.store.session import Session, Store
 
 LATEST = 100
 """Number of the newest experiments whose times estimate a rollout."""
 
 SILENT_S = 60.0
 """Age of the last heartbeat after which a supervisor does not count as working."""
+
+SLOWEST_ROLLOUT_S = 60.0
+"""Longest usual time of a rollout: what is cheap even then needs no look at earlier experiments."""
 
 Key = tuple[str, str]
 """Robot and engine, with their options."""
@@ -54,6 +58,32 @@ def estimate(
         supervisors=working,
         specs=tuple(each.model_dump(mode="json") for each in resolved),
     )
+
+
+def check_cost(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
+    """Refuse what takes long, unless the request confirms it.
+
+    Args:
+        session: session of the transaction that stores it.
+        specs: specs of the submission.
+        admitted: the sender and its limits.
+        done: completed rollouts of these specs.
+
+    Raises:
+        CostUnconfirmed: the message has the cost and the limit.
+    """
+    if admitted.limits is None or admitted.cost_known:
+        return
+    limit = admitted.limits.unconfirmed_core_hours
+    rollouts = sum(expected_rollouts(each) * each.repetitions for each in specs)
+    if (rollouts - done) * SLOWEST_ROLLOUT_S <= limit * 3_600:
+        return
+    measured = _measured(costs.latest(session, LATEST))
+    seconds = sum(_experiment(each, _cost(each, measured)).core_seconds for each in specs)
+    if (hours := seconds / 3_600 * (1 - done / rollouts)) > limit:
+        least = f"above {limit:,} ({variable_of('unconfirmed_core_hours')}), confirm_cost=true or --yes confirms it"
+        message = f"this takes about {hours:,.0f} core-hours; {least}"
+        raise CostUnconfirmed([Violation("confirm_cost", False, message, "true")])
 
 
 def _resolve(spec: StudySpec | ExperimentSpec) -> tuple[ResolvedSpec, ...]:

@@ -13,6 +13,7 @@ from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments.archiving import show_again
+from gaplab.services.experiments.estimates import check_cost
 from gaplab.services.experiments.lifecycle import get_permitting, get_study_permitting
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.states import move, settle
@@ -39,6 +40,7 @@ def extend_experiment(
         Conflict: it is not COMPLETED, the totals add nothing, or its reality is unknown here.
         InvalidSpec: a total is smaller than the present one or above a limit, or a strategy without samples gets
             iterations.
+        CostUnconfirmed: it takes long, and the request does not say that this is meant.
         LimitReached: too much work is in progress.
     """
     experiment = get_permitting(session, experiment_id, Verb.EXTEND)
@@ -64,6 +66,7 @@ def extend_study(session: Session, study_id: str, extension: ExtensionSpec, admi
         Conflict: none of its experiments is COMPLETED, the totals add nothing to these, or their reality is unknown
             here.
         InvalidSpec: no total is given, or one is above a limit.
+        CostUnconfirmed: it takes long, and the request does not say that this is meant.
         LimitReached: too much work is in progress.
     """
     study, experiments = get_study_permitting(session, study_id, Verb.EXTEND)
@@ -97,6 +100,7 @@ def _extend(session: Session, larger: Sequence[tuple[ExperimentRow, ResolvedSpec
     check_extent(specs, admitted.limits)
     computed = tallies(session, [experiment.id for experiment, _ in growing]).values()
     done = sum(tally.rollouts_done + tally.rollouts_saved for tally in computed)
+    check_cost(session, specs, admitted, done=done)
     check_load(session, specs, admitted, done=done)
     for experiment, spec in growing:
         _grow(session, experiment, spec)

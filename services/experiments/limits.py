@@ -27,11 +27,13 @@ class Admission:
         token: id of the sender's token; None if no token is required.
         limits: limits to check; None for none, as for programs that use the database directly.
         key: idempotency key of the request.
+        cost_known: whether the request confirms its cost, however high.
     """
 
     token: str | None = None
     limits: Limits | None = None
     key: str | None = None
+    cost_known: bool = False
 
 
 FREELY = Admission()

@@ -10,6 +10,7 @@ from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments.checks import queue_for
+from gaplab.services.experiments.estimates import check_cost
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.stored_robots import resolved_here
@@ -38,6 +39,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
+        CostUnconfirmed: it takes long, and the request does not say that this is meant.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's experiment was deleted.
@@ -46,6 +48,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
     check_extent([resolved], admitted.limits)
 
     def create(session: Session) -> ExperimentRead:
+        check_cost(session, [resolved], admitted)
         check_load(session, [resolved], admitted)
         row = _insert(session, resolved, admitted)
         queue_for(session, [row])
@@ -68,6 +71,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
+        CostUnconfirmed: it takes long, and the request does not say that this is meant.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's study was deleted.
@@ -76,6 +80,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
     check_extent(resolved, admitted.limits)
 
     def create(session: Session) -> StudyRead:
+        check_cost(session, resolved, admitted)
         check_load(session, resolved, admitted)
         study = insert_study(session, spec.name or "study")
         rows = [_insert(session, each, admitted, study, position) for position, each in enumerate(resolved)]

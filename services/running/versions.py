@@ -26,6 +26,9 @@ DISTRIBUTIONS = {"mujoco": ("mujoco-core", "mujoco")}
 """Distributions that may provide a module, if its own name is not the only one."""
 
 ROOT = Path(__file__).parents[2]
+CLONE = ROOT.parents[1]
+"""Folder of the repository, unless this code was installed elsewhere."""
+
 GIT_S = 5.0
 """Longest wait for git to name the commit; large folders on slow disks take a second."""
 
@@ -132,11 +135,11 @@ def _digest() -> str:
 
 def _git(*command: str) -> str | None:
     """Return git's answer about this code; None without git, or if the folder is not the top of a repository."""
-    if not (ROOT.parent / ".git").exists():
+    if not (CLONE / ".git").exists():
         return None
     try:
         run = subprocess.run(  # noqa: S603 - commands of ours
-            ["git", "-C", str(ROOT.parent), *command],  # noqa: S607 - whichever git there is
+            ["git", "-C", str(CLONE), *command],  # noqa: S607 - whichever git there is
             capture_output=True,
             text=True,
             timeout=GIT_S,

@@ -17,7 +17,7 @@ from tests.e2e.elsewhere import free_port
 from tests.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
-PARTS = ("api", "gaplab", "migrations", "schemas", "services", "workers", "pyproject.toml", "README.md", "LICENSE")
+PARTS = ("api", "migrations", "schemas", "services", "src", "workers", "pyproject.toml", "README.md", "LICENSE")
 SPEC = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 1}
 CLASH = "raise ImportError('a module of the folder in which gaplab runs')\n"
 

@@ -2,9 +2,11 @@
 and `finish` computes what was submitted."""
 
 import io
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 
+import pexpect
 import pytest
 from fastapi import FastAPI
 
@@ -47,6 +49,24 @@ def gaplab(url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixt
         return Said(int(ended.value.code or 0), printed.out, printed.err)
 
     return command
+
+
+@pytest.fixture
+def at_a_terminal(url: str) -> Callable[[str, str, str], pexpect.spawn]:
+    """Runs a line of a shell at a terminal, where `gaplab` is the command, and answers its question."""
+
+    def start(line: str, question: str, answer: str) -> pexpect.spawn:
+        command = f"{shlex.quote(sys.executable)} -m gaplab"
+        child = pexpect.spawn(
+            "sh", ["-c", line.replace("gaplab", command)], env={"GAPLAB_URL": url, "PATH": "/usr/bin:/bin"}, timeout=120
+        )
+        child.expect_exact(question)
+        child.sendline(answer)
+        child.expect(pexpect.EOF)
+        child.close()
+        return child
+
+    return start
 
 
 @pytest.fixture

@@ -65,7 +65,7 @@ def test_a_submitted_experiment_exists_at_its_location_with_every_default_filled
 
 
 def test_an_empty_study_is_the_papers_six_strategies_and_the_direct_baseline(api: TestClient) -> None:
-    answer = api.post("/studies", json={})
+    answer = api.post("/studies?confirm_cost=true", json={})
 
     assert answer.status_code == 202
     study = api.get(answer.headers["Location"]).json()

@@ -151,7 +151,7 @@ def tidy(ask: Callable[..., Any], ended: str) -> None:
     assert ask("views save", "mine", "--query", "tag = gait")["name"] == "mine"
     assert [view["name"] for view in ask("views")] == ["mine"]
     assert ask("views delete", "mine")["query"] == "tag = gait"
-    assert ask("delete", ended)["id"] == ended
+    assert ask("delete", ended, "--yes")["id"] == ended
 
 
 def live_and_die(ask: Callable[..., Any], finish: Callable[[], None]) -> None:

@@ -1,12 +1,14 @@
 """The command and the client query lists, tag, archive and delete, save views, and set webhooks."""
 
 import json
+from collections.abc import Callable
 
+import pexpect
 import pytest
 
 from gaplab import Client, ServiceError
-from gaplab.api.commands import keeping
-from gaplab.services.experiments import submission
+from gaplab.api.commands.exit_codes import Exit
+from gaplab.services.experiments import listing, submission
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import cancel, toy
@@ -23,14 +25,14 @@ def test_the_command_queries_tags_archives_and_deletes(gaplab: Gaplab, sqlite_st
     wrong = gaplab("list", "--query", "strategi = random")
     assert (wrong.code, wrong.err.count("\n")) == (5, 1)
     assert "at character 1: unknown field 'strategi' (did you mean 'strategy'?)" in wrong.err
-    refused = gaplab("delete", made)
+    refused = gaplab("delete", made, "--yes")
     assert (refused.code, "cancel it first" in refused.err) == (6, True)
     cancel(sqlite_store, made)
     assert "is archived" in gaplab("archive", made).out
     assert made not in gaplab("list").out
     assert made in gaplab("list", "--query", "archived = true").out
     assert "listed again" in gaplab("unarchive", made).out
-    assert json.loads(gaplab("delete", made, "--json").out)["id"] == made
+    assert json.loads(gaplab("delete", made, "--yes", "--json").out)["id"] == made
     gone = gaplab("show", made)
     assert (gone.code, "was deleted at" in gone.err) == (4, True)
 
@@ -84,15 +86,26 @@ def test_the_client_does_the_same(url: str, sqlite_store: Store) -> None:
             client.delete("nobody")
 
 
-@pytest.mark.parametrize(("answer", "code"), [("n\n", 130), ("", 130), ("y\n", 0)])
+@pytest.mark.parametrize(("answer", "code"), [("n", Exit.INTERRUPTED), ("y", Exit.OK)])
 def test_deletion_asks_in_a_terminal(
-    gaplab: Gaplab, sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, answer: str, code: int
+    at_a_terminal: Callable[[str, str, str], pexpect.spawn], sqlite_store: Store, answer: str, code: Exit
 ) -> None:
     made = submission.submit_experiment(sqlite_store, toy(name="one")).id
     cancel(sqlite_store, made)
-    monkeypatch.setattr(keeping, "in_terminal", lambda: True)
 
-    said = gaplab("delete", made, stdin=answer)
+    child = at_a_terminal(f"gaplab delete {made}", "Delete 'one' with 3 repetitions for good? [y/N] ", answer)
 
-    assert said.code == code
-    assert "Delete 'one' with 3 repetitions for good?" in said.err + said.out
+    assert child.exitstatus == code
+    assert bool(listing.list_experiments(sqlite_store).items) == bool(code)
+
+
+def test_without_a_terminal_nothing_is_deleted_unless_the_command_says_yes(gaplab: Gaplab, sqlite_store: Store) -> None:
+    made = submission.submit_experiment(sqlite_store, toy(name="one")).id
+    cancel(sqlite_store, made)
+
+    refused = gaplab("delete", made, stdin="y\n")
+
+    assert refused.code == Exit.USAGE
+    assert refused.err == "gaplab: to delete 'one' with 3 repetitions for good without a terminal, add --yes\n"
+    assert listing.list_experiments(sqlite_store).items
+    assert gaplab("delete", made, "--yes").code == Exit.OK

@@ -16,7 +16,7 @@ from gaplab.services.core.errors import LimitReached
 from gaplab.services.experiments import reading
 from gaplab.services.running import execution
 from gaplab.services.settings import Limits, Settings, variable_of
-from gaplab.services.store.models import AttachmentRow
+from gaplab.services.store.models import AttachmentRow, RepetitionRow
 from gaplab.services.store.queries.attachments import UNNAMED_LIVE
 from gaplab.services.store.session import Store
 from tests.experiments import run
@@ -239,9 +239,53 @@ def test_every_limit_is_documented_with_its_default() -> None:
 
 
 def test_the_papers_whole_figure_is_let_in(sqlite_store: Store) -> None:
-    answer = served(sqlite_store).post("/studies", json={"direct_repetitions": 100})
+    answer = served(sqlite_store).post("/studies?confirm_cost=true", json={"direct_repetitions": 100})
 
     assert answer.status_code == 202
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [("/studies", {}), ("/experiments", {"strategy": "simulated_fit", "repetitions": 4_000})],
+)
+def test_what_takes_thousands_of_core_hours_needs_a_confirmation(
+    sqlite_store: Store, path: str, body: dict[str, object]
+) -> None:
+    api = served(sqlite_store)
+    hours = api.post(f"{path}/estimate", json=body).json()["core_seconds"] / 3_600
+
+    refused, stored = api.post(path, json=body, headers={"Idempotency-Key": "k"}), api.get(path).json()["items"]
+    let_in = api.post(f"{path}?confirm_cost=true", json=body, headers={"Idempotency-Key": "k"})
+
+    assert (refused.status_code, refused.json()["type"], stored) == (422, "urn:gaplab:problem:cost-unconfirmed", [])
+    (error,) = refused.json()["errors"]
+    assert (error["pointer"], error["value"], error["permitted"]) == ("confirm_cost", False, "true")
+    assert f"about {hours:,.0f} core-hours" in error["message"]
+    assert "1,000 (GAPLAB_MAX_UNCONFIRMED_CORE_HOURS)" in error["message"]
+    assert let_in.status_code == 202
+
+
+@pytest.mark.parametrize("body", [{"engine": "mujoco"}, {"budget": "desk", "direct_repetitions": 100}])
+def test_what_a_lab_computes_in_days_needs_none(sqlite_store: Store, body: dict[str, object]) -> None:
+    assert served(sqlite_store).post("/studies", json=body).status_code == 202
+
+
+def test_an_extension_is_confirmed_by_what_it_adds(sqlite_store: Store) -> None:
+    made = served(sqlite_store).post("/experiments", json=TOY).json()["id"]
+    for claim in execution.claim(sqlite_store, "me", 9):
+        run(sqlite_store, claim)
+    minutes = update(RepetitionRow).values(seconds=RepetitionRow.rollouts_done * 60.0)  # one for each rollout
+    sqlite_store.write(lambda session: session.execute(minutes))
+    progress = reading.read_experiment(sqlite_store, made).progress
+    each, done = progress.rollouts // 3, progress.rollouts_done + progress.rollouts_saved
+    api, path = served(sqlite_store, unconfirmed_core_hours=(6 * each - done) // 60), f"/experiments/{made}/extend"
+
+    refused = api.post(path, json={"repetitions": 7})
+    extended = api.post(f"{path}?confirm_cost=true", json={"repetitions": 7})
+
+    assert refused.json()["type"] == "urn:gaplab:problem:cost-unconfirmed"
+    assert f"about {(7 * each - done) / 60:.0f} core-hours" in refused.json()["detail"]
+    assert extended.status_code == 202
 
 
 def test_files_that_no_answer_names_have_a_limit_that_frees_itself(store: Store) -> None:

@@ -92,10 +92,11 @@ def test_it_knows_the_commit_and_whether_the_code_was_changed_since(
     def git(*command: Any) -> None:
         subprocess.run(["git", "-C", tmp_path, *command], check=True, capture_output=True)
 
-    monkeypatch.setattr(versions, "ROOT", tmp_path / "gaplab")
+    monkeypatch.setattr(versions, "ROOT", tmp_path / "src" / "gaplab")
+    monkeypatch.setattr(versions, "CLONE", tmp_path)
     for folder in versions.CODE:
-        (tmp_path / "gaplab" / folder).mkdir(parents=True)
-    file = tmp_path / "gaplab" / "schemas" / "a.py"
+        (versions.ROOT / folder).mkdir(parents=True)
+    file = versions.ROOT / "schemas" / "a.py"
     file.write_text("a = 1\n")
     fresh = versions._software.__wrapped__
 

@@ -1,10 +1,7 @@
 """Submission from a terminal: the cost is shown first, and a person is asked before hours of computation."""
 
 import json
-import shlex
-import sys
 from collections.abc import Callable
-from typing import Any
 
 import pexpect
 import pytest
@@ -21,24 +18,6 @@ from tests.commands import Gaplab
 SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
 
 STUDY = {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
-
-
-@pytest.fixture
-def at_a_terminal(url: str) -> Callable[[str, str], pexpect.spawn]:
-    """Runs a line of a shell at a terminal, where `gaplab` is the command."""
-
-    def start(line: str, answer: str) -> pexpect.spawn:
-        command = f"{shlex.quote(sys.executable)} -m gaplab"
-        child = pexpect.spawn(
-            "sh", ["-c", line.replace("gaplab", command)], env={"GAPLAB_URL": url, "PATH": "/usr/bin:/bin"}, timeout=120
-        )
-        child.expect_exact("Submit it? [y/N] ")
-        child.sendline(answer)
-        child.expect(pexpect.EOF)
-        child.close()
-        return child
-
-    return start
 
 
 def test_the_cost_is_shown_before_the_id_is_printed(gaplab: Gaplab) -> None:
@@ -62,18 +41,27 @@ def test_a_dry_run_prints_the_complete_spec_and_submits_nothing(gaplab: Gaplab, 
 
 
 def test_a_program_without_a_terminal_is_not_asked(gaplab: Gaplab, sqlite_store: Store) -> None:
-    said = gaplab("submit", "-", stdin="{}")
+    said = gaplab("submit", "-", stdin='{"engine": "mujoco"}')
 
     assert said.code == 0
     assert "7 experiments, 280 repetitions" in said.err
     assert len(listing.list_studies(sqlite_store).items) == 1
 
 
+def test_thousands_of_core_hours_need_a_yes_without_a_terminal_too(gaplab: Gaplab, sqlite_store: Store) -> None:
+    refused = gaplab("submit", "-", stdin="{}")
+
+    assert refused.code == Exit.INVALID
+    assert "core-hours; above 1,000 (GAPLAB_MAX_UNCONFIRMED_CORE_HOURS), confirm_cost=true or --yes" in refused.err
+    assert listing.list_studies(sqlite_store).items == ()
+    assert gaplab("submit", "-", "--yes", stdin="{}").code == Exit.OK
+
+
 @pytest.mark.parametrize(("answer", "studies"), [("n", 0), ("y", 1)])
 def test_a_person_is_asked_before_hours_even_if_the_spec_comes_through_a_pipe(
-    at_a_terminal: Callable[[str, str], Any], sqlite_store: Store, answer: str, studies: int
+    at_a_terminal: Callable[[str, str, str], pexpect.spawn], sqlite_store: Store, answer: str, studies: int
 ) -> None:
-    child = at_a_terminal("echo '{}' | gaplab submit -", answer)
+    child = at_a_terminal("echo '{}' | gaplab submit -", confirmation.QUESTION, answer)
 
     assert child.exitstatus == (0 if studies else Exit.INTERRUPTED)
     assert len(listing.list_studies(sqlite_store).items) == studies
@@ -103,8 +91,8 @@ def test_only_yes_is_yes(url: str) -> None:
         estimate: EstimateRead = client.estimate({})
 
     assert estimate.seconds > confirmation.LONG_S
-    confirm(estimate, None)
-    confirm(estimate, lambda _: " Yes\n")
+    assert not confirm(estimate, None)
+    assert confirm(estimate, lambda _: " Yes\n")
     for answer in ("", "n", "yesterday"):
         with pytest.raises(NotSubmitted):
             confirm(estimate, lambda _: answer)  # noqa: B023 - asked at once

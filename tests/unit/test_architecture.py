@@ -10,7 +10,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 OURS = ("schemas", "services", "workers", "api", "migrations")
-MODULES = sorted(path.relative_to(ROOT) for top in (*OURS, "gaplab") for path in (ROOT / top).rglob("*.py"))
+MODULES = sorted(path.relative_to(ROOT) for top in (*OURS, "src") for path in (ROOT / top).rglob("*.py"))
 PHYSICS = {"pybullet", "mujoco", "numba", "sapien"}
 ON_DEMAND = {
     "pandas",
@@ -78,7 +78,7 @@ ARROWS = {
         {"typer", "rich", "httpx2", "pydantic"},
     ),
     "api": (("services", "api.process"), set()),
-    "gaplab": (
+    "src": (
         ("schemas", "services.core", "services.engines", "services.plugins", "services.specs", "api", "samples"),
         set(),
     ),
@@ -118,7 +118,7 @@ def tops_of(path: Any) -> Any:
 
 def name_of(path: Path) -> str:
     """Return the dotted name of a file's module, without `gaplab`."""
-    return ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+    return ".".join(path.with_suffix("").parts).removesuffix(".__init__").removeprefix("src.gaplab.")
 
 
 def rule(path: Any) -> Any:

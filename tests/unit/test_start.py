@@ -5,6 +5,7 @@ SciPy loads its parts when they are used: `import scipy` costs nothing, and `fro
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -30,3 +31,13 @@ def test_a_process_starts_without_what_it_may_never_use(module: str) -> None:
     loaded = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True).stdout
 
     assert loaded.split() == []
+
+
+def test_it_is_found_beside_a_checkout_that_is_called_gaplab(tmp_path: Path) -> None:
+    """Python looks there first, and a folder without `__init__.py` is a package unless there is another."""
+    (tmp_path / "gaplab").symlink_to(Path(__file__).parents[2])
+
+    program = "from gaplab import Client; print(Client.__module__)"
+    found = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+
+    assert found.stdout == "gaplab.api.clients.client\n"

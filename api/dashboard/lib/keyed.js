@@ -9,14 +9,15 @@ export const newKey = () => Array.from(crypto.getRandomValues(new Uint32Array(4)
 
 /**
  * Return a function that posts, under the same key for the same body: a second press after a lost answer does nothing twice.
+ * It may add a query to the path.
  *
  * @param {string} path
  */
 export function keyed(path) {
   let last = { text: "", key: "" };
-  return (/** @type {unknown} */ body) => {
+  return (/** @type {unknown} */ body, query = "") => {
     const text = stringify(body);
     if (last.text !== text) last = { text, key: newKey() };
-    return post(path, body, { "Idempotency-Key": last.key });
+    return post(path + query, body, { "Idempotency-Key": last.key });
   };
 }

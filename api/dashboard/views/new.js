@@ -2,6 +2,7 @@
 /** A new study: a form made from the catalogue, which the service checks and prices while the reader types. */
 
 import { get, post } from "../lib/api.js";
+import { confirmingCost } from "../lib/cost.js";
 import { h } from "../lib/dom.js";
 import { keyed } from "../lib/keyed.js";
 import { draftOf, followRobot, specOf } from "./new/draft.js";
@@ -138,8 +139,9 @@ export class Form {
     const spec = specOf(this.draft);
     this.panel.setBusy(true);
     try {
-      const study = await this.send(spec);
-      location.hash = `#/studies/${study.id}`;
+      const study = await confirmingCost((query) => this.send(spec, query), this.signal);
+      if (study) location.hash = `#/studies/${study.id}`;
+      else this.panel.setBusy(false);
     } catch (error) {
       if (this.signal.aborted) return;
       this.isRefused = true;

@@ -2,6 +2,7 @@
 /** The actions on an experiment; those that its state forbids say why. */
 
 import { patch, post } from "../../lib/api.js";
+import { confirmingCost } from "../../lib/cost.js";
 import { openDialog } from "../../lib/dialog.js";
 import { actionButtons, isPermitted, PARTICIPLES, permittedStates } from "../../lib/life_cycle.js";
 
@@ -40,7 +41,7 @@ export const actions = (page) => actionButtons("Actions on this experiment", (ac
  * @param {unknown} [body]
  */
 async function send(page, action, body = undefined) {
-  await post(`/experiments/${page.id}/${action}`, body);
+  await confirmingCost((query) => post(`/experiments/${page.id}/${action}${query}`, body), page.signal);
   await page.reload();
 }
 

@@ -2,6 +2,7 @@
 /** The actions on a study: each goes to all of its experiments whose state permits it. */
 
 import { post } from "../../lib/api.js";
+import { confirmingCost } from "../../lib/cost.js";
 import { openDialog } from "../../lib/dialog.js";
 import { count } from "../../lib/format.js";
 import { actionButtons, isPermitted, PARTICIPLES, permittedStates } from "../../lib/life_cycle.js";
@@ -44,7 +45,7 @@ function refusal(study, action) {
  * @param {object} [body]
  */
 async function send(page, action, body) {
-  await post(`/studies/${page.id}/${action}`, body);
+  await confirmingCost((query) => post(`/studies/${page.id}/${action}${query}`, body), page.signal);
   await page.reload();
 }
 

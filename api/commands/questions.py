@@ -1,0 +1,45 @@
+"""How a command asks the person at the terminal."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from gaplab.api.clients.confirmation import Ask, is_yes
+from gaplab.api.commands.exit_codes import CommandError, Exit
+
+
+@contextmanager
+def keyboard() -> Iterator[Ask | None]:
+    """Yield what asks the person at the terminal, even if standard input is a file; None without a terminal."""
+    if not sys.stdout.isatty():
+        yield None
+        return
+    try:
+        terminal = open("/dev/tty", "r+b", buffering=0)  # noqa: SIM115 - closed below
+    except OSError:
+        yield input if sys.stdin.isatty() else None
+        return
+    with terminal:
+
+        def ask(question: str) -> str:
+            terminal.write(question.encode())
+            return terminal.readline().decode(errors="replace")
+
+        yield ask
+
+
+def demand_yes(to_do: str, done: str) -> None:
+    """Ask whether to do what cannot be undone.
+
+    Args:
+        to_do: words for it, as in "delete it".
+        done: its participle, as in "deleted".
+
+    Raises:
+        CommandError: the answer is not yes, or there is no terminal.
+    """
+    with keyboard() as ask:
+        if ask is None:
+            raise CommandError(f"to {to_do} for good without a terminal, add --yes", Exit.USAGE)
+        if not is_yes(ask(f"{to_do[0].upper()}{to_do[1:]} for good? [y/N] ")):
+            raise CommandError(f"nothing was {done}", Exit.INTERRUPTED)
