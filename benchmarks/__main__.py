@@ -8,36 +8,30 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import curves, mujoco, overhead, physics, physx, pool, savings, service, supervisor, turns
+from benchmarks import engines, service, supervisor
 from benchmarks.measure import Row
-from gaplab.services.engines.mujoco import MuJoCo
-from gaplab.services.engines.physx import PhysX
+
+MEASUREMENTS: dict[str, Callable[[int], list[Row]]] = {
+    "engines": engines.rows,
+    "service": lambda rounds: service.rows(max(2, rounds // 2)),
+    "supervisor": lambda _: supervisor.rows(),
+}
 
 
 def main() -> None:
-    """Measure everything, and print one table."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Measure, and print one table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(MEASUREMENTS)}; default: all")
     parser.add_argument("--rounds", type=int, default=5, help="rounds in which the parts of a ratio take turns")
-    rounds = parser.parse_args().rounds
+    arguments = parser.parse_args()
+    if unknown := set(arguments.names) - set(MEASUREMENTS):
+        parser.error(f"no measurement is called {', '.join(sorted(unknown))}")
     console = Console()
-    table = Table(title=f"gaplab on {os.cpu_count()} cores of {platform.machine()}, Python {platform.python_version()}")
-    for column in ("figure", "value", "ratio", "to", "target"):
-        table.add_column(column, justify="right" if column == "ratio" else "left")
-    measurements: tuple[tuple[str, Callable[[], list[Row]]], ...] = (
-        ("physics", lambda: physics.rows(rounds)),
-        ("physx", lambda: physx.rows(rounds) if PhysX.available() else []),
-        ("mujoco", lambda: mujoco.rows(rounds) if MuJoCo.available() else []),
-        ("service", lambda: service.rows(max(2, rounds // 2))),
-        ("pool", lambda: pool.rows(max(2, rounds // 2))),
-        ("supervisor", supervisor.rows),
-        ("savings", savings.rows),
-        ("turns", turns.rows),
-        ("overhead", overhead.rows),
-        ("curves", curves.rows),
-    )
-    for name, measure in measurements:
+    title = f"gaplab on {os.cpu_count()} cores of {platform.machine()}, Python {platform.python_version()}"
+    table = Table("figure", "value", "ratio", "to", "target", title=title)
+    for name in arguments.names or MEASUREMENTS:
         console.print(f"measuring {name} ...")
-        for row in measure():
+        for row in MEASUREMENTS[name](arguments.rounds):
             table.add_row(*_cells(row))
             console.print("  " + ", ".join(filter(None, _cells(row))), style="dim", highlight=False)
     console.print(table)

@@ -1,116 +1,187 @@
-"""The same robot in every installed engine: its height at rest, and the fitness of the same genomes.
+"""Speed of engines: bare steps against the same episodes of the quadruped through `Simulate`."""
 
-`python -m benchmarks.engines` prints the tables of docs/engines.md, over all registered engines; `--svg FILE`
-draws them.
-"""
-
-from argparse import ArgumentParser
-from itertools import combinations
-from pathlib import Path
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import replace
+from statistics import median
 
 import numpy as np
-from scipy.stats import spearmanr
+import pybullet
+from mujoco import mjtState
+from mujoco import rollout as library
 
-from benchmarks.physics import SWITCHING as TRUTH
-from benchmarks.physics import evolved, simulation
-from gaplab.services.core.arrays import FloatArray, Genomes
-from gaplab.services.core.motions import Motion
+from benchmarks.measure import Row, rates, ratio
+from gaplab.services.core.arrays import Genomes, Parameters
+from gaplab.services.core.motions import Motion, open_loop
+from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.search import maximise
 from gaplab.services.core.streams import stream
-from gaplab.services.engines import engines
+from gaplab.services.core.tunables import tunables
 from gaplab.services.engines.base import Engine
+from gaplab.services.engines.mujoco import MuJoCo
+from gaplab.services.engines.mujoco.scene import MuJoCoScene
+from gaplab.services.engines.physx import PhysX
+from gaplab.services.engines.pybullet import PyBullet
+from gaplab.services.engines.pybullet.scene import PyBulletScene
+from gaplab.services.specs.simulation import Simulation
 
 ROBOT = Quadruped()
-NEARBY = {"0.01 more dynamic friction": (1.0, 0.81, 0.0), "both frictions 0.5": (0.5, 0.5, 0.0)}
-ALONE_S = 3.0
+TUNED = ("static_friction", "dynamic_friction", "restitution")
+SWITCHING, EQUAL = np.array([[1.0, 0.8, 0.0]]), np.array([[0.8, 0.8, 0.0]])
+GENOMES, MANY = 12, 96
+"""Genomes of a round, and of a batch: enough to keep two threads busy to the end."""
+STEPS = 5_000  # of evolution in a round
+
+Work = Callable[[], int]
+
+PYBULLET = "PyBullet, static ≠ dynamic friction (stick-slip switching)"
+COMPARED = (
+    (PYBULLET, "PyBullet, bare loop of steps", "≥ 0.85"),
+    ("PyBullet, static = dynamic friction", "PyBullet, bare loop of steps", "≥ 0.93"),
+    ("PhysX", "PhysX, bare loop of steps", "≥ 0.85"),
+    ("PhysX", PYBULLET, ""),
+    ("MuJoCo, one genome a call", PYBULLET, "≥ 5"),
+    (f"MuJoCo, {MANY} genomes a call", PYBULLET, "≥ 5"),
+    ("MuJoCo without Simulate, one motion a call", "bare mujoco.rollout", "≥ 0.9"),
+    (f"MuJoCo, {MANY} genomes a call", "bare mujoco.rollout", "≥ 0.9"),
+    ("the same on 2 threads", "bare mujoco.rollout on 2", "≥ 0.9"),
+    ("the same on 2 threads", f"MuJoCo, {MANY} genomes a call", "cores"),
+    ("PyBullet, with readings of sensors", PYBULLET, "≥ 0.97"),
+    ("MuJoCo, with readings of sensors", "MuJoCo, one genome a call", "≥ 0.97"),
+    ("a step of the paper's evolution, without physics", PYBULLET, "≥ 100"),
+)
+"""What is measured, what it is compared with, and the ratio that it should have."""
 
 
-def installed() -> dict[str, Engine]:
-    """Return the installed engines that run the quadruped, by name."""
-    return {name: kind() for name, kind in engines.items() if kind.available() and kind.runs(ROBOT.world)}
+def genomes(count: int = GENOMES) -> Genomes:
+    """Return the hand-designed genome and random ones."""
+    drawn: Genomes = np.vstack([ROBOT.known, ROBOT.space.draw(count - 1, np.random.default_rng(0))])
+    return drawn
 
 
-def stands(installed_engines: dict[str, Engine]) -> None:
-    """Print the height of the robot at rest in its neutral pose."""
-    world = ROBOT.world
-    still = Motion(np.zeros(1), np.zeros((1, len(world.actuators))), np.array([ALONE_S]))
-    print(f"The robot weighs {sum(body.mass_kg for body in world.bodies):.2f} kg.\n")
-    print(f"| engine | the trunk's height after {ALONE_S:.0f} s, mm |\n|---|---|")
-    for name, engine in installed_engines.items():
-        print(f"| {name} | {1e3 * engine.rollout(world, still).positions_m[-1, 2]:.1f} |")
+def simulation(engine: Engine | None = None) -> Simulation:
+    """Return the quadruped with the paper's three tunables, by default in PyBullet."""
+    return Simulation(ROBOT, engine or PyBullet(), [tunables[name]() for name in TUNED])
 
 
-def pairs(sets: dict[str, Genomes], fitnesses: dict[str, dict[str, FloatArray]]) -> None:
-    """Print the rank correlation of each pair of engines, over each set of genomes and over all."""
-    print(f"\n| engines | {' | '.join(f'{name}, {len(drawn)}' for name, drawn in sets.items())} | all |")
-    print("|---|" + "---|" * (len(sets) + 1))
-    for one, other in combinations(fitnesses, 2):
-        ranks = [rank(fitnesses[one][name], fitnesses[other][name]) for name in sets]
-        every = rank(*(np.concatenate(list(fitnesses[name].values())) for name in (one, other)))
-        print(f"| {one}, {other} | {' | '.join(ranks)} | {every} |")
+def through_simulate(engine: Engine, at: Parameters = SWITCHING, count: int = GENOMES, *, batch: bool = False) -> Work:
+    """Return work: rollouts through `Simulate`, one genome a call, as the paper's evolution does, or all in one."""
+    simulate, drawn = simulation(engine), genomes(count)
+    return lambda: sum(simulate(each, at).size for each in ([drawn] if batch else drawn[:, None]))
 
 
-def means(sets: dict[str, Genomes], fitnesses: dict[str, dict[str, FloatArray]]) -> None:
-    """Print the mean fitness ± standard deviation in each engine."""
-    print(f"\n| measured in, m/s | {' | '.join(sets)} |\n|---|{'---|' * len(sets)}")
-    for name, by_set in fitnesses.items():
-        print(f"| {name} | {' | '.join(f'{each.mean():.3f} ± {each.std(ddof=1):.3f}' for each in by_set.values())} |")
+def with_readings(engine: Engine, count: int) -> Work:
+    """Return work: rollouts through `Simulate` that sensors read too, one genome a call."""
+    simulate, drawn = simulation(engine), genomes(count)
+    return lambda: len([simulate.sense(each, SWITCHING) for each in drawn[:, None]])
 
 
-def self_correlations(installed_engines: dict[str, Engine], drawn: Genomes) -> None:
-    """Print the rank correlation of each engine with itself in slightly and strongly changed worlds."""
-    print(f"\n| an engine with itself | {' | '.join(NEARBY)} |\n|---|{'---|' * len(NEARBY)}")
-    for name, engine in installed_engines.items():
-        both = simulation(engine)(drawn, np.vstack([TRUTH, *NEARBY.values()]))
-        print(f"| {name} | {' | '.join(rank(both[:, 0], both[:, other]) for other in range(1, both.shape[1]))} |")
+def evolution() -> int:
+    """Run steps of the paper's evolution (ask, replacement, tell) without the cost of fitness."""
+    maximise(SteadyState(), ROBOT.space, lambda asked: asked.genomes[:, 0], STEPS, stream(0, "benchmark"))
+    return STEPS
 
 
-def rank(ours: FloatArray, theirs: FloatArray) -> str:
-    """Return Spearman's rank correlation over the genomes that fail in neither, as text."""
-    finite = np.isfinite(ours) & np.isfinite(theirs)
-    return f"{spearmanr(ours[finite], theirs[finite]).statistic:.2f}"
+def bare_pybullet() -> Work:
+    """Return work: `stepSimulation` in a loop, with motor commands at pulse edges only."""
+    material = ROBOT.world.material
+    world = replace(ROBOT.world, material=replace(material, static_friction=material.dynamic_friction))
+    scene = PyBulletScene(pybullet, world)
+    motions = [open_loop(ROBOT.motion(genome)) for genome in genomes()]
+
+    def work() -> int:
+        for motion in motions:
+            commands, steps = edges(motion)
+            scene.start(world)
+            for step in range(steps):
+                for actuator, target in commands.get(step, ()):
+                    scene.command(actuator, target)
+                pybullet.stepSimulation(physicsClientId=scene.client)
+            pybullet.getBasePositionAndOrientation(scene.robot, physicsClientId=scene.client)
+        return len(motions)
+
+    return work
 
 
-def draw(file: Path, fitnesses: dict[str, dict[str, FloatArray]]) -> None:
-    """Draw scatter plots of fitness in one engine against another, for each pair."""
-    from matplotlib.figure import Figure
+def bare_physx() -> Work:
+    """Return work: `PhysxCpuSystem.step` in a loop, with new drive targets at pulse edges only."""
+    scene = PhysX()._scenes[ROBOT.world]
+    system, joints, start = scene._system, scene.robot.joints, scene._initial
+    scene.start(ROBOT.world)
+    plans = [edges(open_loop(ROBOT.motion(genome))) for genome in genomes()]
 
-    engine_pairs = list(combinations(fitnesses, 2))
-    figure = Figure(figsize=(4 * len(engine_pairs), 4), layout="constrained")
-    most = 1.05 * max(float(np.nanmax(each)) for by_set in fitnesses.values() for each in by_set.values())
-    for axes, (one, other) in zip(figure.subplots(1, len(engine_pairs), squeeze=False)[0], engine_pairs, strict=True):
-        axes.axline((0, 0), slope=1, color="0.8", zorder=0)
-        for name in fitnesses[one]:
-            axes.scatter(fitnesses[one][name], fitnesses[other][name], s=10, label=name)
-        axes.set(xlabel=f"{one}, m/s", ylabel=f"{other}, m/s", xlim=(0, most), ylim=(0, most), aspect="equal")
-    figure.axes[0].legend(frameon=False, fontsize="small")
-    figure.savefig(file)
+    def work() -> int:
+        for commands, steps in plans:
+            system.unpack(start)
+            for step in range(steps):
+                for actuator, target in commands.get(step, ()):
+                    joints[actuator].set_drive_target(target)
+                system.step()
+            scene.articulation.root_pose.p.sum()
+        return len(plans)
+
+    return work
 
 
-def main() -> None:
-    """Print the tables, and draw them if requested."""
-    parser = ArgumentParser(prog="python -m benchmarks.engines", description=__doc__)
-    parser.add_argument("--random", type=int, default=110, help="genomes drawn uniformly")
-    parser.add_argument("--evolved", type=int, default=30, help="genomes evolved in each engine")
-    parser.add_argument("--evaluations", type=int, default=200, help="evaluations of each evolution")
-    parser.add_argument("--svg", type=Path, help="file for the scatter plots")
-    arguments = parser.parse_args()
-    installed_engines = installed()
-    stands(installed_engines)
-    sets = {"random": ROBOT.space.draw(arguments.random, stream(0, "random genomes"))}
-    for name, engine in installed_engines.items():
-        rngs = [stream(seed, "evolved", engine.name) for seed in range(arguments.evolved)]
-        sets[f"evolved in {name}"] = np.array([evolved(engine, arguments.evaluations, rng) for rng in rngs])
-    fitnesses = {
-        name: {each: simulation(engine)(drawn, TRUTH)[:, 0] for each, drawn in sets.items()}
-        for name, engine in installed_engines.items()
+def bare_mujoco(threads: int) -> Work:
+    """Return work: `mujoco.rollout` of the same motions, model and contact law, with precomputed inputs."""
+    engine = MuJoCo(MuJoCo.Options(threads=threads))
+    scene: MuJoCoScene = engine._scenes[ROBOT.world.kind]
+    motions = [open_loop(ROBOT.motion(genome)) for genome in genomes(MANY)]
+    steps = int(scene.steps(motions[0].observe_s)[-1])
+    controls = scene.controls.of(motions, steps, [None])
+    start = np.tile(scene.states.start, (MANY, 1))
+    models = [prepared.model for prepared in scene.models[[ROBOT.world]]] * MANY
+    pool = library.Rollout(nthread=threads if threads > 1 else 0)
+
+    def work() -> int:
+        with scene.pool.in_force():
+            pool.rollout(models, scene.pool.datas, start, controls, control_spec=mjtState.mjSTATE_QFRC_APPLIED.value)
+        return MANY
+
+    return work
+
+
+def mujoco_alone() -> Work:
+    """Return work: rollouts by MuJoCo without `Simulate`, one precomputed motion a call."""
+    engine, motions = MuJoCo(), [open_loop(ROBOT.motion(genome)) for genome in genomes(MANY)]
+    return lambda: len([engine.rollout(ROBOT.world, motion) for motion in motions])
+
+
+def edges(motion: Motion) -> tuple[dict[int, list[tuple[int, float]]], int]:
+    """Return the new targets of motors by step, and the number of steps."""
+    commands: dict[int, list[tuple[int, float]]] = defaultdict(list)
+    before, step_s = np.full(motion.targets.shape[1], np.nan), ROBOT.world.time_step_s
+    for time_s, targets in zip(motion.times_s, motion.targets, strict=True):
+        for actuator in np.flatnonzero(targets != before):
+            commands[round(time_s / step_s)].append((int(actuator), float(targets[actuator])))
+        before = targets
+    return commands, round(motion.observe_s[-1] / step_s)
+
+
+def rows(rounds: int) -> list[Row]:
+    """Measure all engines in turn."""
+    on_two = MuJoCo(MuJoCo.Options(threads=2))
+    competitors = {
+        "PyBullet, bare loop of steps": bare_pybullet(),
+        PYBULLET: through_simulate(PyBullet()),
+        "PyBullet, static = dynamic friction": through_simulate(PyBullet(), EQUAL),
+        "MuJoCo, one genome a call": through_simulate(MuJoCo(), count=MANY),
+        "MuJoCo without Simulate, one motion a call": mujoco_alone(),
+        f"MuJoCo, {MANY} genomes a call": through_simulate(MuJoCo(), count=MANY, batch=True),
+        "bare mujoco.rollout": bare_mujoco(1),
+        "the same on 2 threads": through_simulate(on_two, count=MANY, batch=True),
+        "bare mujoco.rollout on 2": bare_mujoco(2),
+        "PyBullet, with readings of sensors": with_readings(PyBullet(), GENOMES),
+        "MuJoCo, with readings of sensors": with_readings(MuJoCo(), MANY),
+        "a step of the paper's evolution, without physics": evolution,
     }
-    means(sets, fitnesses)
-    pairs(sets, fitnesses)
-    self_correlations(installed_engines, sets["random"])
-    if arguments.svg:
-        draw(arguments.svg, fitnesses)
-
-
-if __name__ == "__main__":
-    main()
+    if PhysX.available():
+        competitors |= {"PhysX, bare loop of steps": bare_physx(), "PhysX": through_simulate(PhysX())}
+    measured = rates(competitors, rounds)
+    return [
+        Row(one, f"{1e3 / median(measured[one]):.2f} ms each", ratio(measured[one], measured[to]), to, target)
+        for one, to, target in COMPARED
+        if one in measured
+    ]

@@ -5,8 +5,7 @@
 
 from argparse import ArgumentParser
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.archives import import_file, private_store
-from gaplab.schemas.comparisons import Comparison
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.figures.kinds.curves import curves_figure
@@ -44,21 +42,14 @@ def imported(store: Store, archives: Sequence[Path]) -> Imported:
     return labels
 
 
-@contextmanager
-def opened(archives: Sequence[Path]) -> Iterator[tuple[Store, Imported]]:
-    """Open a temporary database with these archives, and the labels of their experiments."""
-    with private_store() as store:
-        yield store, imported(store, archives)
-
-
 @dataclass(frozen=True)
 class Found:
-    """The best simulators after one number of samples.
+    """The best simulators after one number of samples, each `(n, p)`.
 
     Attributes:
-        away: `(n, p)`: distances from the truth, as shares of the bounds.
-        width: `(n, p)`: widths of the stated 95 % intervals, as shares of the bounds; None if none are stated.
-        inside: `(n, p)`: 1 where they contain the truth, else 0.
+        away: distances from the truth, as shares of the bounds.
+        width: widths of the stated 95 % intervals, as shares of the bounds; None if none are stated.
+        inside: 1 where they contain the truth, else 0.
     """
 
     away: FloatArray
@@ -111,7 +102,7 @@ def tuned_table(store: Store, labels: Imported) -> Table:
     Here reality may have other coefficients than the simulators, or none.
     """
     columns = "study", "after", "n", "each tunable", "error per sample"
-    table = table_of("Tunables of the best simulators, in the order of the spec", columns)
+    table = Table(*columns, title="Tunables of the best simulators, in the order of the spec")
     for id_, label in labels.items():
         tuned = tuned_simulators(store, id_)
         for samples in tuned.errors:
@@ -130,7 +121,7 @@ def _errors(tuned: TunedSimulators, iteration: int) -> FloatArray:
 def distance_table(store: Store, labels: Imported) -> Table:
     """Return medians over repetitions of the distances, and the coverage of intervals."""
     columns = "study", "after", "n", "together", "each tunable", "truth in interval", "each", "median width"
-    table = table_of("Median distance from the truth, as a share of the bounds; 95 % intervals", columns)
+    table = Table(*columns, title="Median distance from the truth, as a share of the bounds; 95 % intervals")
     for id_, label in labels.items():
         for samples, findings in found(store, id_).items():
             table.add_row(label, str(samples), *findings.row())
@@ -139,41 +130,23 @@ def distance_table(store: Store, labels: Imported) -> Table:
 
 def fitness_table(store: Store, labels: Imported) -> Table:
     """Return recorded fitness in reality after each number of real-world evaluations."""
-    table = table_of("Recorded fitness in reality", ("study", "after", "n", "mean", "SD"))
+    table = Table("study", "after", "n", "mean", "SD", title="Recorded fitness in reality")
     for curve in curves(store, list(labels)):
         for point in curve.points:
-            table.add_row(
-                labels[curve.experiment], str(point.evaluations), str(point.n), *map(_number, (point.mean, point.sd))
-            )
+            numbers = map(_number, (point.mean, point.sd))
+            table.add_row(labels[curve.experiment], str(point.evaluations), str(point.n), *numbers)
     return table
 
 
 def difference_table(store: Store, labels: Imported, counts: Sequence[int]) -> Table:
     """Return the differences of all pairs after each number of evaluations, with Holm's p over the pairs of a count."""
     title = "Differences of fitness with 90 % intervals; p of the trusted test after Holm"
-    table = table_of(title, ("after", "first", "second", "difference", "p"))
+    table = Table("after", "first", "second", "difference", "p", title=title)
     for count in counts:
         for pair in compare(store, list(labels), from_evaluations=count, to_evaluations=count, intervals=False):
-            table.add_row(str(count), labels[pair.first], labels[pair.second], *_difference(pair))
-    return table
-
-
-def drawn(store: Store, labels: Imported) -> bytes:
-    """Return the curves of all archives in one figure, as SVG."""
-    named = [curve.model_copy(update={"name": labels[curve.experiment]}) for curve in curves(store, list(labels))]
-    return render_file(curves_figure(named), "svg", width_in=WIDTH_IN)
-
-
-def _difference(pair: Comparison) -> Iterator[str]:
-    yield f"{_number(pair.difference)} ({_number(pair.lower)} to {_number(pair.upper)})"
-    yield "-" if pair.trusted.p_holm is None else f"{pair.trusted.p_holm:.2g}"
-
-
-def table_of(title: str, columns: Sequence[str]) -> Table:
-    """Return an empty table with these columns."""
-    table = Table(title=title)
-    for column in columns:
-        table.add_column(column)
+            difference = f"{_number(pair.difference)} ({_number(pair.lower)} to {_number(pair.upper)})"
+            p = "-" if pair.trusted.p_holm is None else f"{pair.trusted.p_holm:.2g}"
+            table.add_row(str(count), labels[pair.first], labels[pair.second], difference, p)
     return table
 
 
@@ -198,15 +171,16 @@ def main() -> None:
     parser.add_argument("--after", type=int, nargs="+", default=[1, 3], help="numbers of evaluations to compare at")
     parser.add_argument("--svg", type=Path, help="file to draw the curves into")
     arguments = parser.parse_args()
-    with opened(arguments.archives) as (store, labels):
-        console = Console(width=150)
-        console.print(tuned_table(store, labels))
-        console.print(distance_table(store, labels))
-        console.print(fitness_table(store, labels))
-        if len(labels) > 1:
-            console.print(difference_table(store, labels, arguments.after))
+    with private_store() as store:
+        labels = imported(store, arguments.archives)
+        tables = [make(store, labels) for make in (tuned_table, distance_table, fitness_table)]
+        tables += [difference_table(store, labels, arguments.after)] if len(labels) > 1 else []
+        for table in tables:
+            Console(width=150).print(table)
         if arguments.svg:
-            arguments.svg.write_bytes(drawn(store, labels))
+            drawn = curves(store, list(labels))
+            named = [curve.model_copy(update={"name": labels[curve.experiment]}) for curve in drawn]
+            arguments.svg.write_bytes(render_file(curves_figure(named), "svg", width_in=WIDTH_IN))
 
 
 if __name__ == "__main__":

@@ -7,32 +7,139 @@ Clients pause between requests like a person or a page, so the times are those o
 """
 
 import argparse
+import json
 import os
 import platform
+import random
+import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from http.client import HTTPConnection, HTTPException
 from pathlib import Path
+from statistics import median, quantiles
 from tempfile import TemporaryDirectory
+from urllib.parse import urlsplit
 
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.clients import FOLLOW, READERS, READS, SUBMIT, SUBMITTERS, Clients, RequestTimes
 from gaplab import migrations
 from gaplab.api.process.local_service import start_service
 from gaplab.services.store.session import Store
-from tests.filling import IN_A_STUDY, REPETITIONS, SAMPLES, fill
+from tests.filling import IN_A_STUDY, REPETITIONS, SAMPLES, experiment_id, fill, study_id
 from tests.postgres import running
 
+READERS, SUBMITTERS, STREAMS = 50, 20, 10
+NEXT_TO_NOTHING, A_PAGE = IN_A_STUDY, 50 * IN_A_STUDY  # experiments of one study, and those that fill the longest list
 UNLIMITED = {f"GAPLAB_MAX_{name}": str(10**6) for name in ("EXPERIMENTS", "EXPERIMENTS_PER_TOKEN")}
 """Limits for submissions, which are never computed here: the default of 1 000 would be reached soon."""
+SPEC = json.dumps({"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "repetitions": 2})
+PATIENCE_S = 60.0
+KEPT_ALIVE_S = 2.0  # longest pause for which a connection is reused; the server closes it after five seconds
 
-NEXT_TO_NOTHING, A_PAGE = IN_A_STUDY, 50 * IN_A_STUDY
-"""Numbers of experiments: those of one study, and those that fill the longest list."""
+READS: dict[str, Callable[[int], str]] = {
+    "experiments, newest 50": lambda _: "/experiments?limit=50",
+    "experiments of a study": lambda n: f"/experiments?study={study_id(random.randrange(n // IN_A_STUDY))}",
+    "experiments that run": lambda _: "/experiments?state=RUNNING",
+    "experiments of a strategy": lambda _: "/experiments?strategy=informative",
+    "studies, newest 50": lambda _: "/studies?limit=50",
+    "an experiment": lambda n: f"/experiments/{experiment_id(random.randrange(n))}",
+    "its samples": lambda n: f"/experiments/{experiment_id(random.randrange(n))}/samples",
+    "its curve": lambda n: f"/experiments/{experiment_id(random.randrange(n))}/curve",
+    "a study's curves": lambda n: f"/studies/{study_id(random.randrange(n // IN_A_STUDY))}/curves",
+}
+"""Paths of requests, from the number of stored experiments."""
+SUBMIT, FOLLOW = "submit an experiment", "events on a stream"
 
 
-def measure(url: str, folder: Path, experiments: int, options: argparse.Namespace) -> RequestTimes:
+class Clients:
+    """Simultaneous clients of one service: seconds and errors by kind of request, and the events that they received."""
+
+    def __init__(self, url: str, experiments: int, seconds: float, pause_s: float) -> None:
+        self.seconds: dict[str, list[float]] = defaultdict(list)
+        self.errors: Counter[str] = Counter()
+        self.events = 0
+        self._address, self._experiments, self._pause_s = urlsplit(url).netloc, experiments, pause_s
+        self._end = time.monotonic() + seconds
+
+    def run(self) -> "Clients":
+        """Run all clients to their end."""
+        clients = [threading.Thread(target=self._read, args=(number,)) for number in range(READERS)]
+        clients += [threading.Thread(target=self._submit) for _ in range(SUBMITTERS)]
+        clients += [threading.Thread(target=self._follow) for _ in range(STREAMS)]
+        for client in clients:
+            client.start()
+        for client in clients:
+            client.join()
+        return self
+
+    def told(self, kind: str) -> str:
+        """Return median, 99th percentile and errors as text."""
+        seconds = self.seconds[kind]
+        if len(seconds) < 2:
+            return f"- / - / {self.errors[kind]}"
+        hundredths = quantiles(seconds, n=100, method="inclusive")
+        return f"{hundredths[49] * 1e3:.0f} / {hundredths[98] * 1e3:.0f} / {self.errors[kind]}"
+
+    def _read(self, turn: int) -> None:
+        kinds = list(READS)
+        with self._connected() as connection:
+            while self._going_on():
+                kind = kinds[turn % len(kinds)]
+                turn += 1
+                self._ask(connection, kind, "GET", READS[kind](self._experiments))
+
+    def _submit(self) -> None:
+        with self._connected() as connection:
+            while self._going_on():
+                self._ask(connection, SUBMIT, "POST", "/experiments", SPEC)
+
+    def _going_on(self) -> bool:
+        """Pause for a random time, so that clients do not synchronise; return whether the load continues."""
+        time.sleep(self._pause_s * random.uniform(0.5, 1.5))
+        return time.monotonic() < self._end
+
+    def _ask(self, connection: HTTPConnection, kind: str, method: str, path: str, body: str | None = None) -> None:
+        if self._pause_s > KEPT_ALIVE_S:
+            connection.close()  # the service has closed it; the next request opens it again
+        begun = time.perf_counter()
+        try:
+            connection.request(method, path, body, {"Content-Type": "application/json"} if body else {})
+            answer = connection.getresponse()
+            answer.read()
+        except (OSError, HTTPException):
+            connection.close()
+            self.errors[kind] += 1
+            return
+        self.seconds[kind].append(time.perf_counter() - begun)
+        self.errors[kind] += answer.status >= 300
+
+    def _follow(self) -> None:
+        answer = None
+        with self._connected() as connection:
+            connection.timeout = 1.0
+            try:
+                connection.request("GET", "/events", headers={"Accept": "text/event-stream"})
+                answer = connection.getresponse()
+                self.errors[FOLLOW] += answer.status != 200
+                while time.monotonic() < self._end:
+                    if not (line := answer.readline()):
+                        self.errors[FOLLOW] += 1
+                        return
+                    self.events += line.startswith(b"id:")
+            except (OSError, HTTPException) as error:  # a stream that times out cannot be read again
+                self.errors[FOLLOW] += answer is None or not isinstance(error, TimeoutError)
+
+    @contextmanager
+    def _connected(self) -> Iterator[HTTPConnection]:
+        connection = HTTPConnection(self._address, timeout=PATIENCE_S)
+        yield connection
+        connection.close()
+
+
+def measure(url: str, folder: Path, experiments: int, options: argparse.Namespace) -> Clients:
     """Measure the load on a new database with stored experiments."""
     migrations.upgrade(url)
     store = Store(url)
@@ -45,21 +152,17 @@ def measure(url: str, folder: Path, experiments: int, options: argparse.Namespac
         return Clients(client.url, experiments, options.seconds, options.pause).run()
 
 
-def table(name: str, measured: dict[int, RequestTimes]) -> Table:
+def table(name: str, measured: dict[int, Clients]) -> Table:
     """Return the table of one kind of database, by number of stored experiments."""
     *_, page, full = measured.values()
-    shown = Table(title=f"{name}: median / 99th percentile in ms / errors")
-    shown.add_column("request")
-    for experiments in measured:
-        shown.add_column(
-            f"{experiments:,} experiments, {experiments * REPETITIONS * SAMPLES:,} samples", justify="right"
-        )
-    shown.add_column("ratio of medians, last two columns", justify="right")
+    shown = Table("request", title=f"{name}: median / 99th percentile in ms / errors")
+    stored = (f"{count:,} experiments, {count * REPETITIONS * SAMPLES:,} samples" for count in measured)
+    for column in (*stored, "ratio of medians, last two columns"):
+        shown.add_column(column, justify="right")
     for kind in (*READS, SUBMIT):
-        times = f"{full.median(kind) / page.median(kind):.2f}"
-        shown.add_row(kind, *(each.of(kind) for each in measured.values()), times)
-    if any(each.events for each in measured.values()):
-        shown.add_row(FOLLOW, *(f"{each.events:,} / {each.errors[FOLLOW]} errors" for each in measured.values()), "")
+        both = [median(each.seconds[kind] or [float("nan")]) for each in (full, page)]
+        shown.add_row(kind, *(each.told(kind) for each in measured.values()), f"{both[0] / both[1]:.2f}")
+    shown.add_row(FOLLOW, *(f"{each.events:,} / {each.errors[FOLLOW]} errors" for each in measured.values()), "")
     shown.add_row("answers in all", *(f"{sum(map(len, each.seconds.values())):,}" for each in measured.values()), "")
     return shown
 
@@ -80,16 +183,9 @@ def main() -> None:
             for experiments in (NEXT_TO_NOTHING, A_PAGE, options.experiments):
                 place = Path(folder) / str(experiments)
                 place.mkdir()
-                with running(place) if database == "postgres" else _sqlite(place) as url:
+                with running(place) if database == "postgres" else nullcontext(f"sqlite:///{place / 'load.db'}") as url:
                     measured[experiments] = measure(url, place, experiments, options)
             Console(width=120).print(table(database, measured))
-            if not any(each.events for each in measured.values()):
-                print("Events were not measured: the service has no /events.", flush=True)
-
-
-@contextmanager
-def _sqlite(folder: Path) -> Iterator[str]:
-    yield f"sqlite:///{folder / 'load.db'}"
 
 
 if __name__ == "__main__":

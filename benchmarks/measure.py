@@ -1,22 +1,13 @@
 """Timing on a shared, noisy machine: competitors take turns, and ratios are computed within each round."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from statistics import median
 from time import perf_counter
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Row:
-    """One line of the table.
-
-    Attributes:
-        figure: name of the measurement.
-        value: printed value with its unit.
-        ratio: ratio to `reference`, if any.
-        reference: name of the measurement to compare with.
-        target: printed target.
-    """
+class Row(NamedTuple):
+    """One line of the table: a figure, its value with its unit, and its ratio to another, which should be `target`."""
 
     figure: str
     value: str
@@ -26,12 +17,7 @@ class Row:
 
 
 def rates(competitors: dict[str, Callable[[], int]], rounds: int) -> dict[str, list[float]]:
-    """Return each competitor's rate in units of work per second, by round. A first round warms up and does not count.
-
-    Args:
-        competitors: functions that do some work and return its number of units.
-        rounds: rounds that count.
-    """
+    """Return each competitor's rate in units of its work per second, by round; a first round warms up only."""
     measured: dict[str, list[float]] = {name: [] for name in competitors}
     for round_number in range(rounds + 1):
         for name, work in competitors.items():

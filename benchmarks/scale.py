@@ -7,71 +7,55 @@ dependent steps. On P cores it takes at least max(W / P, S), and at most W / P +
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import ceil
 from statistics import median
 from time import process_time
+from typing import NamedTuple
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.physics import TUNED, genomes
+from benchmarks.engines import ROBOT, TUNED, genomes, simulation
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.arrays import Parameters
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.resolution import resolve_study
-from gaplab.services.specs.simulation import Simulation
 from gaplab.workers.pool import LEAST_S
 
 CORES = (2, 16, 64, 1_000)
 FIGURE_4 = StudySpec(direct_repetitions=100)
-LEND_S = 0.001
-"""Time to send work to another core and receive the result. Measured: 0.4 to 1 ms."""
+LEND_S = 0.001  # to send work to another core and receive the result; measured: 0.4 to 1 ms
 
-TURNS = 12
-MANY = 20
+TURNS, MANY = 12, 20
 
 
-@dataclass(frozen=True)
-class Speed:
-    """Core-seconds of one rollout.
-
-    Attributes:
-        alone_s: core-seconds in a separate call.
-        together_s: core-seconds in a call with many rollouts.
-    """
+class Speed(NamedTuple):
+    """Core-seconds of one rollout: in a separate call, and in a call with many."""
 
     alone_s: float
     together_s: float
 
 
-@dataclass(frozen=True)
-class Calls:
-    """A phase of a repetition: calls of `Simulate`, each of which waits for the one before.
+class Calls(NamedTuple):
+    """A phase of a repetition: a number of calls of `Simulate`, each of which waits for the one before."""
 
-    Attributes:
-        count: number of calls.
-        rollouts: rollouts in each call.
-    """
-
-    count: int
+    number: int
     rollouts: int
 
     def work_s(self, speed: Speed) -> float:
         """Return the work in core-seconds."""
-        return self.count * self.rollouts * (speed.alone_s if self.rollouts == 1 else speed.together_s)
+        return self.number * self.rollouts * (speed.alone_s if self.rollouts == 1 else speed.together_s)
 
     def chain_s(self, speed: Speed) -> float:
         """Return the duration in seconds with as many cores as are useful."""
         parts = max(1, min(self.rollouts, int(self.rollouts * speed.together_s / LEAST_S)))
         together = ceil(self.rollouts / parts)
         each_s = speed.alone_s if together == 1 else speed.together_s
-        return self.count * (together * each_s + (LEND_S if parts > 1 else 0.0))
+        return self.number * (together * each_s + (LEND_S if parts > 1 else 0.0))
 
 
 def phases(spec: ExperimentSpec) -> Iterator[Calls]:
@@ -94,16 +78,9 @@ def figure() -> Iterator[tuple[int, tuple[Calls, ...]]]:
         yield spec.repetitions or 0, tuple(phases(spec))
 
 
-def steps() -> int:
-    """Return the steps that the supervisor stores for the figure: five in an iteration, three in iteration 0."""
-    specs = resolve_study(FIGURE_4)
-    ends = ((spec, (spec.iterations or 0) * strategies[spec.strategy.name].takes_samples) for spec in specs)
-    return sum((spec.repetitions or 0) * (5 * iterations + 3) for spec, iterations in ends)
-
-
 def measured(engine: type[Engine]) -> Speed:
     """Measure the speed of an engine with the kinds of genomes and simulators that occur in searches."""
-    simulate = Simulation(Quadruped(), engine(), [tunables[name]() for name in TUNED])
+    simulate = simulation(engine())
     ranges = [[tunables[name].lower or 0.0, tunables[name].upper or 1.0] for name in TUNED]
     lower, upper = np.transpose(ranges)
     drawn = np.random.default_rng(0).uniform(lower, upper, (MANY, len(TUNED)))
@@ -124,18 +101,13 @@ def measured(engine: type[Engine]) -> Speed:
 def main() -> None:
     """Measure the installed engines, and print the table."""
     console = Console(width=140)
-    total = sum(repetitions * each.count * each.rollouts for repetitions, calls in figure() for each in calls)
-    table = Table(title=f"the paper's Fig. 4: {total / 1e6:.1f} million rollouts, {steps():,} steps to store")
-    for column in (
-        "engine",
-        "rollout alone",
-        f"in a batch of {MANY}",
-        *(f"{cores:,} cores" for cores in CORES),
-        "longest chain",
-    ):
+    total = sum(repetitions * each.number * each.rollouts for repetitions, calls in figure() for each in calls)
+    table = Table(title=f"the paper's Fig. 4: {total / 1e6:.1f} million rollouts")
+    cores = (f"{cores:,} cores" for cores in CORES)
+    for column in ("engine", "rollout alone", f"in a batch of {MANY}", *cores, "longest chain"):
         table.add_column(column, justify="left" if column == "engine" else "right")
     for engine in engines.values():
-        if engine.runs(Quadruped().world) and engine.available():
+        if engine.runs(ROBOT.world) and engine.available():
             speed = measured(engine)
             rollout = (f"{1e3 * speed.alone_s:.1f} ms", f"{1e3 * speed.together_s:.1f} ms")
             table.add_row(engine.name, *rollout, *_durations(speed))

@@ -1,4 +1,4 @@
-"""Steps per second that the supervisor stores on SQLite and Postgres, from 1 000 repetitions with free workers."""
+"""Steps per second that the supervisor stores on SQLite and Postgres, from 1 000 repetitions that cost nothing."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,8 +24,7 @@ from gaplab.workers.supervisor import Supervisor
 from gaplab.workers.task import Batch, batches
 from tests.postgres import running
 
-AT_ONCE = 200
-"""Simultaneous repetitions: as many as for a hundred cores."""
+AT_ONCE = 200  # simultaneous repetitions, as many as for a hundred cores
 
 SPEC = ExperimentSpec.model_validate(
     {
@@ -38,37 +37,11 @@ SPEC = ExperimentSpec.model_validate(
 )
 """A spec with every kind of step, and with the largest ones to store: 20 simulators in each tuning."""
 
-Batches = tuple[Batch, ...]
 
-
-def simulated() -> Batches:
-    """Return the batches of steps of one repetition, which every simulated repetition delivers."""
-    return tuple(batches(recorded(setting(resolve_experiment(SPEC), 0), (), ())))
-
-
-class WithoutRay(Repetitions):
-    """Repetitions without workers: each round, every repetition has its next batch ready."""
-
-    def __init__(self, store: Store, delivered: Batches) -> None:
-        super().__init__(store, "benchmark", {})
-        self._delivered = delivered
-
-    def launch(self, claim: Claim) -> Run:
-        """Deliver precomputed batches; the claim's log is empty."""
-        return Run(claim, iter(self._delivered))
-
-    def receive(self) -> None:
-        """Take the next batch of each run."""
-        for run in self.runs:
-            batch = next(run.stream, None)
-            run.ended = batch is None
-            run.take(batch or ())
-
-
-class ThroughRay(Repetitions):
+class Delivered(Repetitions):
     """Repetitions as Ray tasks that stream precomputed batches."""
 
-    def __init__(self, store: Store, delivered: Batches) -> None:
+    def __init__(self, store: Store, delivered: tuple[Batch, ...]) -> None:
         super().__init__(store, "benchmark", {})
         self._delivered = ray.put(delivered)
 
@@ -78,17 +51,17 @@ class ThroughRay(Repetitions):
 
 
 @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-def _deliver(delivered: Batches) -> Iterator[Batch]:
+def _deliver(delivered: tuple[Batch, ...]) -> Iterator[Batch]:
     yield from (batch for batch in delivered)  # Ray requires a generator
 
 
-def steps_per_second(url: str, kind: type[WithoutRay] | type[ThroughRay], delivered: Batches) -> float:
+def steps_per_second(url: str, delivered: tuple[Batch, ...]) -> float:
     """Run a queued experiment to its end; return steps per second."""
     migrations.upgrade(url)
     store = Store(url)
     experiment = submission.submit_experiment(store, SPEC).id
     ours = Supervisor(store, lambda: AT_ONCE)
-    ours._repetitions = kind(store, delivered)
+    ours._repetitions = Delivered(store, delivered)
     begun = perf_counter()
     idle = 0
     while idle < 2:  # one round ends the last repetition, another finds no more work
@@ -101,17 +74,10 @@ def steps_per_second(url: str, kind: type[WithoutRay] | type[ThroughRay], delive
 
 
 def rows() -> list[Row]:
-    """Measure storing alone, and with Ray in the loop."""
-    delivered = simulated()
+    """Measure both databases."""
+    delivered = tuple(batches(recorded(setting(resolve_experiment(SPEC), 0), (), ())))
     measured = []
-    for name, kind in (("storing alone", WithoutRay), ("with Ray in the loop", ThroughRay)):
-        with TemporaryDirectory() as folder, running(Path(folder)) as server, cluster(Settings(workers=2)):
-            for database, url in (("SQLite", f"sqlite:///{Path(folder) / 'bench.db'}"), ("Postgres", server)):
-                rate = steps_per_second(url, kind, delivered)
-                measured.append(Row(f"supervisor, {name}, {database}", f"{rate:.0f} steps/s"))
+    with TemporaryDirectory() as folder, running(Path(folder)) as server, cluster(Settings(workers=2)):
+        for database, url in (("SQLite", f"sqlite:///{Path(folder) / 'bench.db'}"), ("Postgres", server)):
+            measured.append(Row(f"supervisor, {database}", f"{steps_per_second(url, delivered):.0f} steps/s"))
     return measured
-
-
-if __name__ == "__main__":
-    for row in rows():
-        print(row.figure, row.value)

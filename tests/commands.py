@@ -1,8 +1,11 @@
-"""The command and a service in a thread, for the tests of both."""
+"""The commands and a service in a thread, for the tests of both."""
 
+import runpy
+import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from typing import Any, NamedTuple
 
 import uvicorn
@@ -30,3 +33,19 @@ def served(app: Callable[..., Any]) -> Iterator[str]:
     server.should_exit = True
     thread.join()
     listener.close()
+
+
+def module(name: str, *arguments: object) -> str:
+    """What `python -m` prints of a module, which runs in this process.
+
+    Raises:
+        SystemExit: it refuses.
+    """
+    out, before = StringIO(), sys.argv
+    sys.argv = [name, *map(str, arguments)]
+    try:
+        with redirect_stdout(out):
+            runpy.run_module(name, run_name="__main__")
+    finally:
+        sys.argv = before
+    return out.getvalue()

@@ -1,191 +1,224 @@
-"""The paper's claims C1 to C8, each with its rule.
+"""The paper's claims on a study: `page.toml` has them as data, and each kind of claim is one function here."""
 
-`levels.py` examines those that compare fitness with direct, `pairs.py` those that strategies differ, and `curves.py`
-those on spread and shape.
-"""
-
-from collections.abc import Callable
+import tomllib
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
 
-from benchmarks.reproduction import paper
-from benchmarks.reproduction.curves import NEARER_TO_A_THIRD, curves_flatten, curves_rise, fit_strategies_vary_less
-from benchmarks.reproduction.evidence import Examined
-from benchmarks.reproduction.levels import (
-    all_end_near_direct,
-    four_samples_tune_simulators,
-    one_sample_is_enough,
-    one_sample_tunes_the_simulator,
-    starts_at_two_thirds,
-    three_samples_reach_direct,
-)
-from benchmarks.reproduction.pairs import (
-    fit_strategies_differ,
-    fit_strategies_lead,
-    known_fit_leads_random,
-    one_sample_wins,
-    uniqueness_gains,
-    weak_strategies_differ,
-)
-from benchmarks.reproduction.studies import Study
+import numpy as np
+
+from benchmarks.reproduction import paper, statistics
+from benchmarks.reproduction.statistics import Tested
+from benchmarks.reproduction.studies import Arm, Study
+from gaplab.schemas.comparisons import Test
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.statistics import compare, finite
+from gaplab.services.figures.words import number_of, spoken
+from gaplab.services.reports.numbers import probability, signed
+
+DATA = tomllib.loads(Path(__file__).with_name("page.toml").read_text(encoding="utf-8"))
+NO_TEST, NO_DIRECT = "none in the paper", "direct baseline"
+FEWEST_SAMPLES = 4
+"""Samples below which a curve has no two halves to compare."""
+GROUPS = {"fit": paper.FIT, "best": paper.FIT[2:], "all": paper.STRATEGIES}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Claim:
-    """A claim of the paper.
-
-    Attributes:
-        key: its label: C and a number; a letter follows if one sentence of the paper makes several claims.
-        title: what it claims, in a few words.
-        says: what the paper says.
-        rule: the statements that it is made of, and what refutes them.
-        examine: examines it in a study.
-    """
+    """A claim of the paper, as `page.toml` has it: its kind says which of the other fields it has."""
 
     key: str
+    kind: str
     title: str
     says: str
     rule: str
-    examine: Callable[[Study], Examined]
+    strategies: str = ""
+    levels: Sequence[tuple[int, float]] = ()
+    transferred: bool = False
+    span: Sequence[int] = ()
+    pairs: Sequence[str] = ()
+    p: float | None = None
+    counts: int = 1
+
+    def least(self, first: str, second: str) -> float:
+        """Return the least difference of two strategies that agrees with the paper's; 0 if it tests none."""
+        return 0.0 if self.p is None else paper.least((first, second), self.p, self.counts)
 
 
-CLAIMS = (
-    Claim(
-        "C1",
-        "controllers of a random simulator start at two thirds of direct",
-        f"Before any sample every strategy starts alike, at about {paper.START:.2f} of direct.",
-        "Before any sample all strategies do the same: they search in a random simulator. So they start alike, but for "
-        f"chance, and are taken together. Their mean is within {paper.START_MARGIN:.2f} of {paper.START:.2f} of "
-        "direct: half a unit of the last digit of the paper's 0.9, plus two standard errors. Refuted if it is "
-        "shown to be outside. The robot was chosen among trials that start at 0.38 to 0.83, so agreement says little. "
-        "Where reality is another engine, the start has the gap between the engines as well, which the paper lacks.",
-        starts_at_two_thirds,
-    ),
-    Claim(
-        "C2a",
-        "strategies with simulated fit reach direct after three samples and pass it by ten",
-        f"The three strategies with simulated fit reach {paper.AFTER_THREE:.2f} of direct after three samples, and "
-        f"{paper.AFTER_TEN:.2f} by ten.",
-        f"Each of the three is above {paper.LEAST_AFTER_THREE:.2f} of direct after three samples, and above "
-        f"{paper.LEAST_AFTER_TEN:.2f} after ten: the paper's 1.3 and 1.4 may be a rounded 1.25 and 1.35. Refuted if "
-        "one is shown to be below. Passing direct does not show a good simulator: recorded fitness is the largest of "
-        "the samples and a transferred controller. [Fig. 4](#fig-4) has the best of as many direct searches.",
-        three_samples_reach_direct,
-    ),
-    Claim(
-        "C2b",
-        "after four samples, simulators of strategies with simulated fit are nearly perfect",
-        "Strategies with simulated fit have nearly perfectly tuned simulators after three or four samples.",
-        "The paper infers it from the recorded fitness (C2a), which may be a sample's. Here the transferred "
-        f"controller of each of the three is, by itself, above {paper.LEAST_AFTER_THREE:.2f} of direct after four "
-        "samples. Refuted if one is shown to be below.",
-        four_samples_tune_simulators,
-    ),
-    Claim(
-        "C3",
-        "strategies with simulated fit vary less than 0.58 times as much as the others",
-        "The standard deviation of these three is about a third of the others'.",
-        "The ratio of the standard deviations, from three samples on, is geometrically nearer to a third than to 1: "
-        f"below {NEARER_TO_A_THIRD:.2f}, by a bootstrap over whole repetitions. Refuted if it is shown to be above. "
-        f"The effect is smaller than in the paper if the ratio is shown to be above {1 / paper.LEAST_TIMES:.2f}: the "
-        f"paper's factor of three may be a rounded {paper.LEAST_TIMES}. The largest of several controllers varies less "
-        "than one, so a small ratio does not show that transferred controllers vary less: [both]"
-        "(#where-the-recorded-fitness-comes-from).",
-        fit_strategies_vary_less,
-    ),
-    Claim(
-        "C4a",
-        "with one sample, simulated fit and informative beats every other",
-        "With one sample, simulated fit and informative is significantly different from the other strategies "
-        "(p < 0.01), and better.",
-        "It is above each of the five others after one sample. Refuted if its lead is shown to be smaller than "
-        f"{paper.ONE_SAMPLE.least(*paper.SIMULATED_FIT[:2]):.3f} of direct over a strategy with simulated fit, or "
-        f"than {paper.ONE_SAMPLE.least(paper.SIMULATED_FIT[0], paper.WEAK[0]):.3f} over another.",
-        one_sample_wins,
-    ),
-    Claim(
-        "C4b",
-        "with one sample, simulated fit and informative almost reaches direct",
-        "Simulated fit and informative has a nearly perfect result after a single sample.",
-        f"It is above {paper.LEAST_AFTER_THREE:.2f} of direct after one sample, as others are after three (C2a). "
-        "Refuted if it is shown to be below.",
-        one_sample_is_enough,
-    ),
-    Claim(
-        "C4c",
-        "with one sample, the simulator of simulated fit and informative is nearly optimal",
-        "That single sample results in a nearly optimal simulator.",
-        f"The controller transferred after it is, by itself, above {paper.LEAST_AFTER_THREE:.2f} of direct. Refuted if "
-        "it is shown to be below. The recorded fitness of C4b may be that of the sample, which was selected before any "
-        "simulator was tuned.",
-        one_sample_tunes_the_simulator,
-    ),
-    Claim(
-        "C5a",
-        "strategies with simulated fit are above the others beyond two samples",
-        "Beyond two samples, each strategy with simulated fit is better than each without (p ≪ 0.001).",
-        "Over 3 to 10 samples, each of the three is above each of the other three. Refuted if a lead is shown to be "
-        f"smaller than {paper.BEYOND_TWO.least(paper.SIMULATED_FIT[0], paper.WEAK[0]):.3f} of direct.",
-        fit_strategies_lead,
-    ),
-    Claim(
-        "C5b",
-        "beyond two samples, unique is above plain simulated fit, and both are above simulated fit and informative",
-        "Beyond two samples, the strategies with simulated fit differ from each other (p ≪ 0.001): the unique one is "
-        "above plain simulated fit, and both are above simulated fit and informative.",
-        "Over 3 to 10 samples, each of the three pairs has this order. Refuted if a lead is shown to be smaller than "
-        f"{paper.BEYOND_TWO.least(*paper.SIMULATED_FIT[:2]):.3f} of direct. The paper's p may also be that of each "
-        "against the other three strategies (C5a); the order is in its text. With that reading the order has no size, "
-        "and is refuted only by a pair whose opposite is shown.",
-        fit_strategies_differ,
-    ),
-    Claim(
-        "C5c",
-        "known fit is better than random",
-        "Beyond two samples, known fit is better than random (p ≈ 0.017).",
-        "Over 3 to 10 samples, known fit is above random. Refuted if its lead is shown to be smaller than "
-        f"{paper.KNOWN_FIT.least(*paper.WEAK[:2]):.3f} of direct.",
-        known_fit_leads_random,
-    ),
-    Claim(
-        "C6",
-        "beyond five samples, informative is above known fit, and known fit above random",
-        "Beyond five samples, the three weakest strategies differ from one another (p < 0.05): informative is slightly "
-        "above the other two, and known fit above random.",
-        "Over 6 to 10 samples, each of the three pairs has this order. Refuted if a lead is shown to be smaller than "
-        f"{paper.BEYOND_FIVE.least(*paper.WEAK[:2]):.3f} of direct. The paper's p may also be that of each against the "
-        "three strategies with simulated fit; [letters](#which-strategies-differ) tell these apart.",
-        weak_strategies_differ,
-    ),
-    Claim(
-        "C7",
-        "uniqueness gains a little",
-        "Uniqueness appears to give a small improvement over plain simulated fit.",
-        "Over 3 to 10 samples, simulated fit and unique is above simulated fit. Refuted if it is shown to be below: "
-        "the paper tests no such gain. C5b supposes that its p is also of this pair.",
-        uniqueness_gains,
-    ),
-    Claim(
-        "C8a",
-        "all curves rise",
-        "The fitness of all strategies increases with the number of samples.",
-        "In each strategy the last recorded fitness is above the first, paired by repetition. Refuted if a rise is "
-        f"shown to be smaller than {paper.LEAST_RISE:.2f} of direct, half of the paper's.",
-        curves_rise,
-    ),
-    Claim(
-        "C8b",
-        "all curves flatten",
-        "The increase diminishes with more samples.",
-        "In each strategy the first half of the samples gains more per sample than the second, paired by repetition. "
-        "Refuted if the second half is shown to gain more.",
-        curves_flatten,
-    ),
-    Claim(
-        "C8c",
-        "all strategies end near direct",
-        f"With more samples, all strategies come to about {paper.AT_LAST:.2f} of direct.",
-        f"Each is above {paper.LEAST_AFTER_THREE:.2f} of direct after ten samples: the paper's 1.3 may be a rounded "
-        "1.25. Refuted if one is shown to be below.",
-        all_end_near_direct,
-    ),
-)
+CLAIMS = tuple(Claim(**each) for each in DATA["claims"])
+
+
+class Evidence(NamedTuple):
+    """One statement of a claim; `opposed` is p of the hypothesis that its opposite does not hold, if it has one."""
+
+    statement: str
+    tested: Tested
+    opposed: float | None = None
+
+
+class Examined(NamedTuple):
+    """A claim as a study shows it.
+
+    Attributes:
+        lacking: what the claim names and the study lacks.
+        evidence: the statements; none if the study has nothing that the claim speaks of.
+        here: the study's numbers.
+        paper_test: result of the paper's own test.
+        unequal: why strategies are compared unfairly; None if they are not.
+    """
+
+    lacking: Sequence[str]
+    evidence: Sequence[Evidence] = ()
+    here: str = ""
+    paper_test: str = ""
+    unequal: str | None = None
+
+
+def examine(claim: Claim, study: Study) -> Examined:
+    """Return a claim as a study shows it."""
+    kinds: dict[str, Callable[[Claim, Study], Examined]] = {"start": _start, "reach": _reach, "spread": _spread}
+    return (kinds | {"order": _order, "rises": _shape, "flattens": _shape})[claim.kind](claim, study)
+
+
+def _start(_: Claim, study: Study) -> Examined:
+    starts = [own for arm in study.of() if len(own := arm.values(0, 0))]
+    if not len(study.direct) or not starts:
+        return Examined(_lacking(study, paper.STRATEGIES) if len(study.direct) else [NO_DIRECT])
+    tested = statistics.near(np.concatenate(starts), study.direct, paper.START, paper.START_MARGIN)
+    ratios = [own.mean() / study.unit for own in starts]
+    here = f"{tested.estimate} of direct; strategies {min(ratios):.2f} to {max(ratios):.2f}"
+    return Examined([], [Evidence(f"all together near {paper.START:.2f}", tested)], here, NO_TEST)
+
+
+def _reach(claim: Claim, study: Study) -> Examined:
+    names, arms = GROUPS[claim.strategies], study.of(GROUPS[claim.strategies])
+    levels = [(count, fitness / paper.DIRECT) for count, fitness in claim.levels if count <= study.last]
+    lacking = [*([] if len(study.direct) else [NO_DIRECT]), *_lacking(study, names)]
+    lacking += [_ends(study, count) for count, _ in claim.levels if arms and count > study.last]
+    if not len(study.direct) or not arms or not levels:
+        return Examined(lacking)
+    verb, evidence, here = " transfers" if claim.transferred else "", [], defaultdict[str, list[str]](list)
+    for count, share in levels:
+        for arm in arms:
+            values = finite(arm.transferred[:, count]) if claim.transferred else arm.values(count, count)
+            tested = statistics.reaches(values, study.direct, share)
+            evidence.append(Evidence(f"{spoken(arm.strategy)}{verb} above {share:.2f} after {count}", tested))
+            told = f"{values.mean() / study.unit:.2f}" if len(values) else "nothing"
+            here[spoken(arm.strategy)].append(f"{told} after {count}")
+    return Examined(lacking, evidence, "; ".join(f"{name} {', '.join(each)}" for name, each in here.items()), NO_TEST)
+
+
+def _spread(_: Claim, study: Study) -> Examined:
+    if study.last < 3:
+        return Examined([f"value after 3 samples: it ends after {study.last}"])
+    sides = [
+        {arm.strategy: own for arm in study.of(names) if len(own := arm.complete(3, study.last)) > 1}
+        for names in (paper.FIT, paper.WEAK)
+    ]
+    names = [name for side in sides for name in side]
+    lacking = [spoken(name).lower() for name in paper.STRATEGIES if name not in names]
+    if not all(sides):
+        return Examined(lacking)
+    tested = statistics.narrower(*(list(side.values()) for side in sides))
+    here = f"ratio of the deviations over 3 to {study.last} samples {tested.estimate}"
+    evidence = Evidence(f"ratio of the deviations below {paper.NEARER_TO_A_THIRD:.2f}", tested)
+    return Examined(lacking, [evidence], here, NO_TEST, study.unequal(names))
+
+
+def _shape(claim: Claim, study: Study) -> Examined:
+    arms, lacking = study.of(), _lacking(study, paper.STRATEGIES)
+    if not arms or study.last < FEWEST_SAMPLES:
+        return Examined([*lacking, *([_ends(study, FEWEST_SAMPLES)] if arms else [])])
+    middle, last, evidence, told = study.last // 2, study.last, [], []
+    (unit, of_direct), rises = (1.0, "") if np.isnan(study.unit) else (study.unit, " of direct"), claim.kind == "rises"
+    for arm in arms:
+        recorded = arm.complete(0, last)
+        early, late = recorded[:, middle] - recorded[:, 0], recorded[:, -1] - recorded[:, middle]
+        gains = early + late if rises else early / middle - late / (last - middle)
+        tested = statistics.above([gains], paper.LEAST_RISE if rises else 0.0, study.unit)
+        evidence.append(Evidence(f"{spoken(arm.strategy)} {claim.kind}", tested))
+        if len(recorded):
+            both = (signed(float(each.mean() / unit)) for each in (early, late))
+            told.append(f"{spoken(arm.strategy)} {' and '.join(both)}")
+    here = f"gain{of_direct} to {middle} samples, and from there to {last}: {'; '.join(told)}"
+    return Examined(lacking, evidence, here, NO_TEST)
+
+
+class Pair(NamedTuple):
+    """A statement that one strategy is above another, with its values in a study.
+
+    Attributes:
+        words: the statement.
+        least: the least difference that agrees with the paper's, as a share of direct; 0 if it gives none.
+        groups: values `(r,)` of the first and the second, one for each repetition.
+        student: the paper's test, of the values at all numbers of evaluations.
+    """
+
+    words: str
+    least: float
+    groups: tuple[FloatArray, FloatArray]
+    student: Test
+
+
+def _order(claim: Claim, study: Study) -> Examined:
+    named = [tuple(each.split(" > ")) for each in claim.pairs]
+    names = [name for name in paper.STRATEGIES if any(name in pair for pair in named)]
+    lacking, (first, last) = _lacking(study, names), (claim.span[0], min(claim.span[1], study.last))
+    present = [arms for pair in named if len(arms := study.of(pair)) > 1]
+    if not present or last < first:
+        return Examined([*lacking, *([_ends(study, first)] if present else [])])
+    pairs = [_pair(claim, one, other, first, last) for one, other in present]
+    return Examined(
+        lacking,
+        [
+            Evidence(
+                pair.words,
+                statistics.above(pair.groups, pair.least, study.unit),
+                statistics.above(pair.groups[::-1], 0.0, study.unit).shows,
+            )
+            for pair in pairs
+        ],
+        _least(study, pairs),
+        _paper_test(claim, pairs, first, last),
+        study.unequal(names),
+    )
+
+
+def _pair(claim: Claim, one: Arm, other: Arm, first: int, last: int) -> Pair:
+    words = f"{spoken(one.strategy)} above {spoken(other.strategy).lower()}"
+    pooled = (finite(arm.recorded[:, first : last + 1]) for arm in (one, other))
+    groups = one.values(first, last), other.values(first, last)
+    return Pair(words, claim.least(one.strategy, other.strategy), groups, compare(*pooled)[0])
+
+
+def _least(study: Study, pairs: Sequence[Pair]) -> str:
+    """Return the smallest lead of the strategies that the paper has ahead; it may be negative."""
+    known = [
+        (float(pair.groups[0].mean() - pair.groups[1].mean()), pair) for pair in pairs if all(map(len, pair.groups))
+    ]
+    if not known:
+        return ""
+    least, pair = min(known, key=lambda each: each[0])
+    whose, unit = ("", 1.0) if np.isnan(study.unit) else (" of direct", study.unit)
+    return f"{'difference' if len(known) == 1 else 'least difference'} {signed(least / unit)}{whose} ({pair.words})"
+
+
+def _paper_test(claim: Claim, pairs: Sequence[Pair], first: int, last: int) -> str:
+    if claim.p is None:
+        return NO_TEST
+    where = f"at {number_of('sample', first)}" if first == last else f"pooled over {first} to {last} samples"
+    known = [(pair.student.p, pair) for pair in pairs if pair.student.p is not None]
+    found = sum(p < claim.p and (pair.student.statistic or 0.0) > 0 for p, pair in known)
+    largest = max(known, key=lambda each: each[0], default=None)
+    told = f"; largest p {probability(largest[0])} ({largest[1].words})" if largest else ""
+    return f"Student {where}: {found} of {number_of('pair', len(pairs))} with p < {claim.p:g}{told}"
+
+
+def _lacking(study: Study, names: Sequence[str]) -> list[str]:
+    return [spoken(name).lower() for name in names if not study.arm(name)]
+
+
+def _ends(study: Study, count: int) -> str:
+    return f"value after {number_of('sample', count)}: it ends after {study.last}"

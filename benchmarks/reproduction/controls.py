@@ -5,13 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.differences import Difference
-from benchmarks.lean_ratios import ratio_difference
-from benchmarks.reproduction.statements import CONFIDENCE
+from benchmarks.reproduction.statistics import Difference
 from benchmarks.reproduction.studies import Arm, Study
+from benchmarks.reproduction.verdicts import significant
 from gaplab.schemas.differences import Values
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.equivalence import SIGNIFICANT
 from gaplab.services.core.statistics import both, holm
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING, probability
@@ -19,24 +17,12 @@ from gaplab.services.reports.sentences import listed
 from gaplab.services.specs.differences import SpecColumn, differences
 
 COUNTS = (0, 1, 2, 3, 5, 10)
-
 SIZES = {"/iterations", "/repetitions"}
-"""Settings that say how much of a study is there."""
-
-DIRECT = spoken("direct")
-
 HEAD = ("strategy", "samples", "study", "control", "repetitions", "difference", "p")
 
 
 class Row(NamedTuple):
-    """What a control changes in one strategy after one number of samples.
-
-    Attributes:
-        strategy: name of the strategy in words.
-        samples: number of samples.
-        values: fitness `(r,)` of the study and of the control, in the repetitions that both have.
-        difference: the control's mean less the study's.
-    """
+    """What a control changes in one strategy after some samples, in the repetitions `(r,)` that both studies have."""
 
     strategy: str
     samples: int
@@ -46,7 +32,7 @@ class Row(NamedTuple):
     def cells(self) -> tuple[str, ...]:
         """Return the row in words."""
         means = (f"{each.mean():.2f}" for each in self.values)
-        told = self.difference.told(CONFIDENCE), probability(self.difference.p)
+        told = self.difference.told(), probability(self.difference.p)
         return self.strategy, str(self.samples), *means, str(len(self.values[0])), *told
 
 
@@ -61,15 +47,16 @@ def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
     """
     changes = {
         label: (
-            _alone(control) and not _same_reality(control, study),
+            not len(control.direct) and study.spec.reality != control.spec.reality,
             not study.whole,
-            sum(len(what_differs(own, arm)) for own, arm in pairs) / len(pairs),
+            sum(len(_settings(own, arm)) for own, arm in pairs) / len(pairs),
             -len(pairs),
         )
         for label, study in studies.items()
         if study.archives != control.archives
-        and _world(study.arms[0]) == _world(control.arms[0])
-        and (pairs := list(_both(control, study)))
+        and all(getattr(study.spec, name) == getattr(control.spec, name) for name in ("robot", "seed"))
+        and study.spec.engine.name == control.spec.engine.name
+        and (pairs := _shared(control, study))
     }
     if not changes:
         raise SystemExit(f"{control.archives[0]}: no study has its robot, engine and seed, and one of its strategies")
@@ -79,85 +66,59 @@ def compared_with(control: Study, studies: Mapping[str, Study]) -> str:
 def rows(control: Study, study: Study) -> Iterator[Row]:
     """Yield the difference of a control from a study, for each strategy of both and each number of samples.
 
-    Fitness is divided by the direct baseline of its own study. That of a control without a baseline is divided by the
-    baseline of the study, whose reality is the same. Direct's own fitness is not divided. Repetitions with the same
-    number share their random numbers, so they are paired. Where there are two baselines, the difference has the errors
-    of both. Where the change makes no difference in any repetition, there is no row.
-
-    Args:
-        control: has strategies of the study with other settings.
-        study: the study.
+    Fitness is divided by the direct baseline of its own study, or by the study's if the control has none; direct's own
+    is not divided. Repetitions with the same number share their random numbers, so they are paired. Where the change
+    makes no difference in any repetition, there is no row.
 
     Raises:
         SystemExit: the control has another reality, and no direct baseline.
     """
-    alone = _alone(control)
-    if alone and not _same_reality(control, study):
+    alone = not len(control.direct)
+    if alone and study.spec.reality != control.spec.reality:
         raise SystemExit(f"{control.archives[0]}: it has another reality, so it needs a direct baseline of its own")
-    for own, arm in _both(control, study):
+    for own, arm in _shared(control, study):
         units = (1.0, 1.0) if arm.read.direct else (study.unit, study.unit if alone else control.unit)
         for count in [0] if arm.read.direct else COUNTS:
             old, new = both(_column(own, count), _column(arm, count))
             if arm.read.direct or alone:
                 found = Difference.paired(new / units[1], old / units[0])
             else:
-                found = ratio_difference(new, old, control.direct, study.direct)
+                found = Difference.of_ratios((new, old), (control.direct, study.direct))
             if found is not None and (found.value or found.error):
                 yield Row(spoken(arm.strategy), count, (old / units[0], new / units[1]), found)
 
 
 def shown(found: Sequence[Row]) -> str:
     """Return which differences of a table are shown after Holm's correction over its rows; empty if none is."""
-    corrected = holm([row.difference.p for row in found])
     counts: dict[str, list[str]] = {}
-    for row, p in zip(found, corrected, strict=True):
-        if p is not None and p < SIGNIFICANT:
-            counts.setdefault(row.strategy, []).append(str(row.samples))
-    return "; ".join(
-        strategy.lower() if strategy == DIRECT else f"{strategy.lower()} at {listed(each)}"
-        for strategy, each in counts.items()
-    )
+    for row, p in zip(found, holm([row.difference.p for row in found]), strict=True):
+        if significant(p):
+            counts.setdefault(row.strategy.lower(), []).append(str(row.samples))
+    direct = spoken("direct").lower()
+    return "; ".join(each if each == direct else f"{each} at {listed(counts[each])}" for each in counts)
 
 
 def change(control: Study, study: Study) -> str:
     """Return the settings in which the experiments of a control differ from those of a study."""
-    return "; ".join(dict.fromkeys(each for own, arm in _both(control, study) for each in what_differs(own, arm)))
+    return "; ".join(dict.fromkeys(each for own, arm in _shared(control, study) for each in _settings(own, arm)))
 
 
-def _both(control: Study, study: Study) -> Iterator[tuple[Arm, Arm]]:
-    """Yield the experiments of each strategy that both have: the study's and the control's."""
-    for arm in control.arms:
-        if (own := study.arm(arm.strategy)) is not None:
-            yield own, arm
+def _shared(control: Study, study: Study) -> list[tuple[Arm, Arm]]:
+    """Return the experiments of each strategy that both have: the study's and the control's."""
+    return [(own, arm) for arm in control.arms if (own := study.arm(arm.strategy)) is not None]
 
 
-def what_differs(own: Arm, other: Arm) -> list[str]:
+def _settings(own: Arm, other: Arm) -> list[str]:
     """Return the settings in which two experiments differ, without their sizes."""
     columns = [SpecColumn(arm.read.id, arm.read.name, (arm.read.spec,)) for arm in (own, other)]
-    return [
-        f"{each.setting}: {_told(each.values[1])}, not {_told(each.values[0])}"
-        for each in differences(columns).settings
-        if each.pointer not in SIZES
-    ]
+    found = (each for each in differences(columns).settings if each.pointer not in SIZES)
+    return [f"{each.setting}: {_told(each.values[1])}, not {_told(each.values[0])}" for each in found]
 
 
 def _told(values: Values) -> str:
     return ", ".join("none" if value is None else str(value) for value in values) or MISSING
 
 
-def _alone(control: Study) -> bool:
-    """Return whether a control has no direct baseline."""
-    return not len(control.direct)
-
-
-def _same_reality(control: Study, study: Study) -> bool:
-    return study.arms[0].spec.reality == control.arms[0].spec.reality
-
-
-def _world(arm: Arm) -> tuple[object, ...]:
-    return arm.spec.robot, arm.spec.engine.name, arm.spec.seed
-
-
 def _column(arm: Arm, count: int) -> FloatArray:
     """Return recorded fitness `(r,)` after a number of samples; nothing if the experiment never reaches it."""
-    return arm.recorded[:, count] if count < arm.recorded.shape[1] else np.empty(0)
+    return arm.recorded[:, count] if count <= arm.last else np.empty(0)

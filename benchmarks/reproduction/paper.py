@@ -4,7 +4,6 @@ Source: Klaus, Glette and Tørresen, A Comparison of Sampling Strategies for Par
 SIMPAR 2012, section 3 and the caption of Fig. 4.
 """
 
-from dataclasses import dataclass
 from math import sqrt
 
 from scipy import stats
@@ -19,30 +18,30 @@ DIRECT, DIRECT_SD = 1.33, 0.10
 START = 0.9 / DIRECT
 """Every strategy before any sample: "roughly the same expected fitness, about 0.9"."""
 
-AFTER_THREE, AFTER_TEN = 1.3 / DIRECT, 1.4 / DIRECT
-"""The strategies with simulated fit after three samples, "at least 1.3", and after ten."""
+AFTER_THREE, AFTER_TEN, AT_LAST = 1.3 / DIRECT, 1.4 / DIRECT, 1.3 / DIRECT
+"""The strategies with simulated fit after three samples, "at least 1.3", and after ten.
+
+All strategies at last: "with more iterations, fitnesses improved (diminishingly) to more or less 1.3".
+"""
 
 LEAST_AFTER_THREE, LEAST_AFTER_TEN = 1.25 / DIRECT, 1.35 / DIRECT
 """The least that fitnesses printed as 1.3 and 1.4 may have been."""
 
-AT_LAST = 1.3 / DIRECT
-"""All strategies: "with more iterations, fitnesses improved (diminishingly) to more or less 1.3"."""
-
 LEARNED_SD = (0.10 / DIRECT, 0.15 / DIRECT)
 """Least and greatest standard deviation with simulated fit."""
 
-TIMES = 3.0
-"""How many times smaller these are than those of the others: "about three times"."""
+TIMES, LEAST_TIMES = 3.0, 2.5
+"""How many times smaller these are than those of the others: "about three times", and the least that this may be."""
 
-LEAST_TIMES = 2.5
-"""The least that a factor printed as three may have been."""
+NEARER_TO_A_THIRD, LEAST_RATIO = (1 / 3) ** 0.5, 1 / LEAST_TIMES
+"""Ratios of standard deviations: as far from a third as from 1, by factors; and the greatest that is the paper's."""
 
 LEAST_RISE = (1.3 / DIRECT - START) / 2
 """Half of the rise of all curves, from about 0.9 "to more or less 1.3"."""
 
-SIMULATED_FIT = ("simulated_fit", "simulated_fit_and_unique", "simulated_fit_and_informative")
+FIT = ("simulated_fit", "simulated_fit_and_unique", "simulated_fit_and_informative")
 WEAK = ("informative", "random", "known_fit")
-STRATEGIES = (*SIMULATED_FIT[:2], WEAK[0], SIMULATED_FIT[2], *WEAK[1:])
+STRATEGIES = (*FIT[:2], WEAK[0], FIT[2], *WEAK[1:])
 """The six strategies, in the paper's order."""
 
 START_MARGIN = 0.05 / DIRECT + 2 * TIMES * sum(LEARNED_SD) / 2 / sqrt(len(STRATEGIES) * REPETITIONS)
@@ -66,41 +65,22 @@ that does not search for fit samples starts each time from nothing.
 def deviation(strategy: str) -> float:
     """Return the standard deviation of a strategy's values in the paper, as a share of direct."""
     learned = sum(LEARNED_SD) / 2
-    return learned if strategy in SIMULATED_FIT else TIMES * learned
+    return learned if strategy in FIT else TIMES * learned
 
 
-def correlation(strategy: str) -> float:
-    """Return the supposed correlation of a strategy's values in one repetition of the paper."""
-    return CORRELATIONS[0] if strategy in SIMULATED_FIT else CORRELATIONS[1]
+def least(pair: tuple[str, str], p: float, counts: int) -> float:
+    """Return the difference, as a share of direct, that the paper's design finds with the power `POWER`.
 
+    Its test takes the values of a repetition as independent. The true error of a mean of correlated values is larger,
+    so smaller differences would have been found as well.
 
-@dataclass(frozen=True)
-class PaperDifference:
-    """A difference that the paper found.
-
-    Attributes:
-        p: the p that it prints, of Student's t.
+    Args:
+        pair: the strategies.
+        p: the p that the paper prints, of Student's t.
         counts: numbers of samples whose values the test takes together.
     """
-
-    p: float
-    counts: int = 1
-
-    def least(self, first: str, second: str) -> float:
-        """Return the difference, as a share of direct, that the paper's design finds with the power `POWER`.
-
-        Its test takes the values of a repetition as independent. The true error of a mean of correlated values is
-        larger, so smaller differences would have been found as well.
-        """
-        values = REPETITIONS * self.counts
-        pair = first, second
-        stated = sum(deviation(each) ** 2 for each in pair)
-        true = sum(deviation(each) ** 2 * (1 + (self.counts - 1) * correlation(each)) for each in pair)
-        found = stats.t.ppf(1 - self.p / 2, 2 * values - 2) * sqrt(stated) + stats.norm.ppf(POWER) * sqrt(true)
-        return float(found / sqrt(values))
-
-
-ONE_SAMPLE = PaperDifference(0.01)
-BEYOND_TWO = PaperDifference(0.001, counts=8)
-KNOWN_FIT = PaperDifference(0.017, counts=8)
-BEYOND_FIVE = PaperDifference(0.05, counts=5)
+    values = REPETITIONS * counts
+    stated = sum(deviation(each) ** 2 for each in pair)
+    true = sum(deviation(each) ** 2 * (1 + (counts - 1) * CORRELATIONS[each not in FIT]) for each in pair)
+    found = stats.t.ppf(1 - p / 2, 2 * values - 2) * sqrt(stated) + stats.norm.ppf(POWER) * sqrt(true)
+    return float(found / sqrt(values))

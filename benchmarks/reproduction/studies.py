@@ -1,19 +1,29 @@
-"""The values of a stored study, by strategy."""
+"""Studies from archives, by strategy."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.archives import import_file
+from benchmarks.findings import Found, found
 from benchmarks.reproduction.paper import ITERATIONS, STRATEGIES
 from gaplab.schemas.curves import Curve
-from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.records import ExperimentRead, MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.comparisons import Compared, Range
 from gaplab.services.core.statistics import finite
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
+from gaplab.services.experiments import reading
+from gaplab.services.results.curves import curves, recorded_of
+from gaplab.services.store.models import MeasurementRow, RepetitionRow
+from gaplab.services.store.queries import experiments
+from gaplab.services.store.queries.costs import work_of
+from gaplab.services.store.queries.repetition_rows import of_experiments
+from gaplab.services.store.session import Session, Store
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,45 +35,23 @@ class Arm:
         spec: its resolved spec.
         recorded: recorded fitness `(r, k)` by repetition and number of real-world evaluations; nan is missing.
         transferred: fitness `(r, k)` in reality of the transferred controllers alone; nan if it failed or is missing.
-        seconds: seconds of computation in its recorded steps.
-        attempts: number of attempts at its repetitions.
-        held_s: seconds from the beginnings to the ends of the attempts.
+        samples: the same of the samples.
+        tuned: its best simulators, by number of samples.
+        core_hours: hours of computation in its recorded steps, times cores.
     """
 
     read: ExperimentRead
     spec: ResolvedSpec
     recorded: FloatArray
     transferred: FloatArray
-    seconds: float
-    attempts: int
-    held_s: float
+    samples: FloatArray
+    tuned: dict[int, Found]
+    core_hours: float
 
     @property
     def strategy(self) -> str:
         """Return the name of its strategy."""
         return self.spec.strategy.name
-
-    @property
-    def engines(self) -> set[str]:
-        """Return the names of the engines of its simulators and its reality."""
-        reality = self.spec.reality.engine
-        return {self.spec.engine.name, *([reality.name] if reality else [])}
-
-    @property
-    def cores(self) -> int:
-        """Return the cores of one rollout: the threads of the engine that runs it, or 1."""
-        engine = self.spec.reality.engine if self.read.direct else self.spec.engine
-        return int(engine.options.get("threads", 1)) if engine else 1
-
-    @property
-    def core_hours(self) -> float:
-        """Return hours of computation in recorded steps, times cores."""
-        return self.seconds * self.cores / 3600
-
-    @property
-    def held_core_hours(self) -> float:
-        """Return hours of all attempts, times cores: also work that was lost, and waiting for a core."""
-        return self.held_s * self.cores / 3600
 
     @property
     def repetitions(self) -> int:
@@ -79,82 +67,133 @@ class Arm:
     def selection(self) -> int | None:
         """Return the evaluations of the search for a sample; None without a search."""
         kind, budget = strategies[self.strategy], self.spec.budget
-        if not kind.searches:
-            return None
         reused = budget.reuse_transfer and kind.selects_transferred
-        return budget.controller_evaluations if reused else budget.selection_evaluations
+        return (budget.controller_evaluations if reused else budget.selection_evaluations) if kind.searches else None
 
     def values(self, first: int, last: int) -> FloatArray:
         """Return the mean `(r,)` of each repetition over a range of evaluations, without incomplete repetitions."""
-        return finite(Range(first, last).values(self.compared()))
+        return finite(self.recorded[:, first : last + 1].mean(axis=1)) if last <= self.last else np.empty(0)
 
-    def compared(self) -> Compared:
-        """Return the experiment as the core compares it."""
-        level = self.recorded.shape[1] == 1
-        return Compared(self.read.id, self.strategy, self.recorded, level, self.spec.seed, self.strategy)
+    def complete(self, first: int, last: int) -> FloatArray:
+        """Return the values `(r, k)` of the complete repetitions at each number of evaluations of a range."""
+        values = self.recorded[:, first : last + 1]
+        return values[np.isfinite(values).all(axis=1)]
 
 
-@dataclass(frozen=True, eq=False)
 class Study:
     """A stored study.
 
-    Attributes:
+    Args:
         archives: its files; several if its experiments were computed apart.
         name: its name.
         arms: its experiments, in their order.
         curves: their curves.
+
+    Attributes:
+        spec: that of its first experiment, which has the settings that all share.
+        reality: the engine of its reality, in words.
+        direct: fitness `(r,)` of the direct baseline; empty without it.
+        unit: the mean of that; nan without it.
+        present: the paper's strategies that it has, in the paper's order.
+        last: the last planned number of evaluations that these share, up to the paper's ten.
+        whole: whether it has all of the paper's strategies, samples and direct.
     """
 
-    archives: tuple[Path, ...]
-    name: str
-    arms: tuple[Arm, ...]
-    curves: tuple[Curve, ...]
-
-    @property
-    def present(self) -> tuple[str, ...]:
-        """Return the paper's strategies that it has, in the paper's order."""
-        return tuple(name for name in STRATEGIES if self.arm(name))
-
-    @property
-    def last(self) -> int:
-        """Return the last planned number of evaluations that the paper's strategies share, up to the paper's ten."""
-        return min([ITERATIONS, *(arm.last for name in self.present if (arm := self.arm(name)))])
-
-    @property
-    def whole(self) -> bool:
-        """Return whether it has all of the paper's strategies, samples and direct."""
-        return self.present == STRATEGIES and self.last == ITERATIONS and bool(len(self.direct))
-
-    @property
-    def direct(self) -> FloatArray:
-        """Return the fitness `(r,)` of the direct baseline; empty without it."""
-        return next((finite(arm.recorded[:, 0]) for arm in self.arms if arm.read.direct), np.empty(0))
-
-    @property
-    def unit(self) -> float:
-        """Return the mean fitness of the direct baseline; nan without it."""
-        return float(self.direct.mean()) if len(self.direct) else float("nan")
+    def __init__(self, archives: Sequence[Path], name: str, arms: Sequence[Arm], curves: Sequence[Curve]) -> None:
+        self.archives, self.name, self.arms, self.curves, self.spec = tuple(archives), name, arms, curves, arms[0].spec
+        self.toy = self.spec.robot.name == "toy_function"
+        self.reality = self.spec.reality.engine.name if self.spec.reality.engine else "a robot on a bench"
+        self.direct = next((finite(arm.recorded[:, 0]) for arm in arms if arm.read.direct), np.empty(0))
+        self.unit = float(self.direct.mean()) if len(self.direct) else float("nan")
+        self.present = tuple(arm.strategy for arm in self.of())
+        self.last = min([ITERATIONS, *(arm.last for arm in self.of())])
+        self.whole = self.present == STRATEGIES and self.last == ITERATIONS and bool(len(self.direct))
 
     def arm(self, strategy: str) -> Arm | None:
         """Return the experiment of a strategy, the first of several; None if the study has none."""
         return next((arm for arm in self.arms if arm.strategy == strategy), None)
 
-    def values(self, strategy: str, first: int, last: int) -> FloatArray:
-        """Return the mean `(r,)` of each repetition over a range of evaluations, without incomplete repetitions."""
-        arm = self.arm(strategy)
-        return arm.values(first, last) if arm else np.empty(0)
-
-    def complete(self, strategy: str, first: int, last: int) -> FloatArray:
-        """Return the values `(r, k)` of the complete repetitions at each number of evaluations of a range."""
-        arm = self.arm(strategy)
-        found = arm.recorded[:, first : last + 1] if arm else np.empty((0, last + 1 - first))
-        return found[np.isfinite(found).all(axis=1)]
+    def of(self, names: Iterable[str] = STRATEGIES) -> list[Arm]:
+        """Return its experiments of these strategies, in their order."""
+        return [arm for name in names if (arm := self.arm(name))]
 
     def unequal(self, names: Iterable[str]) -> str | None:
         """Return how the searches for a sample of these strategies differ in size; None if they do not."""
-        arms = [arm for name in names if (arm := self.arm(name))]
-        sizes = {arm.strategy: arm.selection for arm in arms if arm.selection is not None}
+        sizes = {arm.strategy: arm.selection for arm in self.of(names) if arm.selection is not None}
         if len(set(sizes.values())) < 2:
             return None
         told = ", ".join(f"{name} {size:,}" for name, size in sizes.items())
         return f"samples are selected from searches of unequal size ({told} evaluations)"
+
+
+def read_study(store: Store, archives: Sequence[Path]) -> Study:
+    """Import archives of studies or of single experiments, and return them as one study, named by the first.
+
+    Raises:
+        SystemExit: a file is no archive, or the archives differ in robot, engines, reality, budget, tuner,
+            optimizers or seed.
+    """
+    parts = [_part(store, archive) for archive in archives]
+    reads = [read for _, experiments_of in parts for read in experiments_of]
+    arms = _arms(store, reads)
+    if len(parts) > 1 and len({_settings(arm.spec) for arm in arms}) > 1:
+        raise SystemExit(
+            f"{', '.join(map(str, archives))}: robot, engines, reality, budget, tuner, optimizers or seed differ"
+        )
+    times = Counter(arm.strategy for arm in arms)
+    names = {arm.read.id: arm.strategy if times[arm.strategy] == 1 else arm.read.name for arm in arms}
+    named = [replace(arm, read=arm.read.model_copy(update={"name": names[arm.read.id]})) for arm in arms]
+    return Study(
+        archives,
+        parts[0][0],
+        named,
+        [curve.model_copy(update={"name": names[curve.experiment]}) for curve in curves(store, list(names))],
+    )
+
+
+def _part(store: Store, archive: Path) -> tuple[str, tuple[ExperimentRead, ...]]:
+    """Import an archive, and return its name and its experiments."""
+    made = import_file(store, archive)
+    if made.study is not None:
+        study = reading.read_study(store, made.study)
+        return study.name, study.experiments
+    reads = tuple(reading.read_experiment(store, id_) for id_ in made.experiments)
+    return reads[0].name, reads
+
+
+def _settings(spec: ResolvedSpec) -> str:
+    """Return the settings that experiments of one study share."""
+    world = {"robot", "controller", "task", "engine", "tunables", "reality", "seed"}
+    return spec.model_dump_json(include=world | {"budget", "tuner", "discrepancy", "optimizer", "controller_optimizer"})
+
+
+def _arms(store: Store, reads: Sequence[ExperimentRead]) -> list[Arm]:
+    ids, arms = [read.id for read in reads], []
+    tuned = {id_: found(store, id_) for id_ in ids}
+    with store.reading() as session:
+        work, (_, recorded) = work_of(session, ids), recorded_of(session, ids)
+        for read in reads:
+            spec = spec_of(experiments.get_experiment(session, read.id).spec)
+            shape = recorded[read.id].shape
+            engine = spec.reality.engine if read.direct else spec.engine
+            cores = int(engine.options.get("threads", 1)) if engine else 1
+            arm = Arm(
+                read=read,
+                spec=spec,
+                recorded=recorded[read.id],
+                transferred=_measured(session, read.id, MeasurementKind.PROBE, shape),
+                samples=_measured(session, read.id, MeasurementKind.SAMPLE, shape),
+                tuned=tuned[read.id],
+                core_hours=work[read.id].seconds * cores / 3600,
+            )
+            arms.append(arm)
+    return arms
+
+
+def _measured(session: Session, experiment: str, kind: MeasurementKind, shape: tuple[int, ...]) -> FloatArray:
+    """Return measured fitness by repetition and iteration; nan if it failed or is missing."""
+    row, values = MeasurementRow, np.full(shape, np.nan)
+    query = of_experiments(row, [experiment], RepetitionRow.number, row.iteration, row.fitness)
+    for repetition, iteration, fitness in session.execute(query.where(row.kind == kind, row.fitness.is_not(None))):
+        values[repetition, iteration] = fitness
+    return values

@@ -1,7 +1,5 @@
 """The tables that `benchmarks.findings` prints, from archives of experiments whose simulators a test made."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from math import inf, nan
 from pathlib import Path
@@ -14,9 +12,9 @@ from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected,
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
+from tests.commands import module
 from tests.experiments import run, toy
 
-ROOT = Path(__file__).parents[2]
 GENOME = frozen([0.5])
 WORSE = Simulator(frozen([1.9, 1.9]), 9.0)
 BEST = Simulator(frozen([0.2, 0.6]), 0.02), Simulator(frozen([0.4, 1.0]), 0.18)
@@ -46,8 +44,7 @@ def archive(store: Store, spec: ExperimentSpec, best: tuple[Simulator, ...], fol
 
 def tables(path: Path) -> dict[str, list[list[str]]]:
     """The cells of each printed table, by the first words of its title."""
-    named = [sys.executable, "-m", "benchmarks.findings", str(path)]
-    text = subprocess.run(named, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    text = module("benchmarks.findings", path)
     found: dict[str, list[list[str]]] = {}
     title = ""
     for line in text.splitlines():

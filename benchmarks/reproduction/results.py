@@ -1,0 +1,165 @@
+"""The results of studies beside the paper's, as tables of Markdown and sentences."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from benchmarks.findings import Found
+from benchmarks.reproduction import paper
+from benchmarks.reproduction.settings import table
+from benchmarks.reproduction.statistics import Difference, narrower
+from benchmarks.reproduction.studies import Arm, Study
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.curves import best_of_searches, mean_and_deviation
+from gaplab.services.core.statistics import finite
+from gaplab.services.figures.words import spoken
+from gaplab.services.reports.numbers import MISSING
+
+FIGURE_3 = (0, 2, 4, 6, 8)
+"""Samples before those panels of the paper's Fig. 3, and none."""
+ORIGINS = ("strategy", "samples", "last sample", "best sample", "transferred", "recorded", "from a sample", "distance")
+FIRST = 3
+"""Samples from which on the paper compares the strategies."""
+
+
+def figure_4(study: Study) -> str:
+    """Return the recorded fitness over direct by number of samples, beside the paper's and that of many searches."""
+    arms = [arm for arm in study.arms if not arm.read.direct]
+    counts = range(min(paper.ITERATIONS, max(arm.last for arm in arms)) + 1)
+    learned = {0: f"{paper.START:.2f}", 3: f"≥ {paper.AFTER_THREE:.2f}", 10: f"{paper.AFTER_TEN:.2f}"}
+    every = {0: f"{paper.START:.2f}", 10: f"about {paper.AT_LAST:.2f}"}
+    best = _best_of(study)[: len(counts)]
+    rows = [
+        ("the paper, with simulated fit", *(learned.get(count, MISSING) for count in counts)),
+        ("the paper, all six", *(every.get(count, MISSING) for count in counts)),
+        ("direct, the best of samples + 1", *best, *[MISSING] * (len(counts) - len(best))),
+        *(_ratios(study, arm, counts) for arm in arms),
+    ]
+    return table(("samples", *map(str, counts)), rows)
+
+
+def _best_of(study: Study) -> list[str]:
+    """Return the expected best of 1, 2, 3 … direct searches over direct; nothing if there are too few searches."""
+    return [f"{each / study.unit:.2f}" for each in best_of_searches(study.direct) if each is not None]
+
+
+def _ratios(study: Study, arm: Arm, counts: Sequence[int]) -> tuple[str, ...]:
+    each = [arm.values(count, count) / study.unit for count in counts]
+    sizes = sorted({len(values) for values in each} - {0})
+    told = " to ".join(map(str, [sizes[0], sizes[-1]] if len(sizes) > 1 else sizes or [0]))
+    return f"{spoken(arm.read.name)} ({told})", *(_mean(values, spread=True) for values in each)
+
+
+def direct_in_words(study: Study) -> str:
+    """Return the study's direct baseline and the paper's in a sentence."""
+    printed = f"the paper's is {paper.DIRECT:.2f} ± {paper.DIRECT_SD:.2f} ({paper.DIRECT_REPETITIONS} repetitions)"
+    if not len(study.direct):
+        return f"The study has no direct baseline, so it has no ratios; {printed}."
+    told, repetitions = f"Direct is {_mean(study.direct, spread=True)}", f"({len(study.direct)} repetitions)"
+    if study.toy:
+        return f"{told} {repetitions}."
+    return f"{told} {next((curve.unit for curve in study.curves if curve.unit), '')} {repetitions}; {printed}."
+
+
+def figure_3(study: Study) -> tuple[str, str]:
+    """Return the fitness of transferred controllers over direct, and the distance of the best simulators."""
+    counts = [count for count in FIGURE_3 if count <= study.last]
+    head = "samples", *map(str, counts)
+    ratios, distances = [], []
+    for arm in study.of():
+        over = arm.transferred / study.unit
+        ratios.append((spoken(arm.strategy), *(_mean(finite(over[:, count])) for count in counts)))
+        distances.append((spoken(arm.strategy), *(_distance(arm.tuned.get(count)) for count in counts)))
+    return table(head, ratios), table(head, distances)
+
+
+def origins(study: Study) -> str:
+    """Return whether recorded fitness is that of samples or of transferred controllers, and how near simulators are."""
+    return table(ORIGINS, (row for arm in study.of() for row in _origin(study, arm)))
+
+
+def _origin(study: Study, arm: Arm) -> Iterator[tuple[str, ...]]:
+    best = np.fmax.accumulate(arm.samples, axis=1)
+    for count in (each for each in (1, FIRST, paper.ITERATIONS) if each <= arm.last):
+        columns = (fitness[:, count] / study.unit for fitness in (arm.samples, best, arm.transferred, arm.recorded))
+        from_sample = best[:, count] > np.nan_to_num(arm.transferred[:, count], nan=-np.inf)
+        known = np.isfinite(arm.recorded[:, count])
+        share = f"{from_sample[known].mean():.0%}" if known.any() else MISSING
+        means = (_mean(finite(values)) for values in columns)
+        yield spoken(arm.strategy), str(count), *means, share, _distance(arm.tuned.get(count))
+
+
+def lead(study: Study) -> str:
+    """Return in sentences what simulated fit gains, in transferred controllers alone and in recorded fitness.
+
+    Each repetition is one value, and each strategy counts alike. Empty if the study lacks one of both groups.
+    """
+    if study.last < FIRST:
+        return ""
+    spans = (FIRST, study.last), (study.last, study.last)
+    told = [_lead(study, span, transferred=each) for span in spans for each in (True, False)]
+    if not all(told):
+        return ""
+    return (
+        f"Over {FIRST} to {study.last} samples, strategies with simulated fit lead the others by {told[0]} of direct "
+        f"in transferred controllers alone, and by {told[1]} in recorded fitness; after {study.last}, by {told[2]} and "
+        f"{told[3]}.{_spread(study)}{_searched_as_often(study)}"
+    )
+
+
+def _lead(study: Study, span: tuple[int, int], *, transferred: bool) -> str:
+    """Return the mean of the means with simulated fit less that of the others, with its interval, in words."""
+    found = []
+    for sign, groups in zip((1.0, -1.0), _both(study, span, transferred=transferred), strict=True):
+        means = [Difference.mean(group.mean(axis=1)) for group in groups]
+        found += [(sign / len(groups), mean) for mean in means if mean]
+        if not groups or not all(means):
+            return ""
+    return Difference.sum(found).over(study.unit).told()
+
+
+def _spread(study: Study) -> str:
+    """Return in a sentence how much strategies with simulated fit vary beside the others, in both kinds of fitness."""
+    sides = [_both(study, (FIRST, study.last), transferred=each) for each in (True, False)]
+    if min(len(group) for side in sides for groups in side for group in groups) < 2:
+        return ""
+    told = [narrower(*side).estimate for side in sides]
+    return (
+        f" Over {FIRST} to {study.last}, their standard deviations are {told[0]} times the others' in transferred "
+        f"controllers alone, and {told[1]} times in recorded fitness."
+    )
+
+
+def _searched_as_often(study: Study) -> str:
+    """Return in a sentence what the best of several direct searches has, if direct has enough repetitions."""
+    best = _best_of(study)
+    if len(best) <= study.last:
+        return ""
+    few, many = (f"{count} + 1 direct searches has {best[count]}" for count in (FIRST, study.last))
+    return f" The best of {few}, and the best of {many}."
+
+
+def _both(study: Study, span: tuple[int, int], *, transferred: bool) -> list[list[FloatArray]]:
+    """Return the values `(r, k)` with simulated fit, and of the others, in repetitions with both kinds of fitness."""
+    columns = slice(span[0], span[1] + 1)
+    return [
+        [
+            (arm.transferred if transferred else arm.recorded)[:, columns][
+                np.isfinite(arm.recorded[:, columns] + arm.transferred[:, columns]).all(axis=1)
+            ]
+            for arm in study.of(names)
+        ]
+        for names in (paper.FIT, paper.WEAK)
+    ]
+
+
+def _distance(found: Found | None) -> str:
+    """Return the median distance of simulators from the truth, with the bounds of each tunable scaled to 1."""
+    return MISSING if found is None else f"{np.median(np.linalg.norm(found.away, axis=1)):.2f}"
+
+
+def _mean(values: FloatArray, *, spread: bool = False) -> str:
+    """Return the mean of values `(n,)`, and their standard deviation if asked; a dash without values."""
+    _, mean, deviation = mean_and_deviation(values)
+    told = MISSING if mean is None else f"{mean:.2f}"
+    return f"{told} ± {deviation:.2f}" if spread and deviation is not None else told

@@ -1,1 +1,0 @@
-"""Evidence that the quadruped is worth tuning: the tables of docs/robot.md."""
