@@ -35,7 +35,7 @@ from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 from tests.fakes import install
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 UNTUNED, BEST = (0.5, 0.3), (1.1, 0.7)
 HIDDEN = {"static_friction": 0.9, "dynamic_friction": 0.6}
@@ -168,6 +168,12 @@ def test_a_controller_that_a_robot_on_a_bench_is_to_run_walks_in_its_simulator(s
         session.execute(update(RequestRow).values(genome=[0.0] * len(known)))  # a correction led to another controller
     other = Replay.model_validate_json(api.get(f"/experiments/{experiment}/replay?iteration=0").content)
     assert other.simulation.positions_m != shown.simulation.positions_m
+
+
+def predicted(api: TestClient, experiment: str) -> Any:
+    """Predictions, when none is pending any more."""
+    address = f"/experiments/{experiment}/predictions"
+    return wait_until(lambda: None if (found := api.get(address).json())["pending"] else found)
 
 
 class Lab(PyBullet):
@@ -334,7 +340,7 @@ def test_replays_and_predictions_follow_an_edit_of_a_plug_in(
 
     def computed() -> tuple[float, float]:
         replay = api.get(f"/experiments/{experiment}/replay?iteration=1").json()
-        prediction = api.get(f"/experiments/{experiment}/predictions").json()["items"][0]
+        prediction = predicted(api, experiment)["items"][0]
         return replay["simulation"]["fitness"], prediction["simulated_after"]
 
     with running(sqlite_store) as app:
@@ -364,7 +370,7 @@ def test_predictions_are_of_the_simulators_before_and_after_a_sample(sqlite_stor
             if isinstance(step, Tuned):
                 errors[claim.number, step.iteration] = step.simulators[0].squared_error
 
-    found = predictions(sqlite_store, app.state.rollout_process, experiment)
+    found = predictions(sqlite_store, app.state.rollout_process, experiment, seconds=LONGEST_S)
 
     assert (found.pending, found.unit) == (0, "m/s")
     assert [(each.repetition, each.iteration) for each in found.items] == [(0, 1), (0, 2), (1, 1), (1, 2)]
@@ -380,7 +386,7 @@ def test_samples_that_no_tuning_sees_have_no_predictions(sqlite_store: Store, ap
     for step in repetition(setting(claim.spec, 0)):
         assert execution.record(sqlite_store, claim, step)
 
-    found = predictions(sqlite_store, app.state.rollout_process, experiment)
+    found = predictions(sqlite_store, app.state.rollout_process, experiment, seconds=LONGEST_S)
 
     assert [each.iteration for each in found.items] == [1, 3]
     assert (found.pending, found.left_out) == (0, 0)
@@ -406,7 +412,7 @@ def test_samples_for_which_there_is_no_room_are_left_out_and_not_waited_for(
     execution.record(sqlite_store, claim, Tuned(2, (Simulator(frozen(BEST)),)))
     monkeypatch.setattr("gaplab.services.replay.predictions.MOST_KEPT", 1)
 
-    found = api.get(f"/experiments/{experiment}/predictions").json()
+    found = predicted(api, experiment)
     figure = api.get(f"/figures/predictions?experiment={experiment}&format=json").json()
 
     assert [each["iteration"] for each in found["items"]] == [1]
@@ -417,7 +423,7 @@ def test_samples_for_which_there_is_no_room_are_left_out_and_not_waited_for(
 def test_samples_that_nothing_is_tuned_on_yet_have_no_prediction(sqlite_store: Store, api: Any) -> None:
     experiment, _, _ = walked(sqlite_store)
 
-    shown = api.get(f"/experiments/{experiment}/predictions").json()
+    shown = predicted(api, experiment)
 
     assert [each["iteration"] for each in shown["items"]] == [1]
     assert api.get("/experiments/no-such/predictions").status_code == 404
