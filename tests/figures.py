@@ -158,23 +158,28 @@ def coordinates(lines: int = 3, title: str = "") -> FigureDefinition:
 
 FIGURES = [
     coordinates(title="coordinates"),
-    coordinates(1),
-    coordinates(0),
     curves_figure([RISING, DIRECT], title="curves", each=True),
     curves_figure([]),
+    EVERYTHING,
+    simulators_figure(tuned(3), DIMENSIONS[:3], truth=TRUTH, title="simulators"),
+    predictions_figure(PREDICTIONS, unit="m/s", title="predictions"),
+    squared_error_figure(ERRORS, ErrorKind("m/s"), title="squared error", each=True),
+]
+"""One of each kind, and one of nothing: what every renderer must draw."""
+
+MORE_FIGURES = [
+    coordinates(1),
+    coordinates(0),
     curves_figure([curve("a")]),
     curves_figure([DIRECT]),
     curves_figure([curve(f"line {each}", point(0, each)) for each in range(40)]),
     curves_figure([curve("alone", point(0, 1.0, n=1, sd=None), point(1, None, n=0, sd=None))]),
-    EVERYTHING,
-    *(simulators_figure(tuned(each), DIMENSIONS[:each], truth=TRUTH, title="simulators") for each in (1, 2, 3, 4)),
+    *(simulators_figure(tuned(each), DIMENSIONS[:each], truth=TRUTH, title="simulators") for each in (1, 2, 4)),
     simulators_figure(tuned(3), DIMENSIONS[:3], truth=None, columns=2),
     simulators_figure([], DIMENSIONS[:3], truth=TRUTH, columns=2),
-    predictions_figure(PREDICTIONS, unit="m/s", title="predictions"),
     predictions_figure(PREDICTIONS[:1]),
     predictions_figure([], pending=5),
-    squared_error_figure(ERRORS, ErrorKind("m/s"), title="squared error", each=True),
     squared_error_figure({1: {0: 0.0}}),
     squared_error_figure({1: {0: None}}),
 ]
-"""What every renderer must draw."""
+"""Others of each kind."""

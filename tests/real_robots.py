@@ -1,10 +1,12 @@
 """Robots of pybullet_data and gymnasium, used where they are: their files, and how each is imported."""
 
+from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from gaplab.services.robots.importing import ImportedFile, import_robot
 from gaplab.services.robots.options import ImportOptions
@@ -33,6 +35,16 @@ STANCES: dict[str, dict[str, Any]] = {
     "franka_panda": {},
 }
 """Options that let each robot start where it can stay, with its motors at rest."""
+
+
+FEW = {"a1", "franka_panda", "ant"}
+"""One that walks, one that is fixed, and one in MJCF; the others are for a release."""
+
+
+def for_each(names: Iterable[str]) -> Any:
+    """Parametrize a test by the names of robots."""
+    marks = {True: (), False: pytest.mark.release}
+    return pytest.mark.parametrize("name", [pytest.param(each, marks=marks[each in FEW]) for each in names])
 
 
 def imported(name: str) -> ImportedFile:

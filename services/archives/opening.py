@@ -7,14 +7,14 @@ reads Parquet.
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from errno import EINVAL
 from hashlib import sha256
 from pathlib import Path
 from subprocess import DEVNULL
-from typing import IO
+from typing import IO, TypeAlias
 from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile, ZipInfo
 from zlib import error as ZlibError  # noqa: N812 - it is an error
 
@@ -42,6 +42,9 @@ MOST_BYTES_OF_DIRECTORY = 4 * 2**20
 _UNPACKING = Path(__file__).with_name("unpacking.py")
 _CHUNK = 2**16
 
+ParquetConverter: TypeAlias = Callable[[Mapping[Path, int]], None]
+"""Writes the rows of each Parquet file, which has as many as stated, as JSON Lines into a file beside it."""
+
 
 @dataclass(frozen=True)
 class OpenedArchive:
@@ -67,13 +70,14 @@ class OpenedArchive:
             yield from checked(table, self.files[table], self.manifest.members[member_of(table)].rows)
 
 
-def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive:
+def open_archive(file: IO[bytes], folder: Path, most_rows: int, convert: ParquetConverter) -> OpenedArchive:
     """Unpack an archive into an empty folder.
 
     Args:
         file: the archive.
         folder: receives its members.
         most_rows: rows of all tables together.
+        convert: reads Parquet.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, not an archive, or written by a later version.
@@ -88,8 +92,8 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive
             for name, info in members.items()
             if name != MANIFEST
         }
-    _read_parquet({file: manifest.members[name].rows for name, file in files.items() if name.endswith(".parquet")})
-    tables = {table: _lines_of(files[member_of(table)]) for table in EXPORTED if member_of(table) in files}
+    convert({file: manifest.members[name].rows for name, file in files.items() if name.endswith(".parquet")})
+    tables = {table: lines_of(files[member_of(table)]) for table in EXPORTED if member_of(table) in files}
     return OpenedArchive(manifest, tables, {hash_: file for name, file in files.items() if (hash_ := digest_of(name))})
 
 
@@ -201,10 +205,18 @@ def _unpack(archive: ZipFile, info: ZipInfo, promised: Member, target: Path) -> 
     return target
 
 
-def _read_parquet(files: Mapping[Path, int]) -> None:
-    """Write the rows of each Parquet file, which has as many as stated, as JSON Lines into a file beside it."""
-    arguments = [str(each) for file, rows in files.items() for each in (file, _lines_of(file), rows)]
-    command = [sys.executable, "-I", str(_UNPACKING), *arguments]
+def convert_apart(files: Mapping[Path, int], program: Path = _UNPACKING) -> None:
+    """Convert Parquet in a subprocess, which has limits.
+
+    Args:
+        files: number of rows that each file must have.
+        program: what the subprocess runs.
+
+    Raises:
+        InvalidArchive: a file is not readable, or has other rows.
+    """
+    arguments = [str(each) for file, rows in files.items() for each in (file, lines_of(file), rows)]
+    command = [sys.executable, "-I", str(program), *arguments]
     ended = subprocess.run(command, stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, check=False)  # noqa: S603 - ours
     if ended.returncode != 0:
         which = [*files][ended.returncode - 1].name if 0 < ended.returncode <= len(files) else "a member"
@@ -212,5 +224,6 @@ def _read_parquet(files: Mapping[Path, int]) -> None:
         raise InvalidArchive(msg)
 
 
-def _lines_of(file: Path) -> Path:
+def lines_of(file: Path) -> Path:
+    """Return the file beside it that receives the rows of a Parquet file."""
     return file.with_suffix(".jsonl")

@@ -24,7 +24,7 @@ from gaplab.services.archives.checking import Row
 from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, columns_of
 from gaplab.services.archives.consistency import check_attachments, check_row, checked_experiments
 from gaplab.services.archives.logs import check_logs
-from gaplab.services.archives.opening import OpenedArchive, open_archive
+from gaplab.services.archives.opening import OpenedArchive, ParquetConverter, convert_apart, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.states import settle
@@ -66,13 +66,16 @@ class CheckedArchive:
     attachments: Mapping[str, Path]
 
 
-def import_archive(store: Store, file: IO[bytes], *, most_rows: int | None = None) -> ImportRead:
+def import_archive(
+    store: Store, file: IO[bytes], *, most_rows: int | None = None, convert: ParquetConverter = convert_apart
+) -> ImportRead:
     """Store the content of an archive under its own ids; ids that are taken are replaced.
 
     Args:
         store: database at the latest revision.
         file: seekable file, at its beginning.
         most_rows: most rows of all tables together; left out: the default of the setting.
+        convert: reads Parquet.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, too large or not an archive; nothing was stored.
@@ -83,26 +86,29 @@ def import_archive(store: Store, file: IO[bytes], *, most_rows: int | None = Non
     try:
         with store.reading() as session:
             now = moment(session)
-        with checked_archive(file, now, most_rows=most_rows) as checked:
+        with checked_archive(file, now, most_rows=most_rows, convert=convert) as checked:
             return store.write(_copy, checked)
     finally:
         _SLOTS.release()
 
 
 @contextmanager
-def checked_archive(file: IO[bytes], now: datetime, *, most_rows: int | None = None) -> Iterator[CheckedArchive]:
+def checked_archive(
+    file: IO[bytes], now: datetime, *, most_rows: int | None = None, convert: ParquetConverter = convert_apart
+) -> Iterator[CheckedArchive]:
     """Yield the content of an archive in a private database, which is deleted afterwards.
 
     Args:
         file: seekable file, at its beginning.
         now: when work that the archive shows under way counts as ended.
         most_rows: most rows of all tables together; left out: the default of the setting.
+        convert: reads Parquet.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, too large or not an archive.
     """
     with TemporaryDirectory(prefix="gaplab-import-") as folder:
-        opened = open_archive(file, Path(folder), most_rows or Limits().imported_rows)
+        opened = open_archive(file, Path(folder), most_rows or Limits().imported_rows, convert)
         with private_store(Path(folder) / "checked.db") as private:
             yield private.write(_check, private, opened, now)
 

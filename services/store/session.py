@@ -1,13 +1,14 @@
 """The store: transactions on one database."""
 
+import sqlite3
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import wraps
+from contextlib import closing, contextmanager
+from functools import cache, wraps
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
-from sqlalchemy import event, text
+from sqlalchemy import StaticPool, create_engine, event, text
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session as Session
 from sqlalchemy.orm import sessionmaker
@@ -164,13 +165,20 @@ def private_store(file: Path) -> Iterator[Store]:
         file: does not exist; the caller deletes it.
     """
     create(file)
+    file.write_bytes(_without_rows())
     store = Store(f"sqlite:///{file}")
     try:
-        with store.transaction() as session:
-            Base.metadata.create_all(session.connection())
         yield store
     finally:
         store.dispose()
+
+
+@cache
+def _without_rows() -> bytes:
+    """Return a SQLite database with the present tables, which are made once."""
+    with closing(sqlite3.connect(":memory:")) as connection:
+        Base.metadata.create_all(create_engine("sqlite://", creator=lambda: connection, poolclass=StaticPool))
+        return connection.serialize()
 
 
 def transaction(work: Callable[Concatenate[Session, P], T]) -> Callable[Concatenate[Store, P], T]:

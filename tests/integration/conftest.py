@@ -3,8 +3,10 @@ and `finish` computes what was submitted."""
 
 import io
 import shlex
+import shutil
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pexpect
 import pytest
@@ -32,6 +34,17 @@ def url(service: tuple[FastAPI, str], sqlite_store: Store) -> str:
     app, address = service
     app.state.store = sqlite_store
     return address
+
+
+@pytest.fixture
+def other(request: pytest.FixtureRequest, store: Store, sqlite_template: Path, tmp_path: Path) -> Iterator[Store]:
+    """Another database than that of `store`: of the other kind in a test of `dialects`, else SQLite."""
+    if store.file and request.node.get_closest_marker("dialects"):
+        yield request.getfixturevalue("postgres_store")
+        return
+    opened = Store(f"sqlite:///{shutil.copy(sqlite_template, tmp_path / 'other.db')}")
+    yield opened
+    opened.dispose()
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from sqlalchemy import select
 
 from gaplab.api.app import create_app
 from gaplab.schemas.spec import StudySpec
-from gaplab.services.archives import export_experiment, export_study, import_archive, opening
+from gaplab.services.archives import export_experiment, export_study, opening
 from gaplab.services.bench import attachments
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.experiments.deletion import Deleter, delete_experiment
@@ -20,10 +20,8 @@ from gaplab.services.experiments.listing import list_experiments
 from gaplab.services.experiments.submission import submit_experiment, submit_study
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.session import Store
-from tests.integration.test_archives import exported
-from tests.integration.test_archives import other as other
+from tests.archiving import exported, imported
 from tests.integration.test_archives_bad import packed
-from tests.integration.test_archives_bad import unpacked_here as unpacked_here
 from tests.integration.test_bench import bench, compute, measure, pending
 
 PHOTO, TRACE = b"\xff\xd8 a photograph" * 9_000, b"time_s,x\n0,1\n"
@@ -54,6 +52,7 @@ def members_of(archive: bytes) -> dict[str, bytes]:
         return {name: opened.read(name) for name in opened.namelist()}
 
 
+@pytest.mark.dialects
 def test_what_was_exported_and_deleted_comes_back_with_its_files(store: Store, other: Store) -> None:
     experiment, files = measured(store)
     unnamed = send(store, b"no answer names it", "x")
@@ -63,7 +62,7 @@ def test_what_was_exported_and_deleted_comes_back_with_its_files(store: Store, o
     assert stored(store) == {unnamed}
 
     for place in (store, other):
-        import_archive(place, BytesIO(archive))
+        imported(place, archive)
         assert [attachments.read_attachment(place, each) for each in files] == before
         assert exported(export_experiment(place, experiment)) == archive
 
@@ -76,21 +75,19 @@ def test_what_was_exported_and_deleted_comes_back_with_its_files(store: Store, o
     assert stored(other) == set()
 
 
-def test_a_file_that_is_there_already_stays_as_it_is(
-    sqlite_store: Store, postgres_store: Store, unpacked_here: None
-) -> None:
-    experiment, (photo, trace) = measured(sqlite_store)
-    archive = exported(export_experiment(sqlite_store, experiment))
-    send(postgres_store, PHOTO, "mine.png", "image/png")
+def test_a_file_that_is_there_already_stays_as_it_is(store: Store, other: Store) -> None:
+    experiment, (photo, trace) = measured(store)
+    archive = exported(export_experiment(store, experiment))
+    send(other, PHOTO, "mine.png", "image/png")
 
-    import_archive(postgres_store, BytesIO(archive))
-    import_archive(postgres_store, BytesIO(archive))  # under another id
+    imported(other, archive)
+    imported(other, archive)  # under another id
 
-    assert attachments.read_attachment(postgres_store, photo)[0].name == "mine.png"
-    assert stored(postgres_store) == {photo, trace}
+    assert attachments.read_attachment(other, photo)[0].name == "mine.png"
+    assert stored(other) == {photo, trace}
 
 
-def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store, unpacked_here: None) -> None:
+def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store) -> None:
     alike = bench(iterations=1, reality={"probes": "never"}).model_dump(mode="json", exclude={"strategy", "name"})
     study = submit_study(sqlite_store, StudySpec.model_validate(alike | {"strategies": ["random", "known_fit"]}))
     compute(sqlite_store)
@@ -105,22 +102,20 @@ def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store, 
     assert [name for name in members_of(archive) if name.startswith("attachments/")] == [
         f"attachments/{each}" for each in sorted([shared, *own])
     ]
-    assert import_archive(sqlite_store, BytesIO(archive)).study != study.id
+    assert imported(sqlite_store, archive).study != study.id
 
 
-def test_an_archive_without_its_files_is_read_as_before(
-    sqlite_store: Store, postgres_store: Store, unpacked_here: None
-) -> None:
-    experiment, _ = measured(sqlite_store)
-    members = members_of(exported(export_experiment(sqlite_store, experiment)))
+def test_an_archive_without_its_files_is_read_as_before(store: Store, other: Store) -> None:
+    experiment, _ = measured(store)
+    members = members_of(exported(export_experiment(store, experiment)))
     manifest = json.loads(members["manifest.json"])
     old = {name: content for name, content in members.items() if not name.startswith("attachment")}
     manifest["members"] = {name: member for name, member in manifest["members"].items() if name in old}
 
-    import_archive(postgres_store, BytesIO(packed(old | {"manifest.json": json.dumps(manifest).encode()})))
+    imported(other, packed(old | {"manifest.json": json.dumps(manifest).encode()}))
 
-    assert [each.id for each in list_experiments(postgres_store).items] == [experiment]
-    assert stored(postgres_store) == set()
+    assert [each.id for each in list_experiments(other).items] == [experiment]
+    assert stored(other) == set()
 
 
 @pytest.fixture
@@ -145,7 +140,7 @@ def with_file(members: dict[str, bytes], name: str, content: bytes | None) -> by
 
 def refused(store: Store, archive: bytes, what: str) -> None:
     with pytest.raises(InvalidArchive, match=what):
-        import_archive(store, BytesIO(archive))
+        imported(store, archive)
     assert list_experiments(store).items == ()
     assert stored(store) == set()
 
@@ -154,24 +149,18 @@ def of(content: bytes) -> str:
     return f"attachments/{sha256(content).hexdigest()}"
 
 
-def test_a_file_that_does_not_fit_its_hash_is_refused(
-    sqlite_store: Store, good: dict[str, bytes], unpacked_here: None
-) -> None:
+def test_a_file_that_does_not_fit_its_hash_is_refused(sqlite_store: Store, good: dict[str, bytes]) -> None:
     refused(sqlite_store, with_file(good, of(PHOTO), b"forged"), f"content of {of(PHOTO)} has another hash")
     refused(sqlite_store, packed(good | {of(TRACE): b"forged"}, honest=False), "differs from the manifest")
 
 
-def test_a_file_without_a_row_or_a_row_without_a_file_is_refused(
-    sqlite_store: Store, good: dict[str, bytes], unpacked_here: None
-) -> None:
+def test_a_file_without_a_row_or_a_row_without_a_file_is_refused(sqlite_store: Store, good: dict[str, bytes]) -> None:
     refused(sqlite_store, with_file(good, of(PHOTO), None), "has a row or a file, but not both")
     refused(sqlite_store, with_file(good, of(b"more"), b"more"), "has a row or a file, but not both")
     refused(sqlite_store, with_file(good, "attachments/../x", b"x"), "unknown member")
 
 
-def test_a_file_that_no_answer_names_is_refused(
-    sqlite_store: Store, good: dict[str, bytes], unpacked_here: None
-) -> None:
+def test_a_file_that_no_answer_names_is_refused(sqlite_store: Store, good: dict[str, bytes]) -> None:
     (answer,) = map(json.loads, good["answer.jsonl"].splitlines())
 
     for names, what in (([sha256(TRACE).hexdigest()], "no answer names"), ([{}], "no list of hashes")):
@@ -179,20 +168,16 @@ def test_a_file_that_no_answer_names_is_refused(
         refused(sqlite_store, packed(good | {"answer.jsonl": changed}), what)
 
 
-@pytest.mark.parametrize(
-    ("limit", "most", "what"),
-    [
-        ("MOST_FILES", 1, "it has 2 attachments; 1 are permitted: export its experiments one by one"),
-        ("MOST_BYTES_OF_FILES", 100_000, "its attachments have 135,013 bytes; 100,000 are permitted"),
-        ("MOST_BYTES_OF_DIRECTORY", 100, "its directory has .* bytes; 100 are permitted"),
-    ],
-)
 def test_more_files_than_are_permitted(
-    sqlite_store: Store, good: dict[str, bytes], monkeypatch: pytest.MonkeyPatch, limit: str, most: int, what: str
+    sqlite_store: Store, good: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(opening, limit, most)
-
-    refused(sqlite_store, packed(good), what)
+    for limit, most, what in (
+        ("MOST_BYTES_OF_FILES", 100_000, "its attachments have 135,013 bytes; 100,000 are permitted"),
+        ("MOST_FILES", 1, "it has 2 attachments; 1 are permitted: export its experiments one by one"),
+        ("MOST_BYTES_OF_DIRECTORY", 100, "its directory has .* bytes; 100 are permitted"),
+    ):  # each is looked at before those above it
+        monkeypatch.setattr(opening, limit, most)
+        refused(sqlite_store, packed(good), what)
 
 
 def test_a_file_larger_than_one_that_is_stored(sqlite_store: Store, good: dict[str, bytes]) -> None:
@@ -202,7 +187,7 @@ def test_a_file_larger_than_one_that_is_stored(sqlite_store: Store, good: dict[s
     refused(sqlite_store, with_file(good, of(b""), b""), "has 0 bytes")
 
 
-def test_an_archive_with_photographs_is_let_in_over_http(store: Store, unpacked_here: None) -> None:
+def test_an_archive_with_photographs_is_let_in_over_http(store: Store) -> None:
     experiment, (photo, _) = measured(store)
     with TestClient(create_app(store)) as api:
         archive = api.get(f"/experiments/{experiment}/export").content

@@ -1,13 +1,14 @@
 """Out of one database and into another: the same to the last bit, whatever the databases and the numbers."""
 
 import json
-import time
 import tracemalloc
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from math import copysign, inf, nan
+from threading import Barrier
+from types import SimpleNamespace
 from typing import Any
 from zipfile import ZipFile
 
@@ -21,7 +22,7 @@ from sqlalchemy import insert
 from gaplab.schemas.lifecycle import Ending, State, Verb
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
-from gaplab.services.archives import export_experiment, export_study, import_archive, opening, unpacking
+from gaplab.services.archives import export_experiment, export_study, import_archive
 from gaplab.services.archives import reading as importing
 from gaplab.services.archives.columns import EXPORTED, ONLY_IF_USED
 from gaplab.services.archives.logs import check_logs
@@ -35,9 +36,9 @@ from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
-from gaplab.services.store.queries import archives as repository
 from gaplab.services.store.queries.attempts import attempts_of
 from gaplab.services.store.session import Store
+from tests.archiving import exported, imported
 from tests.experiments import AWKWARD, cancel, run, some_log, toy
 
 EVERY = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -66,19 +67,6 @@ def _steps(draw: Any) -> Iterator[Any]:
         yield Tuned(iteration, tuple(draw(st.lists(SIMULATOR, min_size=1, max_size=4))), draw(COST))
         yield Transferred(iteration, draw(GENOME), draw(FITNESS), draw(COST))
         yield Probed(iteration, draw(FITNESS), draw(FITNESS))
-
-
-@pytest.fixture
-def other(request: pytest.FixtureRequest, store: Store) -> Any:
-    """A database of the other kind."""
-    with store.reading() as session:
-        kind = session.get_bind().dialect.name
-    return request.getfixturevalue("postgres_store" if kind == "sqlite" else "sqlite_store")
-
-
-def exported(archive: Any) -> Any:
-    with archive.file as file:
-        return file.read()
 
 
 def finished(store: Store, log: Any = None, **changes: Any) -> Any:
@@ -110,6 +98,7 @@ def forget(store: Store) -> None:
                 session.execute(table.delete())
 
 
+@pytest.mark.dialects
 def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store: Store, other: Any) -> None:
     submitted = finished(store, reality={"parameters": {"static_friction": 0.9}})
     before, archive = shown(store, submitted), exported(export_experiment(store, submitted))
@@ -118,61 +107,52 @@ def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store: Store,
     assert shown(other, submitted) == before
     back = exported(export_experiment(other, submitted))
     forget(store)
-    import_archive(store, BytesIO(back))
+    imported(store, back)
 
     assert (there.experiments, there.renamed, there.called_off) == ((submitted,), {}, ())
     assert back == archive == exported(export_experiment(store, submitted))
     assert shown(store, submitted) == before
 
 
-@pytest.fixture
-def unpacked_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Parquet is read in this process, without its limits, which saves a second each time."""
-
-    def read(files: Any) -> None:
-        assert all(unpacking.convert(str(each), str(opening._lines_of(each)), rows) for each, rows in files.items())
-
-    monkeypatch.setattr(opening, "_read_parquet", read)
-
-
+@pytest.mark.dialects
 @EVERY
 @given(st.data())
-def test_whatever_numbers_and_names_go_there_and_back(store: Store, other: Any, unpacked_here: Any, data: Any) -> None:
+def test_whatever_numbers_and_names_go_there_and_back(store: Store, other: Any, data: Any) -> None:
     forget(store)
     forget(other)
     submitted = finished(store, data.draw(logs()), repetitions=1, name=data.draw(NAME))
     archive = exported(export_experiment(store, submitted))
 
-    import_archive(other, BytesIO(archive))
+    imported(other, archive)
 
     assert exported(export_experiment(other, submitted)) == archive
     assert repr(shown(other, submitted)) == repr(shown(store, submitted))
 
 
-def test_a_zero_has_no_sign_in_either_database(store: Store, other: Any, unpacked_here: Any) -> None:
+@pytest.mark.dialects
+def test_a_zero_has_no_sign_in_either_database(store: Store, other: Any) -> None:
     submitted = finished(store, list(some_log(recorded=-0.0)), repetitions=1)
     archive = exported(export_experiment(store, submitted))
 
-    import_archive(other, BytesIO(archive))
+    imported(other, archive)
 
     assert exported(export_experiment(other, submitted)) == archive
     values = [value for point in curves.curve(store, submitted).points for value in point.values if value is not None]
     assert copysign(1, values[0]) == 1
 
 
-def test_an_archive_may_arrive_twice_at_once(
-    store: Store, other: Any, unpacked_here: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    archive, taken_ids = exported(export_experiment(store, finished(store))), repository.taken_ids
+@pytest.mark.dialects
+def test_an_archive_may_arrive_twice_at_once(store: Store, other: Any) -> None:
+    archive, ready = exported(export_experiment(store, finished(store))), Barrier(2)
 
-    def slowly(*arguments: Any) -> Any:
-        found = taken_ids(*arguments)
-        time.sleep(0.2)
-        return found
+    def write(*work: Any) -> Any:
+        """Begin when the other one does."""
+        ready.wait(timeout=60)
+        return other.write(*work)
 
-    monkeypatch.setattr(repository, "taken_ids", slowly)
+    place: Any = SimpleNamespace(reading=other.reading, write=write)
     with ThreadPoolExecutor(2) as pool:
-        both = list(pool.map(lambda _: import_archive(other, BytesIO(archive)), range(2)))
+        both = list(pool.map(lambda _: imported(place, archive), range(2)))
 
     assert sorted(len(each.renamed) for each in both) == [0, 1]
 
@@ -199,7 +179,7 @@ def test_a_study_goes_there_with_all_that_is_its_own(store: Store, other: Any) -
     finished(store)
 
     archive = exported(export_study(store, study.id))
-    stored = import_archive(other, BytesIO(archive))
+    stored = imported(other, archive)
 
     assert stored.study == study.id
     assert stored.experiments == tuple(each.id for each in study.experiments)
@@ -220,7 +200,7 @@ def test_an_experiment_of_a_study_goes_on_its_own(store: Store, other: Any) -> N
     study = submission.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["random"]}))
     (experiment,) = (each.id for each in study.experiments)
 
-    import_archive(other, BytesIO(exported(export_experiment(store, experiment))))
+    imported(other, exported(export_experiment(store, experiment)))
 
     assert reading.read_experiment(other, experiment).study is None
     with pytest.raises(NotFound):
@@ -231,7 +211,7 @@ def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store: Stor
     submitted = finished(store)
     archive = exported(export_experiment(store, submitted))
 
-    stored = import_archive(store, BytesIO(archive))
+    stored = imported(store, archive)
 
     (new,) = stored.experiments
     assert stored.renamed == {submitted: new}
@@ -247,7 +227,7 @@ def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(sto
     for step in list(some_log())[:4]:
         assert execution.record(store, second, step)
 
-    stored = import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
+    stored = imported(other, exported(export_experiment(store, submitted)))
 
     assert stored.called_off == (submitted,)
     assert reading.read_experiment(other, submitted).state is State.CANCELLED
@@ -276,7 +256,7 @@ def test_reality_is_hidden_until_its_study_has_ended(store: Store, other: Any, e
         with ZipFile(BytesIO(archive)) as opened:
             everything = b"".join(opened.read(name) for name in opened.namelist())
         assert (b"0.98765" in everything) is ended
-        stored = import_archive(other, BytesIO(archive))
+        stored = imported(other, archive)
         first = stored.experiments[0]
         found = reading.read_experiment(other, first).spec["reality"]["parameters"]["static_friction"]
         assert found == (0.98765 if ended else None)
@@ -284,13 +264,14 @@ def test_reality_is_hidden_until_its_study_has_ended(store: Store, other: Any, e
         assert misfit(other, first).points == ()
 
 
+@pytest.mark.dialects
 def test_an_export_is_of_one_moment_while_a_supervisor_writes(store: Store, other: Any) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=6)).id
     for claim in execution.claim(store, "me", 6):
         run(store, claim)
         archive = export_experiment(store, submitted)
         if claim.number == 3:
-            stored = import_archive(other, archive.file)  # which refuses rows that are no whole logs
+            stored = imported(other, archive.file.read())  # which refuses rows that are no whole logs
             assert reading.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
         archive.file.close()
 
@@ -322,7 +303,7 @@ def test_attempts_go_with_it_and_none_goes_on(store: Store, other: Any) -> None:
     assert execution.release(store, second, "its worker was lost")
     execution.claim(store, "another", 1)
 
-    import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
+    imported(other, exported(export_experiment(store, submitted)))
 
     there, here = (attempts(each, submitted, 0) for each in (store, other))
     assert here == there
@@ -344,7 +325,7 @@ def test_what_came_without_its_reality_cannot_be_extended(store: Store, other: A
         if claim.experiment_id == direct:
             run(store, claim, (_fitting(step, len(claim.spec.tunables)) for step in some_log(0)))
 
-    import_archive(other, BytesIO(exported(export_study(store, study.id))))
+    imported(other, exported(export_study(store, study.id)))
 
     assert reading.read_experiment(other, direct).state is State.COMPLETED
     with pytest.raises(Conflict, match="while its reality was hidden"):
@@ -363,7 +344,7 @@ def test_a_stopped_study_goes_on_from_its_archive_as_if_it_had_never_stopped(sto
         execution.release(store, claim, "its worker was lost")
     lifecycle.ask_study(store, study.id, Verb.STOP)
 
-    import_archive(other, BytesIO(exported(export_study(store, study.id))))
+    imported(other, exported(export_study(store, study.id)))
     stopped = reading.read_study(other, study.id)
     extension.extend_study(other, study.id, ExtensionSpec(repetitions=2))
     compute(other)
@@ -379,6 +360,7 @@ def compute(store: Store) -> None:
             run(store, claim, repetition(setting(claim.spec, claim.number), claim.log))
 
 
+@pytest.mark.dialects
 def test_times_keep_their_microseconds(store: Store, other: Any) -> None:
     submitted = finished(store)
     moment = datetime(2012, 11, 5, 9, 0, 0, 123457, tzinfo=UTC)
@@ -386,14 +368,12 @@ def test_times_keep_their_microseconds(store: Store, other: Any) -> None:
         session.get(ExperimentRow, submitted).created_at = moment
         session.get(ExperimentRow, submitted).ended_at = moment + timedelta(days=4000)
 
-    import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
+    imported(other, exported(export_experiment(store, submitted)))
 
     assert reading.read_experiment(other, submitted).created_at == moment
 
 
-def test_others_write_while_an_archive_is_checked(
-    store: Store, other: Any, monkeypatch: pytest.MonkeyPatch, unpacked_here: None
-) -> None:
+def test_others_write_while_an_archive_is_checked(store: Store, other: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     submitted = finished(store)
     archive = exported(export_experiment(store, submitted))
 
@@ -402,10 +382,9 @@ def test_others_write_while_an_archive_is_checked(
         check_logs(*given)
 
     monkeypatch.setattr(importing, "check_logs", check_slowly)
-    with ThreadPoolExecutor(1) as pool:
-        imported = pool.submit(import_archive, other, BytesIO(archive)).result(timeout=20)  # SQLite waits 30 s
+    stored = imported(other, archive)  # or SQLite refuses the writer, after its patience
 
-    assert imported.experiments == (submitted,)
+    assert stored.experiments == (submitted,)
     assert {each.name for each in listing.list_experiments(other).items} == {"meanwhile", "simulated_fit"}
 
 

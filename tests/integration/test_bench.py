@@ -18,7 +18,7 @@ from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, TakeSpec
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.archives import export_experiment, import_archive
+from gaplab.services.archives import export_experiment
 from gaplab.services.archives.rerunning import verify
 from gaplab.services.bench import answering, attachments, corrections, taking
 from gaplab.services.bench.branches import list_branches
@@ -40,8 +40,8 @@ from gaplab.services.store.queries.costs import work_of
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
+from tests.archiving import exported, imported
 from tests.experiments import same, toy
-from tests.integration.test_archives import exported
 
 PHYSICAL = {"kind": "physical", "probes": "each"}
 
@@ -100,14 +100,6 @@ def finish(store: Store, fitness: Callable[[Any], float]) -> list[Any]:
         measure(store, items[0], *[fitness(items[0].genome)] * items[0].repeats)
         compute(store)
     return asked
-
-
-@pytest.fixture
-def other(request: pytest.FixtureRequest, store: Store) -> Any:
-    """A database of the other kind."""
-    with store.reading() as session:
-        kind = session.get_bind().dialect.name
-    return request.getfixturevalue("postgres_store" if kind == "sqlite" else "sqlite_store")
 
 
 def log_of(store: Store, experiment: ExperimentRead) -> Any:
@@ -171,11 +163,12 @@ def test_a_controller_is_measured_once_even_if_it_is_probe_and_sample(store: Sto
     assert {each.kind for each in asked} == {"probe"}
 
 
-def test_a_take_has_one_holder_and_runs_out(store: Store) -> None:
+@pytest.mark.dialects
+def test_a_take_has_one_holder_and_a_bench_one_take(store: Store) -> None:
     submit_experiment(store, bench(repetitions=2))
     compute(store)
     first, second = pending(store)
-    taken = taking.take(store, first.id, TakeSpec(operator="Ada", lease_s=1.0), FREELY).answer
+    taken = taking.take(store, first.id, TakeSpec(operator="Ada"), FREELY).answer
     assert (taken.state, taken.takes, taken.taken_by) == ("taken", 1, "Ada")
     with pytest.raises(Conflict, match="Ada has taken it"):
         taking.take(store, first.id, TakeSpec(operator="Bo"), FREELY)
@@ -188,6 +181,7 @@ def test_a_take_has_one_holder_and_runs_out(store: Store) -> None:
     assert taking.take(store, second.id, TakeSpec(operator="Bo"), FREELY).answer.taken_by == "Bo"
 
 
+@pytest.mark.dialects
 @pytest.mark.parametrize("by_s", [-3600, 3600])
 def test_a_take_ends_with_its_lease_also_if_the_clock_was_set(store: Store, by_s: float) -> None:
     """`taken_until` in the past is over; so is one that no heartbeat could have set."""
@@ -212,6 +206,7 @@ def test_a_take_ends_with_its_lease_also_if_the_clock_was_set(store: Store, by_s
     assert taking.reopen(store, request.id).state == "open"
 
 
+@pytest.mark.dialects
 def test_the_same_answer_twice_counts_once_and_another_is_a_conflict(store: Store) -> None:
     submit_experiment(store, bench())
     compute(store)
@@ -249,6 +244,7 @@ def test_bad_values_are_refused_with_their_place(store: Store) -> None:
     assert pending(store)[0].answers == ()
 
 
+@pytest.mark.dialects
 def test_a_correction_closes_what_followed_and_measurements_are_reused(store: Store) -> None:
     spec = bench(iterations=3)
     experiment = submit_experiment(store, spec)
@@ -323,6 +319,7 @@ def test_a_void_measurement_is_asked_for_again(store: Store) -> None:
     assert all(map(same, after, before))
 
 
+@pytest.mark.dialects
 def test_a_correction_of_a_probe_changes_its_point_alone(store: Store) -> None:
     experiment = submit_experiment(store, bench())
     asked = finish(store, lambda _: 0.5)
@@ -371,6 +368,7 @@ def test_a_correction_of_a_sample_says_that_a_stopped_experiment_goes_on(store: 
     assert read_experiment(store, experiment.id).state is State.QUEUED
 
 
+@pytest.mark.dialects
 def test_a_void_answer_of_a_closed_branch_is_not_answered_again(store: Store) -> None:
     experiment = submit_experiment(store, bench(strategy="simulated_fit", iterations=3))
     finish(store, lambda genome: genome[0])
@@ -394,6 +392,7 @@ def test_a_void_answer_of_a_closed_branch_is_not_answered_again(store: Store) ->
     assert pending(store)[0].id == wanted.id
 
 
+@pytest.mark.dialects
 def test_a_correction_while_the_repetition_is_computed_fences_its_worker(store: Store) -> None:
     experiment = submit_experiment(store, bench())
     compute(store)
@@ -472,6 +471,7 @@ def test_a_resolved_physical_spec_resolves_to_itself() -> None:
     assert replace(setting(resolved, 0)).reality is not None
 
 
+@pytest.mark.dialects
 def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) -> None:
     spec = bench(iterations=3)
     experiment = submit_experiment(store, spec)
@@ -489,7 +489,7 @@ def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) 
     taking.release(store, taken.id, HolderSpec(take=1))
 
     for _ in range(2):  # the second time under other ids
-        there = import_archive(other, BytesIO(archive))
+        there = imported(other, archive)
     assert there.called_off == ()
     first, second = (read_experiment(other, id_) for id_ in (experiment.id, there.experiments[0]))
     assert (first.state, second.state) == (State.QUEUED, State.QUEUED)
@@ -524,6 +524,7 @@ def sent(store: Store, name: str) -> str:
     return attachments.store_attachment(store, name.encode(), name, "text/plain").id
 
 
+@pytest.mark.dialects
 def test_a_file_goes_with_the_last_answer_that_names_it(store: Store) -> None:
     shared, own, waits, old, again = (sent(store, name) for name in ("shared", "own", "waits", "old", "again"))
     first, second = (submit_experiment(store, bench(iterations=1, reality={"probes": "never"})) for _ in range(2))
@@ -558,6 +559,7 @@ def test_every_result_of_a_bench_is_served(store: Store) -> None:
     assert refused == {}
 
 
+@pytest.mark.dialects
 def test_fifty_operators_at_once_get_one_request_each_or_none(store: Store) -> None:
     submit_experiment(store, bench(repetitions=3, reality={"bench": "one"}))
     submit_experiment(store, bench(repetitions=2, reality={"bench": "two"}))
@@ -581,13 +583,14 @@ def test_fifty_operators_at_once_get_one_request_each_or_none(store: Store) -> N
     assert held == {each.id: each.taken_by for each in taken}
 
 
+@pytest.mark.dialects
 @pytest.mark.parametrize("claimed", [False, True])
 def test_an_answer_counts_also_while_a_repetition_is_on_its_way_to_the_request(
     store: Store, other: Store, claimed: bool
 ) -> None:
     experiment = submit_experiment(store, bench())
     compute(store)
-    import_archive(other, BytesIO(exported(export_experiment(store, experiment.id))))
+    imported(other, exported(export_experiment(store, experiment.id)))
     claims = execution.claim(other, "slow", 1) if claimed else ()
     assert measure(other, pending(other)[0], 0.5).state == "counted"
     for claim in claims:

@@ -80,6 +80,7 @@ def test_readings_that_come_after_their_value_are_kept(store: Store, request_: A
     assert (late.readings, late.note) == ((((0.1,),),), "from the log of the robot")
 
 
+@pytest.mark.dialects
 def test_an_answer_that_is_sent_again_is_stored_once_also_without_a_key(store: Store, request_: Any) -> None:
     first = sent(store, "first")
     whole = {"take": 1, "values": (0.5,), "note": "co\0ld", "attachments": (first,), "readings": (((None,),),)}

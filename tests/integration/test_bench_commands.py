@@ -255,8 +255,10 @@ def test_a_reason_is_asked_for_before_the_service_is(gaplab: Gaplab, command: tu
 
 
 def test_all_requests_are_listed_on_one_line_each(sqlite_store: Store, gaplab: Gaplab) -> None:
-    reality = PHYSICAL | {"bench": "the long table at the window of the second laboratory"}
-    asked(sqlite_store, iterations=1, repetitions=55, reality=reality)
+    reality = PHYSICAL | {"bench": "the long table at the window of the second laboratory", "probes": "each"}
+    submit_experiment(sqlite_store, toy(robot="quadruped", engine="mujoco", repetitions=55, reality=reality))
+    for _ in range(55):
+        ask(sqlite_store)
 
     listed, printed = json.loads(gaplab("requests", "--json").out), gaplab("requests").out
 

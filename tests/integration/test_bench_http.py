@@ -3,14 +3,13 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from threading import Event, Thread
 from threading import enumerate as threads
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from httpx2 import MockTransport, Response
+from httpx2 import MockTransport, Request, Response
 
 from gaplab import Client, ServiceError, ServiceUnreachable
 from gaplab.api.clients import driving
@@ -20,6 +19,7 @@ from gaplab.services import access
 from gaplab.services.store.session import Store
 from tests.experiments import toy
 from tests.integration.test_bench import compute, truth
+from tests.integration.test_bench_safety import ask
 from tests.integration.test_client import InProcess
 from tests.waiting import wait_until
 
@@ -27,32 +27,38 @@ SPEC = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repet
 REALITY = {"kind": "physical", "probes": "each"}
 
 
+class Supervised(InProcess):
+    """The service in this process; if `computing`, a supervisor does what can be done after each change."""
+
+    computing = False
+
+    def __init__(self, store: Store) -> None:
+        super().__init__(store)
+        self._store = store
+
+    def handle_request(self, request: Request) -> Response:
+        try:
+            return super().handle_request(request)
+        finally:
+            if self.computing and request.method != "GET":
+                compute(self._store)
+
+
 @pytest.fixture
-def network(store: Store) -> Iterator[InProcess]:
-    network = InProcess(store)
+def network(store: Store) -> Iterator[Supervised]:
+    network = Supervised(store)
     yield network
     network.close()
 
 
 @pytest.fixture
-def client(network: InProcess) -> Client:
+def client(network: Supervised) -> Client:
     return Client("http://test", transport=network, pauses_s=(0.0, 0.0, 0.0))
 
 
 @pytest.fixture
-def computing(store: Store) -> Iterator[None]:
-    """A supervisor that does what can be done."""
-    over = Event()
-
-    def work() -> None:
-        while not over.wait(0.02):
-            compute(store)
-
-    thread = Thread(target=work)
-    thread.start()
-    yield
-    over.set()
-    thread.join()
+def computing(network: Supervised) -> None:
+    network.computing = True
 
 
 def submitted(client: Client, **reality: Any) -> Any:
@@ -77,7 +83,7 @@ def test_a_driver_is_a_loop_of_one_line(client: Client) -> None:
 
 
 @pytest.mark.usefixtures("computing")
-def test_a_lost_answer_is_sent_again_and_counts_once(client: Client, network: InProcess, tmp_path: Path) -> None:
+def test_a_lost_answer_is_sent_again_and_counts_once(client: Client, network: Supervised, tmp_path: Path) -> None:
     experiment = submitted(client)
     for number, request in enumerate(client.requests(experiment.id, journal=tmp_path / "journal")):
         network.lost = 2 if number == 1 else 0
@@ -148,8 +154,10 @@ def test_a_driver_finds_an_open_request_behind_a_page_of_those_of_a_busy_bench(
     client: Client, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr(driving, "time")  # a pause of the driver is an error here
-    many = client.submit(SPEC | {"repetitions": 52, "reality": REALITY | {"bench": "a"}})
-    compute(store)
+    walking = SPEC | {"robot": "quadruped", "engine": "mujoco"}
+    many = client.submit(walking | {"repetitions": 52, "reality": REALITY | {"bench": "a"}})
+    for _ in range(52):
+        ask(store)
     free = submitted(client, bench="b")
     compute(store)
     busy: Any = client.requests(many.id)
@@ -164,7 +172,7 @@ def test_a_driver_finds_an_open_request_behind_a_page_of_those_of_a_busy_bench(
 
 @pytest.mark.parametrize("status", [401, 403])
 def test_answers_stay_in_the_journal_while_the_token_is_refused(
-    client: Client, network: InProcess, store: Store, tmp_path: Path, status: int
+    client: Client, network: Supervised, store: Store, tmp_path: Path, status: int
 ) -> None:
     submitted(client)
     compute(store)
@@ -180,7 +188,7 @@ def test_answers_stay_in_the_journal_while_the_token_is_refused(
         assert [answer for _, answer, _ in journal.unsent()] == [{"values": [0.5]}]
 
 
-def test_a_driver_that_may_read_but_not_take_is_told_so(store: Store, network: InProcess) -> None:
+def test_a_driver_that_may_read_but_not_take_is_told_so(store: Store, network: Supervised) -> None:
     tokens = {role: access.create_token(store, role, role.value).secret for role in (Role.RUNNER, Role.READER)}
     with Client("http://test", token=tokens[Role.RUNNER], transport=network) as runner:
         submitted(runner)
@@ -194,9 +202,11 @@ def test_a_driver_that_may_read_but_not_take_is_told_so(store: Store, network: I
     assert refused.value.problem.status == 403
 
 
-@pytest.mark.parametrize(
-    ("body", "pointer"),
-    [
+def test_nonsense_is_refused_with_its_place(client: Client, store: Store) -> None:
+    submitted(client)
+    compute(store)
+    (request,) = client.bench.pending()
+    cases: list[tuple[dict[str, Any], str]] = [
         ({"values": [0.5], "unit": "km/h"}, "/unit"),
         ({"values": [0.5, 0.5]}, "/values"),
         ({"values": ["0.5"]}, "/values/0"),
@@ -206,23 +216,12 @@ def test_a_driver_that_may_read_but_not_take_is_told_so(store: Store, network: I
         ({"values": [0.5], "attachments": ["0" * 64]}, "/attachments/0"),
         ({"values": [0.5], "readings": [[[0.1]]]}, "/readings/0"),
         ({"values": [0.5], "surprise": 1}, "/surprise"),
-    ],
-)
-def test_nonsense_is_refused_with_its_place(client: Client, store: Store, body: Any, pointer: str) -> None:
-    submitted(client)
-    compute(store)
-    (request,) = client.bench.pending()
-    with pytest.raises(ServiceError) as refused:
-        client._connection.post(object, f"/requests/{request.id}/measurements", body)
-    assert refused.value.problem.status == 422
-    assert pointer in {each.pointer for each in refused.value.problem.errors or ()}
-    assert client.bench.request(request.id).answers == ()
-
-
-def test_infinite_values_are_refused(client: Client, store: Store) -> None:
-    submitted(client)
-    compute(store)
-    (request,) = client.bench.pending()
+    ]
+    for body, pointer in cases:
+        with pytest.raises(ServiceError) as refused:
+            client._connection.post(object, f"/requests/{request.id}/measurements", body)
+        assert refused.value.problem.status == 422
+        assert pointer in {each.pointer for each in refused.value.problem.errors or ()}
     for value in ("NaN", "Infinity", "1e999"):
         with pytest.raises(ServiceError) as refused:
             client._connection.change(
@@ -233,6 +232,7 @@ def test_infinite_values_are_refused(client: Client, store: Store) -> None:
                 headers={"Content-Type": "application/json"},
             )
         assert refused.value.problem.status == 422
+    assert client.bench.request(request.id).answers == ()
 
 
 def test_a_motion_leaves_in_three_formats(client: Client, store: Store) -> None:
@@ -278,20 +278,17 @@ def test_attachments_are_stored_once_and_never_shown_by_a_browser(client: Client
         assert "attachment" in answer.headers["content-disposition"]
 
 
-@pytest.mark.parametrize(
-    ("name", "plain", "quoted"),
-    [
+def test_an_attachment_keeps_its_name_in_any_script(client: Client) -> None:
+    for name, plain, quoted in (
         ("测试.csv", "__.csv", "%E6%B5%8B%E8%AF%95.csv"),
         ("größe 3.csv", "gr__e_3.csv", "gr%C3%B6%C3%9Fe%203.csv"),
         ('..\\a"\r\nb\u202e', ".._a___b_", ".._a%22__b_"),
-    ],
-)
-def test_an_attachment_keeps_its_name_in_any_script(client: Client, name: str, plain: str, quoted: str) -> None:
-    stored = client.bench._attach(name, name.encode(), "text/csv")
-    with client._connection.stream("GET", f"/attachments/{stored.id}") as answer:
-        assert answer.read() == name.encode()
-        told = answer.headers["content-disposition"]
-    assert told == f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quoted}"
+    ):
+        stored = client.bench._attach(name, name.encode(), "text/csv")
+        with client._connection.stream("GET", f"/attachments/{stored.id}") as answer:
+            assert answer.read() == name.encode()
+            told = answer.headers["content-disposition"]
+        assert told == f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quoted}"
 
 
 def test_a_table_of_samples_is_checked_and_used(client: Client, tmp_path: Path) -> None:

@@ -254,7 +254,7 @@ def test_what_is_too_large_to_be_reckoned_with_is_left_out_as_what_failed() -> N
     assert squared_error_figure({1: {0: huge}}).empty
 
 
-@pytest.mark.parametrize("large", [1e300, 1.7e308])
+@pytest.mark.parametrize("large", [pytest.param(1e300, marks=pytest.mark.release), 1.7e308])
 def test_every_figure_is_drawn_however_large_its_numbers_are(large: float) -> None:
     ends = [point(at, value, sd=large) for at, value in enumerate((large, -large, 1.0))]
     figures = [

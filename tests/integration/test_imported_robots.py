@@ -8,13 +8,13 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.motions import Motion
 from gaplab.services.engines import engines
 from gaplab.services.specs.assembly import engine_of
-from tests.real_robots import STANCES, imported
+from tests.real_robots import STANCES, for_each, imported
 
 pytest.importorskip("mujoco")
 
 
 @pytest.mark.parametrize("engine", ["pybullet", "mujoco", "physx"])
-@pytest.mark.parametrize("name", STANCES)
+@for_each(STANCES)
 def test_a_robot_with_its_motors_at_rest_stays_as_it_starts(name: str, engine: str) -> None:
     """For three seconds. Gains are those that the import computes, and the largest torques those of the file."""
     if engine not in engines or not engines[engine].available():

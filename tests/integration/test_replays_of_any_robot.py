@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from PIL import Image
 
@@ -18,13 +18,14 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import Replay
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.bench import motions
+from gaplab.services.core import external_plugins
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots import robots
 from gaplab.services.core.types import Simulator, Transferred, Tuned
 from gaplab.services.core.world import PDMotor
 from gaplab.services.experiments import submission
-from gaplab.services.plugins import watching
+from gaplab.services.plugins import folders, watching
 from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Requested
@@ -33,15 +34,28 @@ from tests.drawn_robot import FILES, strode
 from tests.integration.test_client import InProcess
 
 
+@pytest.fixture(scope="module")
+def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FastAPI]:
+    """A service that has the robot; one for all tests, since its processes take a while to start."""
+    home = tmp_path_factory.mktemp("plug-ins")
+    for name, text in FILES.items():
+        (home / f"{name}.py").write_text(text)
+    folders.find()
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv(VARIABLE, str(home))
+        external_plugins.set_folders((*external_plugins.folders(), home))
+        watching.reload()
+        app = create_app(Store("sqlite://"))
+        yield app
+        app.state.rollout_process.close()
+        app.state.drawing_process.close()
+    external_plugins.set_folders(())
+
+
 @pytest.fixture
-def api(sqlite_store: Store, put: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
-    monkeypatch.setenv(VARIABLE, str(put(**FILES)))
-    monkeypatch.setattr(watching, "LOOK_S", 0)
-    app = create_app(sqlite_store)
-    watching.reload()
-    yield TestClient(app)
-    app.state.rollout_process.close()
-    app.state.drawing_process.close()
+def api(app: FastAPI, sqlite_store: Store) -> TestClient:
+    app.state.store = sqlite_store
+    return TestClient(app)
 
 
 def test_every_part_of_every_body_is_shown(sqlite_store: Store, api: TestClient) -> None:
@@ -78,7 +92,7 @@ def test_heights_and_speeds_are_those_of_the_observed_body_that_slides(sqlite_st
 def test_its_video_shows_each_colour(sqlite_store: Store, api: TestClient) -> None:
     experiment = strode(sqlite_store)
 
-    answer = api.get(f"/experiments/{experiment}/video?width=640&format=gif")
+    answer = api.get(f"/experiments/{experiment}/video?width=320&format=gif")
 
     assert answer.status_code == 200, answer.text
     with Image.open(BytesIO(answer.content)) as film:

@@ -3,16 +3,14 @@
 import json
 from collections.abc import Iterator
 from io import BytesIO
-from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
-from gaplab import migrations
 from gaplab.api.app import create_app
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.archives import export_experiment, import_archive
+from gaplab.services.archives import export_experiment
 from gaplab.services.archives.rerunning import verify
 from gaplab.services.core import robot_library, world_checks
 from gaplab.services.core.errors import InvalidSpec
@@ -29,6 +27,7 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, RobotRow
 from gaplab.services.store.session import Store
+from tests.archiving import exported, imported
 from tests.experiments import run
 
 JSON = {"Content-Type": "application/json"}
@@ -64,12 +63,8 @@ def _nothing_known() -> Iterator[None]:
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    url = f"sqlite:///{tmp_path / 'gaplab.db'}"
-    migrations.upgrade(url)
-    opened = Store(url)
-    yield opened
-    opened.dispose()
+def store(sqlite_store: Store) -> Store:
+    return sqlite_store
 
 
 @pytest.fixture
@@ -244,23 +239,16 @@ def test_queries_and_the_catalogue_know_it_by_its_name(store: Store, http: TestC
     assert list_experiments(store, ListFilter(q="robot = imported")).items == ()
 
 
-def test_an_archive_has_its_robots_and_brings_them(store: Store, tmp_path: Path) -> None:
+def test_an_archive_has_its_robots_and_brings_them(store: Store, other: Store) -> None:
     file = file_of()
     stored_robots.add_robot(store, file.text)
     made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
-    with export_experiment(store, made.id).file as exported:
-        content = exported.read()
+    archive = exported(export_experiment(store, made.id))
     robot_library._known.clear()
-    other = f"sqlite:///{tmp_path / 'other.db'}"
-    migrations.upgrade(other)
-    target = Store(other)
-    archive = tmp_path / "walker.zip"
-    archive.write_bytes(content)
-    with archive.open("rb") as opened:
-        import_archive(target, opened)
 
-    assert read_robot_file(stored_robots.robot_text(target, "walker")).sha256 == file.sha256
-    target.dispose()
+    imported(other, archive)
+
+    assert read_robot_file(stored_robots.robot_text(other, "walker")).sha256 == file.sha256
 
 
 def test_an_archive_of_a_robot_from_a_file_is_verified_in_processes_that_do_not_know_it(store: Store) -> None:
@@ -268,8 +256,7 @@ def test_an_archive_of_a_robot_from_a_file_is_verified_in_processes_that_do_not_
     made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, repetition(setting(claim.spec, claim.number)))
-    with export_experiment(store, made.id).file as exported:
-        archive = BytesIO(exported.read())
+    archive = BytesIO(exported(export_experiment(store, made.id)))
     robot_library._known.clear()
 
     (found,) = verify(archive, cores=1).repetitions
@@ -278,20 +265,15 @@ def test_an_archive_of_a_robot_from_a_file_is_verified_in_processes_that_do_not_
     assert found.steps == found.stored_steps > 0
 
 
-def test_an_archive_gives_no_name_another_meaning(store: Store, tmp_path: Path) -> None:
+def test_an_archive_gives_no_name_another_meaning(store: Store, other: Store) -> None:
     stored_robots.add_robot(store, file_of().text)
     made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
-    with export_experiment(store, made.id).file as exported:
-        (tmp_path / "walker.zip").write_bytes(exported.read())
-    other = f"sqlite:///{tmp_path / 'other.db'}"
-    migrations.upgrade(other)
-    target = Store(other)
+    archive = exported(export_experiment(store, made.id))
     own = json.loads(file_of().text)
     own["world"]["bodies"][0]["mass_kg"] = 3.0
-    mine = stored_robots.add_robot(target, json.dumps(own))
-    with (tmp_path / "walker.zip").open("rb") as opened:
-        import_archive(target, opened)
+    mine = stored_robots.add_robot(other, json.dumps(own))
 
-    assert [each.sha256 for each in stored_robots.list_robots(target)] == [mine.sha256, file_of().sha256]
-    assert read_robot_file(stored_robots.robot_text(target, "walker")).sha256 == mine.sha256
-    target.dispose()
+    imported(other, archive)
+
+    assert [each.sha256 for each in stored_robots.list_robots(other)] == [mine.sha256, file_of().sha256]
+    assert read_robot_file(stored_robots.robot_text(other, "walker")).sha256 == mine.sha256

@@ -1,6 +1,7 @@
 """Reports: verdicts that follow from their rules, and the same content as HTML and as PDF."""
 
 import re
+import shutil
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from html.parser import HTMLParser
@@ -14,10 +15,9 @@ from gaplab.api.app import create_app
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.archives import import_archive
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.types import Probed
-from gaplab.services.experiments import extension, lifecycle, reading, submission
+from gaplab.services.experiments import extension, lifecycle, listing, reading, submission
 from gaplab.services.reports.blocks import Code, Paragraph
 from gaplab.services.reports.content import study_verdict
 from gaplab.services.reports.document import study_report
@@ -27,6 +27,7 @@ from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from gaplab.services.store.lease import Claim
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
+from tests.archiving import imported
 from tests.experiments import run, some_log, toy
 
 STUDIES = Path(__file__).parents[2] / "docs" / "studies"
@@ -40,18 +41,28 @@ def api(sqlite_store: Store) -> Iterator[TestClient]:
     app.state.rollout_process.close()
 
 
+@pytest.fixture(scope="module")
+def published(sqlite_template: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
+    """A store with a published study, with eight repetitions of each strategy and three evaluations; only read."""
+    store = Store(f"sqlite:///{shutil.copy(sqlite_template, tmp_path_factory.mktemp('published') / 'gaplab.db')}")
+    imported(store, (STUDIES / "a1-pybullet-open-fitness.zip").read_bytes())
+    yield store
+    store.dispose()
+
+
 @pytest.fixture
-def study(sqlite_store: Store) -> str:
-    """A published study, with eight repetitions of each strategy and three evaluations."""
-    return imported(sqlite_store, "a1-pybullet-open-fitness.zip")
+def study(published: Store) -> str:
+    """The id of the published study."""
+    (study,) = listing.list_studies(published).items
+    return study.id
 
 
-def imported(store: Store, archive: str) -> str:
-    """Import a published study; return its id."""
-    with (STUDIES / archive).open("rb") as file:
-        made = import_archive(store, file)
-    assert made.study is not None
-    return made.study
+@pytest.fixture
+def reader(published: Store) -> Iterator[TestClient]:
+    """Asks for the published study."""
+    app = create_app(published)
+    yield TestClient(app)
+    app.state.rollout_process.close()
 
 
 class Page(HTMLParser):
@@ -120,16 +131,16 @@ def test_four_repetitions_are_too_few_for_a_verdict(sqlite_store: Store, api: Te
 
 
 def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
-    sqlite_store: Store, api: TestClient, study: str
+    published: Store, reader: TestClient, study: str
 ) -> None:
-    experiments = reading.read_study(sqlite_store, study).experiments
+    experiments = reading.read_study(published, study).experiments
     asked: Any = {"experiment": [each.id for each in experiments], "from": 3, "to": 3}
-    pairs = api.get("/comparisons", params=asked).json()
+    pairs = reader.get("/comparisons", params=asked).json()
     learned = {each.id for each in experiments if not each.direct}
     compared = [pair for pair in pairs if {pair["first"], pair["second"]} <= learned]
     differing = [pair for pair in compared if pair["trusted"]["p_holm"] < 0.05]
 
-    verdict = study_verdict(sqlite_store, study)
+    verdict = study_verdict(published, study)
 
     assert verdict.evaluations == 3
     assert 0 < len(differing) < len(compared)
@@ -154,15 +165,15 @@ def test_the_verdict_on_two_strategies(sqlite_store: Store, ahead: float, headli
     assert study_verdict(sqlite_store, made.id).headline.replace("\xa0", " ").startswith(headline)
 
 
-def test_the_verdict_tells_the_share_of_direct(sqlite_store: Store, study: str) -> None:
-    sentences = study_verdict(sqlite_store, study).sentences
+def test_the_verdict_tells_the_share_of_direct(published: Store, study: str) -> None:
+    sentences = study_verdict(published, study).sentences
 
     assert any("Share of the fitness of Direct" in sentence and "%" in sentence for sentence in sentences)
 
 
-def test_only_a_margin_turns_no_significance_into_no_difference(api: TestClient, study: str) -> None:
+def test_only_a_margin_turns_no_significance_into_no_difference(reader: TestClient, study: str) -> None:
     def told(**query: Any) -> str:
-        verdict = api.get(f"/studies/{study}/report", params={"format": "json", **query}).json()
+        verdict = reader.get(f"/studies/{study}/report", params={"format": "json", **query}).json()
         return " ".join([verdict["headline"], *verdict["sentences"]])
 
     plain, wide, narrow, share = told(), told(margin=100), told(margin=1e-6), told(margin_of_direct=50)
@@ -182,8 +193,8 @@ def test_a_study_without_results_has_no_verdict(sqlite_store: Store) -> None:
     assert study_verdict(sqlite_store, made.id).headline == "There are no results yet."
 
 
-def test_the_page_needs_no_other_file_and_no_script(api: TestClient, study: str) -> None:
-    answer = api.get(f"/studies/{study}/report")
+def test_the_page_needs_no_other_file_and_no_script(reader: TestClient, study: str) -> None:
+    answer = reader.get(f"/studies/{study}/report")
 
     page = Page(answer.text)
     assert answer.headers["content-type"].startswith("text/html")
@@ -206,8 +217,8 @@ def test_a_name_cannot_become_markup(sqlite_store: Store, api: TestClient) -> No
     assert EVIL in Page(text).words
 
 
-def test_the_same_report_is_the_same_pdf(sqlite_store: Store, study: str) -> None:
-    report, at = study_report(sqlite_store, study), datetime(2026, 1, 1, tzinfo=UTC)
+def test_the_same_report_is_the_same_pdf(published: Store, study: str) -> None:
+    report, at = study_report(published, study), datetime(2026, 1, 1, tzinfo=UTC)
 
     first, second = (render_pdf(report, "made", at) for _ in range(2))
 
@@ -216,8 +227,10 @@ def test_the_same_report_is_the_same_pdf(sqlite_store: Store, study: str) -> Non
     assert len(re.findall(rb"/Type /Page\b", first)) > 3
 
 
-def test_the_pdf_is_served(api: TestClient, study: str) -> None:
-    answer = api.get(f"/studies/{study}/report", params={"format": "pdf"})
+def test_the_pdf_is_served(sqlite_store: Store, api: TestClient) -> None:
+    made = submission.submit_experiment(sqlite_store, toy()).id
+
+    answer = api.get(f"/experiments/{made}/report", params={"format": "pdf"})
 
     assert answer.headers["content-type"] == "application/pdf"
     assert answer.content.startswith(b"%PDF")
@@ -237,10 +250,10 @@ def test_hidden_parameters_of_reality_are_in_no_report(sqlite_store: Store, api:
     assert str(secret) in api.get(f"/experiments/{made}/report").text
 
 
-def test_the_spec_in_a_report_gives_the_same_experiments(sqlite_store: Store, study: str) -> None:
-    experiments = reading.read_study(sqlite_store, study).experiments
+def test_the_spec_in_a_report_gives_the_same_experiments(published: Store, study: str) -> None:
+    experiments = reading.read_study(published, study).experiments
 
-    (spec,), _ = how_to_reproduce(sqlite_store, study)
+    (spec,), _ = how_to_reproduce(published, study)
     resolved = resolve_study(StudySpec.model_validate_json(spec))
 
     known = set(experiments[0].spec)  # without the schedule, which changes no number

@@ -62,7 +62,10 @@ def test_no_tuning_sees_a_held_out_sample_and_the_best_simulator_is_tested_on_it
     ]
 
 
-@pytest.mark.parametrize("name", sorted(strategies))
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name == "simulated_fit" else pytest.mark.release) for name in sorted(strategies)],
+)
 def test_a_resumed_repetition_holds_out_the_same_samples(name: str) -> None:
     whole = [flat(step) for step in repetition(small_setting(name, held_out=0.5))]
 

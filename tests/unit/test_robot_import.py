@@ -19,7 +19,7 @@ from gaplab.services.robots.hulls import simplify
 from gaplab.services.robots.importing import ImportedFile, import_robot
 from gaplab.services.robots.options import ImportOptions
 from tests import real_robots
-from tests.real_robots import FILES
+from tests.real_robots import FILES, for_each
 from tests.robot_texts import MJCF
 
 mujoco = pytest.importorskip("mujoco")
@@ -96,7 +96,7 @@ def set_angles(model: Any, data: Any, world: World, angles: FloatArray) -> None:
         data.qpos[model.joint(joint.name).qposadr[0]] = angle
 
 
-@pytest.mark.parametrize("name", FILES)
+@for_each(FILES)
 def test_bodies_are_where_mujoco_has_them_at_any_joint_angles(name: str) -> None:
     world, model, rng = imported(name).robot.world, reference(name), np.random.default_rng(1)
     data = mujoco.MjData(model)
@@ -116,7 +116,7 @@ def test_bodies_are_where_mujoco_has_them_at_any_joint_angles(name: str) -> None
             assert turned.as_matrix() == pytest.approx(data.xmat[model.jnt_bodyid[at]].reshape(3, 3), abs=1e-9)
 
 
-@pytest.mark.parametrize("name", [each for each in FILES if each != "laikago"])
+@for_each(each for each in FILES if each != "laikago")
 def test_mass_center_and_inertia_are_those_of_mujoco(name: str) -> None:
     """The total inertia is the mass matrix of the base, at random angles: it depends on every body."""
     world, model, rng = imported(name).robot.world, reference(name), np.random.default_rng(2)
@@ -151,7 +151,7 @@ def test_mass_center_and_inertia_are_those_of_mujoco(name: str) -> None:
         assert turn.T @ moment @ turn == pytest.approx(matrix[3:6, 3:6], rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", MASSES_KG)
+@for_each(MASSES_KG)
 def test_no_mass_is_lost(name: str) -> None:
     """MuJoCo alone loses that of a URDF's root: 4.7 of a1's 12.5 kg."""
     found = imported(name)
@@ -161,7 +161,7 @@ def test_no_mass_is_lost(name: str) -> None:
     assert found.after_kg == pytest.approx(MASSES_KG[name] + held, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", FILES)
+@for_each(FILES)
 def test_joints_keep_their_limits_damping_friction_and_armature(name: str) -> None:
     world, model = imported(name).robot.world, reference(name)
 
@@ -176,7 +176,7 @@ def test_joints_keep_their_limits_damping_friction_and_armature(name: str) -> No
         assert joint.slides == (theirs.type[0] == 2)
 
 
-@pytest.mark.parametrize("name", FILES)
+@for_each(FILES)
 def test_the_lowest_point_touches_the_ground_at_the_start(name: str) -> None:
     """MuJoCo measures it: the distance of each shape from a plane, of meshes with all their vertices."""
     world, model = imported(name).robot.world, reference(name)

@@ -58,7 +58,10 @@ def moved(world: World, name: str, by: Sequence[float]) -> World:
     return with_body(world, name, center_m=(x, y, z))
 
 
-@pytest.fixture(params=["a1", "laikago", "mini_cheetah", "franka_panda"])
+RELEASE = [pytest.param(name, marks=pytest.mark.release) for name in ("laikago", "mini_cheetah")]
+
+
+@pytest.fixture(params=["a1", "franka_panda", *RELEASE])
 def urdf(request: pytest.FixtureRequest) -> tuple[RobotFile, Path]:
     file, options = FILES[request.param]
     return import_robot(path_of(file), ImportOptions(**options)).robot, path_of(file)
