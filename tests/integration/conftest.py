@@ -18,7 +18,7 @@ from tests.commands import Gaplab, Said, served
 from tests.experiments import run, some_log
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def service() -> Iterator[tuple[FastAPI, str]]:
     """A service without workers, and without a database yet."""
     app = create_app(Store("sqlite://"))
@@ -36,14 +36,15 @@ def url(service: tuple[FastAPI, str], sqlite_store: Store) -> str:
 
 @pytest.fixture
 def gaplab(url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Gaplab:
-    """Runs the command as a shell would."""
-    monkeypatch.setenv("GAPLAB_URL", url)
+    """Runs the command as a shell would, with these variables in the environment."""
 
-    def command(*arguments: str, stdin: str = "") -> Said:
-        monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
-        monkeypatch.setattr(sys, "stdin", io.StringIO(stdin))
-        with pytest.raises(SystemExit) as ended:
-            main()
+    def command(*arguments: str, stdin: str = "", **environment: str) -> Said:
+        with monkeypatch.context() as shell:
+            shell.setattr("sys.stdin", io.StringIO(stdin))
+            for name, value in {"GAPLAB_URL": url, **environment}.items():
+                shell.setenv(name, value)
+            with pytest.raises(SystemExit) as ended:
+                main(arguments)
         printed = capsys.readouterr()
         assert "Traceback" not in printed.out + printed.err
         return Said(int(ended.value.code or 0), printed.out, printed.err)

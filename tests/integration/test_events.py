@@ -179,6 +179,7 @@ def all_verbs(store: Store) -> None:
         archives.import_archive(store, file)
 
 
+@pytest.mark.dialects
 def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store: Store) -> None:
     with store.transaction() as session:
         note(session, EventKind.SUBMITTED, "the first")  # so that numbers and ids differ
@@ -205,6 +206,7 @@ def test_an_experiment_submitted_after_its_check_is_told_of_it_at_once(store: St
         assert kinds(store, WantedEvents(experiment=each)) == ["submitted", "sensitivity_ended"]
 
 
+@pytest.mark.dialects
 def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store: Store) -> None:
     submission.submit_experiment(store, toy())
     check, spec = sensitivity.claim(store, "me"), resolve_experiment(toy())
@@ -231,6 +233,7 @@ def test_a_step_that_is_delivered_twice_is_told_once(store: Store) -> None:
     assert kinds(store, WantedEvents(kinds=frozenset({EventKind.PROBED}))) == ["probed"] * 3
 
 
+@pytest.mark.dialects
 def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store: Store) -> None:
     submission.submit_experiment(store, toy())
 
@@ -292,6 +295,7 @@ def write_many(store: Store, name: int) -> None:
             store.write(dawdle)
 
 
+@pytest.mark.dialects
 def test_a_reader_that_resumes_among_many_writers_misses_nothing(store: Store) -> None:
     """Writers commit, roll back and dawdle; whoever reads meanwhile, a page after the other, sees every number once."""
     over = threading.Event()
@@ -490,7 +494,6 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(
 def test_a_stream_whose_reader_failed_is_resumed_by_the_client(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gaplab.api.clients.events.RETRY_S", 0.05)
     submission.submit_experiment(sqlite_store, toy())
     latest, failing = events.latest, iter([True])
 
@@ -502,7 +505,7 @@ def test_a_stream_whose_reader_failed_is_resumed_by_the_client(
 
     monkeypatch.setattr(events, "latest", fail_once)
     with served(sqlite_store) as (url, _), Client(url) as client:
-        found = take(client.events(), 1)
+        found = take(client.events(retry_s=0.05), 1)
 
     assert found[0].number == 1
     assert next(failing, None) is None
@@ -538,14 +541,11 @@ def test_a_service_that_stops_ends_its_streams(sqlite_store: Store) -> None:
     listening.join()
 
 
-def test_a_client_goes_on_where_it_was_when_the_service_comes_back(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("gaplab.api.clients.events.RETRY_S", 0.05)
+def test_a_client_goes_on_where_it_was_when_the_service_comes_back(sqlite_store: Store) -> None:
     submission.submit_experiment(sqlite_store, toy())
     with served(sqlite_store) as (url, _):
         client = Client(url)
-        stream = client.events()
+        stream = client.events(retry_s=0.05)
         found = take(stream, 1)
     submission.submit_experiment(sqlite_store, toy())
 
@@ -695,6 +695,7 @@ def test_a_number_beyond_the_latest_event_is_refused_with_both(store: Store) -> 
     assert all(each.json()["detail"].startswith("there is no event 2; the latest is 1.") for each in answers)
 
 
+@pytest.mark.dialects
 def test_streams_end_when_the_database_is_replaced_by_an_earlier_one(store: Store) -> None:
     for _ in range(3):
         submission.submit_experiment(store, toy())
