@@ -12,10 +12,9 @@ from fastapi import FastAPI
 
 from gaplab.api.app import create_app
 from gaplab.api.commands.cli import main
-from gaplab.services.running import execution
 from gaplab.services.store.session import Store
+from tests import experiments
 from tests.commands import Gaplab, Said, served
-from tests.experiments import run, some_log
 
 
 @pytest.fixture(scope="session")
@@ -73,11 +72,4 @@ def at_a_terminal(url: str) -> Callable[[str, str, str], pexpect.spawn]:
 @pytest.fixture
 def finish(sqlite_store: Store) -> Callable[[], None]:
     """Runs whatever is queued."""
-
-    def work() -> None:
-        while claims := execution.claim(sqlite_store, "test", limit=10):
-            for number, claim in enumerate(claims):
-                iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
-                run(sqlite_store, claim, some_log(iterations, recorded=1 + number / 10))
-
-    return work
+    return lambda: experiments.finish(sqlite_store)

@@ -5,7 +5,6 @@ import io
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from itertools import count
 
 import pytest
 from fastapi.testclient import TestClient
@@ -17,7 +16,7 @@ from gaplab.services.core.sensitivity import Effort, check
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import subject
 from gaplab.services.store.session import Store
-from tests.experiments import run, some_log, toy
+from tests.experiments import finish, run, toy
 
 TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 3}
 STUDY = {
@@ -34,15 +33,6 @@ STUDY = {
 def api(store: Store) -> Iterator[TestClient]:
     with TestClient(create_app(store)) as client:
         yield client
-
-
-def finish(store: Store) -> None:
-    """Run whatever is queued, each repetition to a different fitness."""
-    numbers = count()
-    while claims := execution.claim(store, "test", limit=10):
-        for claim in claims:
-            iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
-            run(store, claim, some_log(iterations, recorded=1 + 0.1 * next(numbers)))
 
 
 def test_a_submitted_experiment_exists_at_its_location_with_every_default_filled_in(api: TestClient) -> None:

@@ -23,19 +23,11 @@ from gaplab.services.specs.assembly import subject
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab, served
-from tests.experiments import run, some_log
+from tests.experiments import finish
 from tests.waiting import wait_until
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SMOKE = str(EXAMPLES / "smoke.json")
-
-
-def finish(store: Store) -> None:
-    """Run whatever is queued."""
-    while claims := execution.claim(store, "test", limit=10):
-        for number, claim in enumerate(claims):
-            iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
-            run(store, claim, some_log(iterations, recorded=1 + number / 10))
 
 
 def wait_for_submission(store: Store) -> None:
