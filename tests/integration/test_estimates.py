@@ -44,7 +44,6 @@ def test_the_rollouts_are_those_that_the_submitted_study_has(store: Store) -> No
     assert [each.iterations for each in found.experiments] == [3, 3, 0]
 
 
-@pytest.mark.dialects
 def test_the_time_is_that_of_rollouts_measured_here_with_the_same_robot_and_engine(store: Store) -> None:
     spec = StudySpec.model_validate(STUDY)
     before = estimate(store, spec, cores=2)

@@ -41,7 +41,6 @@ def every_page(list_page: Any, **filters: Any) -> Any:
     return items, pages
 
 
-@pytest.mark.dialects
 def test_a_submitted_experiment_is_stored_resolved_and_queued(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(name="mine"))
 
@@ -142,7 +141,6 @@ def test_pages_of_studies_have_every_study_once_newest_first(store: Store) -> No
     assert pages == 3
 
 
-@pytest.mark.dialects
 def test_a_list_is_filtered_by_study_state_and_strategy(store: Store) -> None:
     study = submission.submit_study(store, small_study())
     alone = submission.submit_experiment(store, toy())
@@ -196,7 +194,6 @@ def test_a_list_takes_as_many_queries_for_many_as_for_one(store: Store) -> None:
     assert queries() == one
 
 
-@pytest.mark.dialects
 def test_samples_and_probes_are_rows_in_the_order_of_the_log(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
     for claim in execution.claim(store, "me", 2):

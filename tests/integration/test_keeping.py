@@ -190,7 +190,6 @@ def test_nothing_is_deleted_that_is_under_way_or_holds_hardware(store: Store) ->
         lifecycle.ask_experiment(store, made.id, Verb.RETRY)
 
 
-@pytest.mark.dialects
 def test_a_worker_that_has_not_heard_of_the_deletion_writes_into_no_other_experiment(store: Store) -> None:
     made = submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)

@@ -271,7 +271,6 @@ def test_an_extension_is_confirmed_by_what_it_adds(sqlite_store: Store) -> None:
     assert extended.status_code == 202
 
 
-@pytest.mark.dialects
 def test_files_that_no_answer_names_have_a_limit_that_frees_itself(store: Store) -> None:
     api = TestClient(create_app(store, limits=Limits(unnamed_attachment_bytes=10)))
 

@@ -55,7 +55,6 @@ def asked(store: Store) -> Any:
     return counts
 
 
-@pytest.mark.dialects
 def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store: Store, tmp_path: Path) -> None:
     fill(store, 2 * IN_A_STUDY)
 

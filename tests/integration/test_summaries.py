@@ -63,7 +63,6 @@ def test_the_fitness_is_a_point_of_the_curve_and_not_the_mean_of_maxima(store: S
     assert listing.list_experiments(store).items[0].fitness == read.fitness
 
 
-@pytest.mark.dialects
 def test_while_it_runs_the_fitness_is_after_the_last_number_that_all_begun_have_reached(store: Store) -> None:
     made = submission.submit_experiment(store, toy(repetitions=3)).id
     first, second, _ = claims(store)[made]
