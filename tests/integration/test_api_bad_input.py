@@ -87,7 +87,7 @@ MISSPELT: list[tuple[dict[str, Any], str, object, str]] = [
 
 
 def test_a_misspelt_name_is_refused_with_its_place_and_the_nearest_name(api: TestClient) -> None:
-    wrong = []
+    wrong: list[Any] = []
     for change, pointer, value, nearest in MISSPELT:
         error = only_error(api.post("/experiments", json=LEAST | change))
         told = (error["pointer"], error["value"], error["nearest"], nearest in error["permitted"])
@@ -121,7 +121,7 @@ OUT_OF_RANGE: list[tuple[dict[str, Any], str]] = [
 
 
 def test_a_value_out_of_its_range_is_refused_with_its_place(api: TestClient) -> None:
-    wrong = []
+    wrong: list[Any] = []
     for change, pointer in OUT_OF_RANGE:
         answer = api.post("/experiments", content=json.dumps(LEAST | change), headers=JSON)
         error = problem(answer, 422)["errors"][0]
@@ -199,16 +199,16 @@ def test_a_list_of_strategies_is_no_field_of_an_experiment_and_it_says_which_is(
 
 
 def test_a_body_that_is_no_json_or_no_object_or_breaks_parsers_is_refused(api: TestClient) -> None:
-    texts = ("", "{", "[1, 2", '{"strategy": "random"} x', "nonsense", "\x00", '{"a": }')
-    breaking = (b"\xff\xfe\x00", b'{"seed": ' + b"9" * 5000 + b"}", b"[" * 100_000)
-    others = ("[]", "1", '"random"', "null", "true")
+    texts: tuple[str | bytes, ...] = ("", "{", "[1, 2", '{"strategy": "random"} x', "nonsense", "\x00", '{"a": }')
+    breaking: tuple[str | bytes, ...] = (b"\xff\xfe\x00", b'{"seed": ' + b"9" * 5000 + b"}", b"[" * 100_000)
+    others: tuple[str | bytes, ...] = ("[]", "1", '"random"', "null", "true")
 
     kinds = [
         [problem(api.post("/experiments", content=body, headers=JSON), 422)["type"].rpartition(":")[2] for body in part]
         for part in (texts, breaking, others)
     ]
 
-    assert {*kinds[0], *kinds[2]} <= {"not-json", "invalid-spec"}
+    assert set(kinds[0]) <= {"not-json", "invalid-spec"}
     assert kinds[1] == ["not-json"] * 3
 
 

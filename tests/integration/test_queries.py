@@ -200,7 +200,7 @@ ERRORS = {
 
 @pytest.mark.parametrize("read", [listing.list_experiments, listing.list_studies])
 def test_a_mistake_in_a_query_is_named_with_its_place(sqlite_store: Store, read: Any) -> None:
-    wrong = []
+    wrong: list[Any] = []
     for q, (message, nearest) in ERRORS.items():
         with pytest.raises(InvalidSpec) as refused:
             read(sqlite_store, ListFilter(q=q))
