@@ -326,7 +326,7 @@ def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_othe
 ) -> None:
     store = postgres_store
     for _ in range(3):
-        submission.submit_experiment(store, toy(repetitions=8))
+        submission.submit_experiment(store, toy(repetitions=5))
 
     def work(owner: str) -> int:
         done = 0
@@ -337,7 +337,7 @@ def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_othe
         return done
 
     with ThreadPoolExecutor(4) as pool:
-        assert sum(pool.map(work, "abcd")) == 24
+        assert sum(pool.map(work, "abcd")) == 15
 
     found = [each.number for each in events.page(store, 0, WantedEvents(), limit=1_000).items]
     assert found == list(range(1, len(found) + 1))
