@@ -1,6 +1,8 @@
 """Settings of the service and limits of the API. Each process reads them from the environment once, at its start."""
 
+import os
 import shlex
+from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, PositiveInt, ValidationError
@@ -42,14 +44,16 @@ class _Environment(BaseSettings):
         return (init_settings,)
 
     @classmethod
-    def from_environment(cls) -> Self:
-        """Return the values of the environment; an empty variable counts as not set.
+    def from_environment(cls, environment: Mapping[str, str] = os.environ) -> Self:
+        """Return the values of an environment, by default the process's; an empty variable counts as not set.
 
         Raises:
             InvalidSetting: a value is not permitted; the message names its variable.
         """
+        source = EnvSettingsSource(cls)
+        source.env_vars = {name.lower(): value for name, value in environment.items() if value}
         try:
-            return cls(**EnvSettingsSource(cls)())
+            return cls(**source())
         except ValidationError as error:
             (first, *_) = error.errors()
             variable = f"{cls.model_config['env_prefix']}{first['loc'][0]}".upper()

@@ -8,7 +8,6 @@ from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
 from gaplab.schemas.events import EventPage, EventRead
 
 RETRY_S = 1.0
-"""Pause before a broken stream is opened again."""
 
 SILENCE_S = 45.0
 """Longest silence of a stream that works: the service sends a comment every 15 s."""
@@ -21,23 +20,31 @@ class EventLog:
         self._connection = connection
 
     def events(
-        self, *, follow: bool = True, patience_s: float = 60.0, **filters: str | int | Sequence[str] | None
+        self,
+        *,
+        follow: bool = True,
+        patience_s: float = 60.0,
+        retry_s: float = RETRY_S,
+        **filters: str | int | Sequence[str] | None,
     ) -> Iterator[EventRead]:
         """Yield events in their order, each once.
 
         Args:
             follow: continue forever with new events, over broken connections; otherwise, end with the latest.
             patience_s: longest time without a service before the error is raised.
+            retry_s: pause before a broken stream is opened again.
             filters: as in the API: experiment, study, kind, after; left out: all events.
         """
         if follow:
-            yield from self._follow(filters, patience_s)
+            yield from self._follow(filters, patience_s, retry_s)
             return
         while (page := self._connection.get(EventPage, "/events/page", **filters)).items:
             yield from page.items
             filters["after"] = page.last
 
-    def _follow(self, filters: dict[str, str | int | Sequence[str] | None], patience_s: float) -> Iterator[EventRead]:
+    def _follow(
+        self, filters: dict[str, str | int | Sequence[str] | None], patience_s: float, retry_s: float
+    ) -> Iterator[EventRead]:
         parameters: dict[str, Parameter] = {name: value for name, value in filters.items() if value is not None}
         last: int | None = None
         away_since: float | None = None
@@ -53,7 +60,7 @@ class EventLog:
                 away_since = now if away_since is None else away_since
                 if is_final(error) or now - away_since > patience_s:
                     raise
-            time.sleep(RETRY_S)
+            time.sleep(retry_s)
 
     def _stream(self, parameters: dict[str, Parameter], last: int | None) -> Iterator[EventRead | None]:
         """Yield each event of one stream, and None for any other sign that the service is there."""

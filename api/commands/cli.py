@@ -1,6 +1,7 @@
 """The `gaplab` command: it runs the service, and sends requests to a running one."""
 
 import sys
+from collections.abc import Sequence
 
 import typer
 
@@ -19,10 +20,10 @@ from gaplab.api.commands.exit_codes import CommandError, Exit, code_of
 from gaplab.services.core.errors import GaplabError
 
 
-def main() -> None:
-    """Run the command; an error prints a sentence and sets the exit code, without a traceback."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command, by default with the process's arguments; an error is a sentence and an exit code."""
     try:
-        app(prog_name="gaplab")
+        app(arguments, prog_name="gaplab")
     except NotSubmitted as error:
         _exit([str(error)], Exit.INTERRUPTED)
     except (ServiceError, ServiceUnreachable, CommandError, GaplabError) as error:

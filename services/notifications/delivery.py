@@ -56,16 +56,16 @@ def deliver(message: Notification, channel: Channel, webhook: str | None, notify
     return post(webhook, message, notify.secret)
 
 
-def post(url: str, message: Notification, secret: str | None = None) -> Attempt:
+def post(url: str, message: Notification, secret: str | None = None, *, within_s: float = WEBHOOK_S) -> Attempt:
     """POST the message as JSON. Redirects are not followed, and the body of the answer is not read."""
     body = message.model_dump_json().encode()
     headers = {"Content-Type": "application/json", "User-Agent": "gaplab", "Gaplab-Notification": message.id}
     if secret:
         headers["Gaplab-Signature"] = signature(secret, body, int(time.time()))
     try:
-        status = _status(url, body, headers)
+        status = _status(url, body, headers, within_s)
     except TimeoutError:
-        return Attempt(f"it did not answer within {WEBHOOK_S:g} s")
+        return Attempt(f"it did not answer within {within_s:g} s")
     except (httpx2.HTTPError, httpx2.InvalidURL, UnicodeError) as error:
         return Attempt(f"it cannot be reached ({type(error).__name__})")
     if 200 <= status < 300:
@@ -73,16 +73,16 @@ def post(url: str, message: Notification, secret: str | None = None) -> Attempt:
     return Attempt(f"it answered {status}", hopeless=status in _GONE or 300 <= status < 400)
 
 
-def _status(url: str, body: bytes, headers: dict[str, str]) -> int:
+def _status(url: str, body: bytes, headers: dict[str, str], within_s: float) -> int:
     """POST, and return the status of the answer.
 
     Raises:
-        TimeoutError: there is no answer after `WEBHOOK_S`, even if each of its bytes came soon after the one before.
+        TimeoutError: there is no answer after `within_s`, even if each of its bytes came soon after the one before.
     """
 
     async def answered() -> int:
         async with (
-            asyncio.timeout(WEBHOOK_S),
+            asyncio.timeout(within_s),
             httpx2.AsyncClient(timeout=None, follow_redirects=False) as client,
             client.stream("POST", url, content=body, headers=headers) as answer,
         ):

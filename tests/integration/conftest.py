@@ -14,13 +14,12 @@ from fastapi import FastAPI
 
 from gaplab.api.app import create_app
 from gaplab.api.commands.cli import main
-from gaplab.services.running import execution
 from gaplab.services.store.session import Store
+from tests import experiments
 from tests.commands import Gaplab, Said, served
-from tests.experiments import run, some_log
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def service() -> Iterator[tuple[FastAPI, str]]:
     """A service without workers, and without a database yet."""
     app = create_app(Store("sqlite://"))
@@ -49,14 +48,15 @@ def other(request: pytest.FixtureRequest, store: Store, sqlite_template: Path, t
 
 @pytest.fixture
 def gaplab(url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Gaplab:
-    """Runs the command as a shell would."""
-    monkeypatch.setenv("GAPLAB_URL", url)
+    """Runs the command as a shell would, with these variables in the environment."""
 
-    def command(*arguments: str, stdin: str = "") -> Said:
-        monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
-        monkeypatch.setattr(sys, "stdin", io.StringIO(stdin))
-        with pytest.raises(SystemExit) as ended:
-            main()
+    def command(*arguments: str, stdin: str = "", **environment: str) -> Said:
+        with monkeypatch.context() as shell:
+            shell.setattr("sys.stdin", io.StringIO(stdin))
+            for name, value in {"GAPLAB_URL": url, **environment}.items():
+                shell.setenv(name, value)
+            with pytest.raises(SystemExit) as ended:
+                main(arguments)
         printed = capsys.readouterr()
         assert "Traceback" not in printed.out + printed.err
         return Said(int(ended.value.code or 0), printed.out, printed.err)
@@ -85,11 +85,4 @@ def at_a_terminal(url: str) -> Callable[[str, str, str], pexpect.spawn]:
 @pytest.fixture
 def finish(sqlite_store: Store) -> Callable[[], None]:
     """Runs whatever is queued."""
-
-    def work() -> None:
-        while claims := execution.claim(sqlite_store, "test", limit=10):
-            for number, claim in enumerate(claims):
-                iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
-                run(sqlite_store, claim, some_log(iterations, recorded=1 + number / 10))
-
-    return work
+    return lambda: experiments.finish(sqlite_store)

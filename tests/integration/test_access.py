@@ -2,10 +2,10 @@
 
 import logging
 import re
-import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,7 +17,6 @@ from gaplab import migrations
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError
-from gaplab.api.commands.cli import main
 from gaplab.schemas.access import Role
 from gaplab.services import access
 from gaplab.services.access import authenticate, create_token, is_loopback
@@ -26,18 +25,13 @@ from gaplab.services.settings import Settings
 from gaplab.services.store.engine import PATIENCE_S, WRITES, open_engine
 from gaplab.services.store.models import TokenRow
 from gaplab.services.store.session import Store
+from tests.commands import Gaplab
 
 TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 1}
 
 
 @pytest.fixture
-def api(store: Store) -> Iterator[TestClient]:
-    with TestClient(create_app(store)) as client:
-        yield client
-
-
-@pytest.fixture
-def lite(sqlite_store: Store) -> Iterator[TestClient]:
+def api(sqlite_store: Store) -> Iterator[TestClient]:
     with TestClient(create_app(sqlite_store), raise_server_exceptions=False) as client:
         yield client
 
@@ -47,13 +41,13 @@ def bearer(store: Store, role: Role) -> dict[str, str]:
 
 
 def test_on_loopback_all_is_open_until_a_token_is_made_and_stays_closed_after_the_last_is_revoked(
-    store: Store, api: TestClient
+    sqlite_store: Store, api: TestClient
 ) -> None:
     before = api.post("/experiments", json=TOY).status_code
-    made = create_token(store, Role.READER)
+    made = create_token(sqlite_store, Role.READER)
     refused = api.get("/experiments")
     let_in = api.get("/experiments", headers={"Authorization": f"Bearer {made.secret}"}).status_code
-    access.revoke_token(store, made.token.id)
+    access.revoke_token(sqlite_store, made.token.id)
     revoked = api.get("/experiments", headers={"Authorization": f"Bearer {made.secret}"})
 
     assert (before, refused.status_code, let_in, revoked.status_code) == (202, 401, 200, 401)
@@ -79,10 +73,10 @@ def test_beyond_loopback_a_token_is_needed_even_where_none_was_ever_made(sqlite_
     ],
 )
 def test_each_role_may_do_what_it_is_for_and_no_more(
-    store: Store, api: TestClient, role: Role, permitted: set[str]
+    sqlite_store: Store, api: TestClient, role: Role, permitted: set[str]
 ) -> None:
     made = api.post("/experiments", json=TOY).json()["id"]
-    headers = bearer(store, role)
+    headers = bearer(sqlite_store, role)
     answers = {
         "read": api.get(f"/experiments/{made}", headers=headers),
         "estimate": api.post("/studies/estimate", json={"robot": "toy_function"}, headers=headers),
@@ -101,7 +95,7 @@ def test_each_role_may_do_what_it_is_for_and_no_more(
 
 
 def test_every_route_wants_a_token_but_those_for_health_and_the_files_of_the_page(
-    sqlite_store: Store, lite: TestClient
+    sqlite_store: Store, api: TestClient
 ) -> None:
     create_token(sqlite_store, Role.ADMIN)
     document = create_app(sqlite_store).openapi()
@@ -109,7 +103,7 @@ def test_every_route_wants_a_token_but_those_for_health_and_the_files_of_the_pag
     pages = [("get", path) for path in ("/", "/docs", "/redoc", "/openapi.json", "/assets/docs/swagger-ui.css", "/no")]
 
     found = {
-        path: lite.request(method, path.format(id="x", number=0, name="x", robot="x")).status_code
+        path: api.request(method, path.format(id="x", number=0, name="x", robot="x")).status_code
         for method, path in [*routes, *pages]
     }
 
@@ -121,9 +115,8 @@ def test_every_route_wants_a_token_but_those_for_health_and_the_files_of_the_pag
     }
 
 
-@pytest.mark.parametrize(
-    "header",
-    [
+def test_what_is_no_token_lets_nobody_in_even_where_none_is_needed(api: TestClient) -> None:
+    headers: list[Any] = [
         "Bearer",
         "Bearer ",
         "Bearer x",
@@ -132,10 +125,11 @@ def test_every_route_wants_a_token_but_those_for_health_and_the_files_of_the_pag
         "Bearer gaplab_abc_" + "0" * 64,
         "Bearer gaplab_" + "a" * 5000 + "_" + "0" * 64,
         "Bearer \u00e9".encode("latin-1"),
-    ],
-)
-def test_what_is_no_token_lets_nobody_in_even_where_none_is_needed(lite: TestClient, header: str | bytes) -> None:
-    assert lite.get("/experiments", headers={"Authorization": header}).status_code == 401  # type: ignore[arg-type]
+    ]
+
+    found = {each: api.get("/experiments", headers={"Authorization": each}).status_code for each in headers}
+
+    assert found == dict.fromkeys(headers, 401)
 
 
 def test_a_token_with_another_secret_lets_nobody_in(store: Store) -> None:
@@ -164,6 +158,7 @@ def test_a_secret_is_stored_nowhere_and_a_use_is_noted(store: Store) -> None:
     assert made.secret.rpartition("_")[2] not in str(rows)
 
 
+@pytest.mark.dialects
 def test_a_request_does_not_wait_until_its_use_can_be_noted(store: Store) -> None:
     made = create_token(store, Role.READER)
 
@@ -220,44 +215,45 @@ def test_an_unknown_token_cannot_be_revoked(store: Store) -> None:
 
 
 def test_no_token_is_in_logs_answers_or_problems_whatever_happens(
-    sqlite_store: Store, lite: TestClient, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    sqlite_store: Store, api: TestClient, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     caplog.set_level(logging.DEBUG)
     headers = bearer(sqlite_store, Role.READER)
     secret = headers["Authorization"].rpartition("_")[2]
-    said = [lite.get("/experiments", headers=headers), lite.post("/experiments", json=TOY, headers=headers)]
+    said = [api.get("/experiments", headers=headers), api.post("/experiments", json=TOY, headers=headers)]
     monkeypatch.setattr("gaplab.services.experiments.listing.list_experiments", lambda *_, **__: 1 / 0)
-    said.append(lite.get("/experiments", headers=headers))
-    said.append(lite.get("/experiments", headers={"Authorization": f"Bearer gaplab_x_{secret}"}))
+    said.append(api.get("/experiments", headers=headers))
+    said.append(api.get("/experiments", headers={"Authorization": f"Bearer gaplab_x_{secret}"}))
 
     assert [each.status_code for each in said] == [200, 403, 500, 401]
     assert secret not in caplog.text
     assert not any(secret in each.text + str(each.headers) for each in said)
 
 
-@pytest.mark.parametrize(
-    "headers",
-    [
+def test_without_tokens_no_page_of_another_site_is_served(sqlite_store: Store) -> None:
+    api = TestClient(create_app(sqlite_store, Settings()), base_url="http://127.0.0.1:8000")
+    strange = [
         {"host": "evil.example"},
         {"origin": "http://evil.example"},
         {"origin": "null"},
         {"host": "["},
         {"origin": "http://["},
-    ],
-)
-def test_without_tokens_no_page_of_another_site_is_served(sqlite_store: Store, headers: dict[str, str]) -> None:
-    api = TestClient(create_app(sqlite_store, Settings()), base_url="http://127.0.0.1:8000")
+    ]
 
-    assert api.get("/experiments", headers=headers).status_code == 403
-    assert api.post("/experiments", json=TOY, headers=headers).status_code == 403
-    assert api.get("/experiments", headers={"origin": "http://127.0.0.1:8000"}).status_code == 200
-    assert api.get("/experiments", headers={"host": "localhost:8000"}).status_code == 200
-    assert api.get("/experiments", headers=headers | bearer(sqlite_store, Role.READER)).status_code == 200
+    refused = [api.get("/experiments", headers=each).status_code for each in strange]
+    refused += [api.post("/experiments", json=TOY, headers=each).status_code for each in strange]
+    own = ({"origin": "http://127.0.0.1:8000"}, {"host": "localhost:8000"})
+    served = [api.get("/experiments", headers=each).status_code for each in own]
+    token = bearer(sqlite_store, Role.READER)
+    served += [api.get("/experiments", headers=each | token).status_code for each in strange]
+
+    assert refused == [403] * 10
+    assert served == [200] * 7
 
 
-def test_other_origins_are_told_nothing_by_cors(lite: TestClient) -> None:
-    plain = lite.get("/experiments", headers={"origin": "http://evil.example"})
-    asked = lite.options(
+def test_other_origins_are_told_nothing_by_cors(api: TestClient) -> None:
+    plain = api.get("/experiments", headers={"origin": "http://evil.example"})
+    asked = api.options(
         "/experiments", headers={"origin": "http://evil.example", "access-control-request-method": "POST"}
     )
 
@@ -265,43 +261,22 @@ def test_other_origins_are_told_nothing_by_cors(lite: TestClient) -> None:
     assert not [name for name in (*plain.headers, *asked.headers) if name.startswith("access-control")]
 
 
-@pytest.mark.parametrize(
-    ("host", "expected"),
-    [
-        ("127.0.0.1", True),
-        ("127.8.8.8", True),
-        ("::1", True),
-        ("localhost", True),
-        ("0.0.0.0", False),
-        ("::", False),
-        ("192.168.1.2", False),
-        ("localhost.evil.example", False),
-        ("", False),
-    ],
-)
-def test_loopback_is_what_only_this_machine_reaches(host: str, expected: bool) -> None:
-    assert is_loopback(host) is expected
+def test_loopback_is_what_only_this_machine_reaches() -> None:
+    inside = ("127.0.0.1", "127.8.8.8", "::1", "localhost")
+    outside = ("0.0.0.0", "::", "192.168.1.2", "localhost.evil.example", "")
 
-
-def command(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: str
-) -> tuple[int, str, str]:
-    monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    said = capsys.readouterr()
-    return int(ended.value.code or 0), said.out, said.err
+    assert [host for host in (*inside, *outside) if is_loopback(host)] == list(inside)
 
 
 def test_the_command_makes_lists_and_revokes_tokens_in_the_database_itself(
-    sqlite_url: str, sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    sqlite_url: str, sqlite_store: Store, gaplab: Gaplab
 ) -> None:
-    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
-    _, secret, about = command(monkeypatch, capsys, "token", "create", "--role", "runner", "--name", "night runs")
+    database = {"GAPLAB_DATABASE_URL": sqlite_url}
+    _, secret, about = gaplab("token", "create", "--role", "runner", "--name", "night runs", **database)
     caller = authenticate(sqlite_store, secret.strip(), required=True)
-    _, listed, _ = command(monkeypatch, capsys, "token", "list")
-    code, _, _ = command(monkeypatch, capsys, "token", "revoke", caller.token or "")
-    _, after, _ = command(monkeypatch, capsys, "token", "list")
+    _, listed, _ = gaplab("token", "list", **database)
+    code, _, _ = gaplab("token", "revoke", caller.token or "", **database)
+    _, after, _ = gaplab("token", "list", **database)
 
     assert caller.role is Role.RUNNER
     assert "once" in about
@@ -315,15 +290,14 @@ def test_the_command_makes_lists_and_revokes_tokens_in_the_database_itself(
 
 
 def test_a_token_is_refused_where_it_would_migrate_a_database_that_a_service_may_use(
-    tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, gaplab: Gaplab
 ) -> None:
     url = f"sqlite:///{tmp_path / 'old.db'}"
     engine = open_engine(url, enforce_foreign_keys=False)
     with engine.execution_options(**{WRITES: True}).begin() as connection:
         alembic.upgrade(migrations.configuration(connection), "0013")
-    monkeypatch.setenv("GAPLAB_DATABASE_URL", url)
 
-    code, secret, said = command(monkeypatch, capsys, "token", "create", "--role", "admin")
+    code, secret, said = gaplab("token", "create", "--role", "admin", GAPLAB_DATABASE_URL=url)
 
     with engine.connect() as connection:
         found = connection.exec_driver_sql("SELECT version_num FROM alembic_version").scalars().all()
@@ -333,32 +307,31 @@ def test_a_token_is_refused_where_it_would_migrate_a_database_that_a_service_may
     assert "run `python -m migrations`" in said
 
 
-def test_a_first_token_can_be_made_before_the_database_was_ever_used(
-    tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("GAPLAB_DATABASE_URL", f"sqlite:///{tmp_path / 'new.db'}")
+def test_a_first_token_can_be_made_before_the_database_was_ever_used(tmp_path: Path, gaplab: Gaplab) -> None:
+    new = f"sqlite:///{tmp_path / 'new.db'}"
 
-    code, secret, _ = command(monkeypatch, capsys, "token", "create", "--role", "admin")
+    code, secret, _ = gaplab("token", "create", "--role", "admin", GAPLAB_DATABASE_URL=new)
 
     assert code == 0
     assert secret.startswith("gaplab_")
 
 
-@pytest.mark.parametrize("way", ["argument", "environment", "none"])
-def test_a_client_shows_its_token(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, way: str) -> None:
+def test_a_client_shows_the_token_that_it_is_given_or_that_of_the_environment(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     secret = create_token(sqlite_store, Role.READER).secret
-    monkeypatch.delenv("GAPLAB_TOKEN", raising=False)
-    if way == "environment":
-        monkeypatch.setenv("GAPLAB_TOKEN", secret)
     transport = TestClient(create_app(sqlite_store))._transport  # what carries requests into the app itself
 
-    with Client("http://testserver", token=secret if way == "argument" else None, transport=transport) as client:
-        if way == "none":
-            with pytest.raises(ServiceError, match="GAPLAB_TOKEN") as refused:
-                client.experiments()
-            assert refused.value.problem.status == 401
-        else:
-            assert client.experiments().items == ()
+    def items(token: str | None = None) -> tuple[Any, ...]:
+        with Client("http://testserver", token=token, transport=transport) as client:
+            return client.experiments().items
+
+    with pytest.raises(ServiceError, match="GAPLAB_TOKEN") as refused:
+        items()
+    assert refused.value.problem.status == 401
+    assert items(secret) == ()
+    monkeypatch.setenv("GAPLAB_TOKEN", secret)
+    assert items() == ()
 
 
 def test_only_an_admin_may_demand_what_an_admin_may() -> None:

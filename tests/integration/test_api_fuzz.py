@@ -1,4 +1,7 @@
-"""Whatever is sent, the API answers with a result or with a problem that is valid JSON, and never fails itself."""
+"""Whatever is sent, the API answers with a result or with a problem that is valid JSON, and never fails itself.
+
+`test_mutated_specs`, `test_api_schema` and `test_api_bad_input` have samples of the same in each run.
+"""
 
 import copy
 import json
@@ -16,6 +19,8 @@ from gaplab.migrations import upgrade
 from gaplab.schemas.problems import Problem
 from gaplab.services.store.session import Store
 from tests.mutated_specs import EXPERIMENT, places
+
+pytestmark = pytest.mark.release
 
 ANYTHING = st.recursive(
     st.none()

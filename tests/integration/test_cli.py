@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.clients.errors import ServiceUnreachable
 from gaplab.api.commands import demo
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.core.optimizers.steady_state import SteadyState
@@ -23,19 +23,11 @@ from gaplab.services.specs.assembly import subject
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab, served
-from tests.experiments import run, some_log
+from tests.experiments import finish
 from tests.waiting import wait_until
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SMOKE = str(EXAMPLES / "smoke.json")
-
-
-def finish(store: Store) -> None:
-    """Run whatever is queued."""
-    while claims := execution.claim(store, "test", limit=10):
-        for number, claim in enumerate(claims):
-            iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
-            run(store, claim, some_log(iterations, recorded=1 + number / 10))
 
 
 def wait_for_submission(store: Store) -> None:
@@ -275,22 +267,20 @@ def test_no_service_is_a_sentence_that_says_how_to_start_one(gaplab: Gaplab) -> 
     assert "gaplab serve" in said.err
 
 
-@pytest.mark.parametrize("address", ["nonsense", "http://[", "ftp://127.0.0.1", "http://no-such-host.invalid", ""])
-def test_an_address_that_is_none_is_a_sentence(gaplab: Gaplab, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("GAPLAB_URL", address)
-    said = gaplab("list")
+def test_an_address_that_is_none_is_a_sentence(gaplab: Gaplab) -> None:
+    for address in ("nonsense", "http://[", "ftp://127.0.0.1", "http://no-such-host.invalid", ""):
+        said = gaplab("list", GAPLAB_URL=address)
 
-    assert said.code == Exit.UNREACHABLE
-    assert said.err.count("\n") == 1
+        assert (said.code, said.err.count("\n")) == (Exit.UNREACHABLE, 1), address
 
 
-@pytest.mark.parametrize("command", ["show", "curve", "cancel"])
-@pytest.mark.parametrize("name", ["nope", "..", "", "a/b", "x?y", "%", "ü"])
-def test_an_unknown_id_is_a_sentence(gaplab: Gaplab, command: str, name: str) -> None:
-    said = gaplab(command, name)
+def test_an_id_that_is_unknown_or_can_be_none_is_a_sentence(gaplab: Gaplab) -> None:
+    names = ("nope", "..", "", " ", "a/b", "x?y", "%", "ü", "\udcff")
+    for command in (*(("show", name) for name in names), ("curve", "a/b"), ("cancel", "..")):
+        said = gaplab(*command)
 
-    assert said.code == Exit.NOT_FOUND
-    assert re.fullmatch(r"gaplab: there is no.*\n", said.err)
+        assert said.code == Exit.NOT_FOUND, command
+        assert re.fullmatch(r"gaplab: there is no.*\n", said.err), command
 
 
 def test_every_mistake_in_a_spec_has_a_line_of_its_own(gaplab: Gaplab) -> None:
@@ -301,58 +291,36 @@ def test_every_mistake_in_a_spec_has_a_line_of_its_own(gaplab: Gaplab) -> None:
     assert "did you mean 'simulated_fit'?" in said.err
 
 
-@pytest.mark.parametrize("text", ["", "{", "[1]", '{"seed": NaN}', "[" * 100_000, '"text"'])
-def test_a_file_that_is_no_spec_is_a_sentence(gaplab: Gaplab, tmp_path: Path, text: str) -> None:
+def test_a_file_that_is_no_spec_or_cannot_be_read_is_a_sentence(gaplab: Gaplab, tmp_path: Path) -> None:
     file = tmp_path / "spec.json"
-    file.write_text(text)
+    for text in ("", "{", "[1]", '{"seed": NaN}', "[" * 100_000, '"text"'):
+        file.write_text(text)
+        said = gaplab("submit", str(file))
 
-    said = gaplab("submit", str(file))
+        assert (said.code, said.err.count("\n")) == (Exit.FILE, 1), text[:20]
+        assert said.err.startswith(f"gaplab: {file}")
+    for name in ("missing.json", ".", "\udcff.json"):
+        said = gaplab("submit", name)
 
-    assert said.code == Exit.FILE
-    assert said.err.startswith(f"gaplab: {file}")
-    assert said.err.count("\n") == 1
-
-
-@pytest.mark.parametrize("file", ["missing.json", ".", "\udcff.json"])
-def test_a_file_that_cannot_be_read_is_a_sentence(gaplab: Gaplab, file: str) -> None:
-    said = gaplab("submit", file)
-
-    assert said.code == Exit.FILE
-    assert said.err.count("\n") == 1
+        assert (said.code, said.err.count("\n")) == (Exit.FILE, 1), name
 
 
-def test_a_file_that_is_there_already_is_a_sentence(
-    gaplab: Gaplab, sqlite_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
+def test_a_file_that_is_there_already_is_a_sentence(gaplab: Gaplab, sqlite_url: str, tmp_path: Path) -> None:
     file = tmp_path / "there.db"
     file.touch()
 
-    said = gaplab("backup", str(file))
+    said = gaplab("backup", str(file), GAPLAB_DATABASE_URL=sqlite_url)
 
     assert (said.code, said.err) == (Exit.FILE, f"gaplab: {file}: a file of this name is there already\n")
 
 
-@pytest.mark.parametrize("id_", ["", " ", "..", "a/b", "é", "\udcff"])
-def test_an_id_that_can_be_none_is_not_found(gaplab: Gaplab, id_: str) -> None:
-    assert gaplab("show", id_).code == Exit.NOT_FOUND
+def test_a_token_that_cannot_be_one_is_said_at_once(gaplab: Gaplab) -> None:
+    for token in ("a\nb", "é", "\udcff"):
+        assert "the token has characters" in gaplab("list", GAPLAB_TOKEN=token).err
 
 
-@pytest.mark.parametrize("token", ["a\nb", "é", "\udcff"])
-def test_a_token_that_cannot_be_one_is_said_at_once(
-    gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch, token: str
-) -> None:
-    monkeypatch.setenv("GAPLAB_TOKEN", token)
-
-    assert "the token has characters" in gaplab("list").err
-
-
-def test_a_token_that_is_none_is_an_id_that_is_none(
-    gaplab: Gaplab, sqlite_url: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
-
-    assert gaplab("token", "revoke", "nobody").code == Exit.NOT_FOUND
+def test_a_token_that_is_none_is_an_id_that_is_none(gaplab: Gaplab, sqlite_url: str) -> None:
+    assert gaplab("token", "revoke", "nobody", GAPLAB_DATABASE_URL=sqlite_url).code == Exit.NOT_FOUND
 
 
 def test_wrong_use_of_the_command_ends_with_2_and_help_tells_the_codes(gaplab: Gaplab) -> None:
@@ -361,49 +329,33 @@ def test_wrong_use_of_the_command_ends_with_2_and_help_tells_the_codes(gaplab: G
     assert "Exit codes" in gaplab("--help").out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("list", "--limit", "-1"), 'it must be at least 1, not "-1"'),
-        (("list", "--limit", "abc"), 'it must be a whole number, not "abc"'),
-        (("watch", "e1", "--every", "abc"), 'it must be a finite number, not "abc"'),
-        (("compare", "e1", "--format", "xml"), "'--format': 'xml' is not one of 'table',"),
-        (("views", "save", "mine", "--shows", "xml"), "'--shows': 'xml' is not one of 'all',"),
-    ],
-)
-def test_a_wrong_argument_is_named_with_what_is_permitted(
-    gaplab: Gaplab, arguments: tuple[str, ...], message: str
-) -> None:
-    said = gaplab(*arguments)
+def test_a_wrong_argument_is_named_with_what_is_permitted(gaplab: Gaplab) -> None:
+    wrong = {
+        ("list", "--limit", "-1"): 'it must be at least 1, not "-1"',
+        ("list", "--limit", "abc"): 'it must be a whole number, not "abc"',
+        ("watch", "e1", "--every", "abc"): 'it must be a finite number, not "abc"',
+        ("compare", "e1", "--format", "xml"): "'--format': 'xml' is not one of 'table',",
+        ("views", "save", "mine", "--shows", "xml"): "'--shows': 'xml' is not one of 'all',",
+    }
 
-    assert (said.code, message in said.err) == (Exit.USAGE, True)
+    for arguments, message in wrong.items():
+        said = gaplab(*arguments)
+        assert (said.code, message in said.err) == (Exit.USAGE, True), arguments
 
 
-def test_a_port_that_is_no_number_in_the_environment_is_a_sentence(
-    gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("GAPLAB_PORT", "eighty")
-
-    said = gaplab("list")
+def test_a_port_that_is_no_number_in_the_environment_is_a_sentence(gaplab: Gaplab) -> None:
+    said = gaplab("list", GAPLAB_PORT="eighty")
 
     assert said.code == Exit.FAILED
     assert "GAPLAB_PORT is 'eighty'" in said.err
 
 
-@pytest.mark.parametrize("example", sorted(EXAMPLES.glob("*.json")), ids=lambda path: path.name)
-def test_every_example_is_accepted_and_says_its_name(gaplab: Gaplab, example: Path) -> None:
-    said = gaplab("submit", str(example))
+def test_every_example_is_accepted_and_says_its_name(gaplab: Gaplab) -> None:
+    for example in EXAMPLES.glob("*.json"):
+        said = gaplab("submit", str(example))
 
-    assert said.code == 0, said.err
-    assert json.loads(example.read_text())["name"]
-
-
-def test_the_client_raises_the_services_problem(url: str) -> None:
-    with Client(url) as client, pytest.raises(ServiceError) as refused:
-        client.submit({"strategy": "simulated_fti"})
-
-    assert refused.value.problem.status == 422
-    assert refused.value.problem.errors[0].nearest == "simulated_fit"
+        assert said.code == 0, said.err
+        assert json.loads(example.read_text())["name"]
 
 
 def test_the_client_knows_when_what_answers_is_no_gaplab() -> None:

@@ -20,7 +20,6 @@ from fastapi.testclient import TestClient
 import gaplab
 from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable
 from gaplab.api.app import create_app
-from gaplab.api.clients import events as stream
 from gaplab.api.clients import results, tables
 from gaplab.api.clients.records import experiments_of
 from gaplab.schemas.access import Role
@@ -98,19 +97,17 @@ def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, 
     assert values.groupby(["experiment", "evaluations"])["fitness"].mean().notna().all()
 
 
-@pytest.mark.parametrize(
-    ("spec", "said"),
-    [
+def test_what_is_no_spec_is_not_sent(client: Client, network: InProcess) -> None:
+    wrong: list[tuple[Any, str]] = [
         ("examples/smoke.json", "not 'examples/smoke.json'; read a file with json.loads"),
         (Path("smoke.json"), "smoke.json'.; read a file with json.loads"),
         ([], r"a spec is a dict, an ExperimentSpec or a StudySpec, not \[\]$"),
         (None, "not None$"),
-    ],
-)
-def test_what_is_no_spec_is_not_sent(client: Client, network: InProcess, spec: Any, said: str) -> None:
-    for send in (client.submit, client.estimate, client.check):
-        with pytest.raises(TypeError, match=said):
-            send(spec)
+    ]
+    for spec, said in wrong:
+        for send in (client.submit, client.estimate, client.check):
+            with pytest.raises(TypeError, match=said):
+                send(spec)
 
     assert network.asked == []
 
@@ -260,14 +257,6 @@ def test_predictions_that_take_too_long_say_how_many_are_left() -> None:
         pytest.raises(TimeoutError, match="1 predictions of e are not computed"),
     ):
         client.predictions("e", every_s=0, timeout_s=0)
-
-
-@pytest.mark.parametrize("method", ["samples", "simulators"])
-def test_nothing_yet_is_an_empty_frame_with_the_same_columns(client: Client, method: str) -> None:
-    found = getattr(client, method)(client.submit(SMALL).id)
-
-    assert found.empty
-    assert {"repetition", "iteration"} <= set(found)
 
 
 def test_without_pandas_the_message_is_the_line_that_installs_it(
@@ -461,11 +450,8 @@ def test_a_spec_with_several_mistakes_raises_with_a_line_for_each(client: Client
     assert refused.value.problem.errors[0].nearest
 
 
-def test_with_a_token_it_is_the_same_and_without_one_it_says_so(
-    sqlite_store: Store, network: InProcess, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_with_a_token_it_is_the_same_and_without_one_it_says_so(sqlite_store: Store, network: InProcess) -> None:
     secret = access.create_token(sqlite_store, Role.RUNNER, "me").secret
-    monkeypatch.delenv("GAPLAB_TOKEN", raising=False)
 
     with Client("http://gaplab.example", token=secret, transport=network) as mine:
         id = mine.submit(SMALL).id
@@ -474,19 +460,6 @@ def test_with_a_token_it_is_the_same_and_without_one_it_says_so(
     with Client("http://gaplab.example", transport=network) as nobody, pytest.raises(ServiceError, match="token") as no:
         nobody.submit(SMALL)
     assert no.value.problem.status == 401
-
-    monkeypatch.setenv("GAPLAB_TOKEN", secret)
-    with Client("http://gaplab.example", transport=network) as from_the_environment:
-        assert from_the_environment.find(id).id == id
-
-
-def test_the_service_of_the_environment_is_the_one_that_is_meant(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("GAPLAB_URL", "http://127.0.0.1:7")
-
-    with Client() as client:
-        assert client.url == "http://127.0.0.1:7"
-        with pytest.raises(ServiceUnreachable, match="no service answers"):
-            client.studies()
 
 
 def test_events_and_lists_are_values_that_json_can_hold(client: Client) -> None:
@@ -550,19 +523,17 @@ def test_events_of_what_is_no_gaplab_are_not_waited_for() -> None:
         next(client.events())
 
 
-@pytest.mark.parametrize("answer", ["{}", "[]", "null", '{"paths": null}', "<p>hello</p>"])
-def test_kinds_of_figures_of_what_is_no_gaplab_are_a_sentence(answer: str) -> None:
-    network = httpx2.MockTransport(lambda _: httpx2.Response(200, text=answer))
+def test_kinds_of_figures_of_what_is_no_gaplab_are_a_sentence() -> None:
+    answers = ["{}", "[]", "null", '{"paths": null}', "<p>hello</p>"]
+    network = httpx2.MockTransport(lambda _: httpx2.Response(200, text=answers.pop()))
 
-    with (
-        Client("http://gaplab.example", transport=network) as client,
-        pytest.raises(ServiceUnreachable, match="is no gaplab of this version"),
-    ):
-        client.figure_kinds()
+    with Client("http://gaplab.example", transport=network) as client:
+        while answers:
+            with pytest.raises(ServiceUnreachable, match="is no gaplab of this version"):
+                client.figure_kinds()
 
 
-def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stream, "RETRY_S", 0.01)
+def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks() -> None:
     event = EventRead(number=7, kind=EventKind.STARTED, experiment="e", body={}, at=datetime.now(UTC))
 
     def quiet() -> Iterator[bytes]:
@@ -578,4 +549,4 @@ def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(mo
     )
 
     with Client("http://gaplab.example", transport=network) as client:
-        assert next(client.events(patience_s=0.15)) == event
+        assert next(client.events(patience_s=0.15, retry_s=0.01)) == event

@@ -103,6 +103,7 @@ def test_few_at_once_take_as_long_as_few_cores(sqlite_store: Store) -> None:
     assert estimate(sqlite_store, spec, cores=16).cores == 3
 
 
+@pytest.mark.dialects
 def test_only_supervisors_that_were_heard_of_lately_work(store: Store) -> None:
     long_ago = datetime.now(UTC) - timedelta(hours=1)
     with store.transaction() as session:
@@ -147,6 +148,7 @@ def test_the_best_fitness_of_an_experiment_is_the_mean_of_its_repetitions_best(s
     assert listed.best_fitness == pytest.approx((3.0 + 4.0) / 2)
 
 
+@pytest.mark.dialects
 def test_a_best_fitness_of_nothing_has_no_sign_whichever_zero_a_database_takes_for_the_greater(store: Store) -> None:
     made = submission.submit_experiment(store, toy(repetitions=1))
     (one,) = claim(store, "me", 1)

@@ -1,13 +1,7 @@
 """`gaplab events`, `gaplab accept-versions`, and what `gaplab show` says of provenance, on a service in a thread."""
 
 import re
-import sys
-from collections.abc import Iterator
-from typing import Any
 
-import pytest
-
-from gaplab.api.commands.cli import main
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
@@ -15,23 +9,6 @@ from gaplab.services.running.versions import provenance
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import run, some_log, toy
-from tests.integration.test_events import served
-
-
-@pytest.fixture
-def gaplab(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Any]:
-    """Runs the command against a service of the store; its code, and what it printed."""
-    with served(sqlite_store) as (url, _):
-        monkeypatch.setenv("GAPLAB_URL", url)
-
-        def command(*arguments: Any) -> Any:
-            monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
-            with pytest.raises(SystemExit) as left:
-                main()
-            said = capsys.readouterr()
-            return left.value.code or 0, said.out, said.err
-
-        yield command
 
 
 def test_events_are_printed_a_line_each(sqlite_store: Store, gaplab: Gaplab) -> None:

@@ -120,6 +120,7 @@ def test_a_study_is_let_in_whole_or_not_at_all(store: Store) -> None:
     assert api.get("/studies").json()["items"] == api.get("/experiments").json()["items"] == []
 
 
+@pytest.mark.dialects
 def test_submissions_at_the_same_moment_do_not_pass_a_limit_together(store: Store) -> None:
     api = served(store, experiments=3)
 
@@ -172,63 +173,45 @@ def test_who_waits_for_events_has_a_stream_open_and_who_does_not_wait_has_none(s
     assert [at_once.status_code, *(each.status_code for each in room)] == [200, 200, 200]
 
 
-def test_limits_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert Limits.from_environment() == Limits()
-    monkeypatch.setenv("GAPLAB_MAX_ROLLOUTS_PER_TOKEN", "7")
-    assert Limits.from_environment() == Limits(rollouts_per_token=7)
-    monkeypatch.setenv("GAPLAB_MAX_STREAMS", "many")
+def test_limits_come_from_the_environment() -> None:
+    assert Limits.from_environment({}) == Limits()
+    assert Limits.from_environment({"GAPLAB_MAX_ROLLOUTS_PER_TOKEN": "7"}) == Limits(rollouts_per_token=7)
     with pytest.raises(ValueError, match="GAPLAB_MAX_STREAMS is 'many'"):
-        Limits.from_environment()
+        Limits.from_environment({"GAPLAB_MAX_STREAMS": "many"})
 
 
-def test_what_is_set_to_nothing_is_not_set(monkeypatch: pytest.MonkeyPatch) -> None:
-    for each in ("DATABASE_URL", "RAY_ADDRESS", "WORKERS", "LEASE_S", "HOST", "PORT", "URL", "TOKEN"):
-        monkeypatch.setenv(f"GAPLAB_{each}", "")
+def test_what_is_set_to_nothing_is_not_set() -> None:
+    names = ("DATABASE_URL", "RAY_ADDRESS", "WORKERS", "LEASE_S", "HOST", "PORT", "URL", "TOKEN")
 
-    assert Settings.from_environment() == Settings()
+    assert Settings.from_environment({f"GAPLAB_{each}": "" for each in names}) == Settings()
 
 
-@pytest.mark.parametrize(
-    ("host", "url"), [("::1", "http://[::1]:9000"), ("127.0.0.2", "http://127.0.0.2:9000"), ("x", "http://x:9000")]
-)
-def test_the_service_is_looked_for_where_it_binds(monkeypatch: pytest.MonkeyPatch, host: str, url: str) -> None:
-    monkeypatch.delenv("GAPLAB_URL", raising=False)
-    monkeypatch.setenv("GAPLAB_HOST", host)
-    monkeypatch.setenv("GAPLAB_PORT", "9000")
-
-    assert Settings.from_environment().url == url
+def test_the_service_is_looked_for_where_it_binds() -> None:
+    for host, url in (("::1", "http://[::1]:9000"), ("127.0.0.2", "http://127.0.0.2:9000"), ("x", "http://x:9000")):
+        assert Settings.from_environment({"GAPLAB_HOST": host, "GAPLAB_PORT": "9000"}).url == url
 
 
 @pytest.mark.parametrize(
     ("host", "url"), [("0.0.0.0", "http://127.0.0.1:8600"), ("::", "http://[::1]:8600"), ("lab", "http://lab:8600")]
 )
-def test_the_address_of_the_service_follows_host_and_port_unless_it_is_set(
-    monkeypatch: pytest.MonkeyPatch, host: str, url: str
-) -> None:
-    monkeypatch.delenv("GAPLAB_URL", raising=False)
-
-    followed = Settings.from_environment().bound(host, 8600)
-    monkeypatch.setenv("GAPLAB_URL", "https://gaplab.example.org")
-    given = Settings.from_environment().bound(host, 8600)
+def test_the_address_of_the_service_follows_host_and_port_unless_it_is_set(host: str, url: str) -> None:
+    followed = Settings().bound(host, 8600)
+    given = Settings.from_environment({"GAPLAB_URL": "https://gaplab.example.org"}).bound(host, 8600)
 
     assert (followed.host, followed.port, followed.url) == (host, 8600, url)
     assert (given.host, given.port, given.url) == (host, 8600, "https://gaplab.example.org")
     assert Settings().bound(None, None) == Settings()
 
 
-@pytest.mark.parametrize("address", ["nonsense", "ftp://127.0.0.1", "gaplab.example.org:8000", "http://"])
-def test_an_address_without_http_is_refused(monkeypatch: pytest.MonkeyPatch, address: str) -> None:
-    monkeypatch.setenv("GAPLAB_URL", address)
-
-    with pytest.raises(ValueError, match=f"GAPLAB_URL is '{address}'; it must be an http or https address"):
-        Settings.from_environment()
+def test_an_address_without_http_is_refused() -> None:
+    for address in ("nonsense", "ftp://127.0.0.1", "gaplab.example.org:8000", "http://"):
+        with pytest.raises(ValueError, match=f"GAPLAB_URL is '{address}'; it must be an http or https address"):
+            Settings.from_environment({"GAPLAB_URL": address})
 
 
-def test_a_number_that_is_none_is_said_with_its_variable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("GAPLAB_PORT", "8²")
-
+def test_a_number_that_is_none_is_said_with_its_variable() -> None:
     with pytest.raises(ValueError, match="GAPLAB_PORT is '8²'"):
-        Settings.from_environment()
+        Settings.from_environment({"GAPLAB_PORT": "8²"})
 
 
 def test_every_limit_is_documented_with_its_default() -> None:
@@ -305,6 +288,7 @@ def test_files_that_no_answer_names_have_a_limit_that_frees_itself(store: Store)
     assert api.get(f"/attachments/{first.json()['id']}").status_code == 404
 
 
+@pytest.mark.dialects
 def test_files_that_are_sent_at_once_keep_the_limit(store: Store) -> None:
     api = TestClient(create_app(store, limits=Limits(unnamed_attachment_bytes=30)))
 

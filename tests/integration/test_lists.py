@@ -68,6 +68,7 @@ def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store: 
     assert {each.experiment_id for each in execution.claim(store, "me", 9)} == {submitted.id}
 
 
+@pytest.mark.dialects
 def test_no_list_asks_more_often_when_it_shows_more(store: Store) -> None:
     fill(store, 1)
     few = asked(store)

@@ -1,4 +1,4 @@
-"""Misfit from stored results, on both databases."""
+"""Misfit from stored results."""
 
 import csv
 import io

@@ -178,6 +178,7 @@ def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
     assert gaplab("spec", again.out.strip()).out == gaplab("spec", study.id).out
 
 
+@pytest.mark.release
 @pytest.mark.skipif(not has_avx2(), reason="no code is chosen on such a processor")
 def test_code_that_an_archive_does_not_name_is_named(gaplab: Gaplab) -> None:
     said = gaplab("rerun", str(FOLDER / "cma_es.zip"), "--verify", "--repetitions", "1")

@@ -57,7 +57,7 @@ def test_thousands_of_core_hours_need_a_yes_without_a_terminal_too(gaplab: Gapla
     assert gaplab("submit", "-", "--yes", stdin="{}").code == Exit.OK
 
 
-@pytest.mark.parametrize(("answer", "studies"), [("n", 0), ("y", 1)])
+@pytest.mark.parametrize(("answer", "studies"), [("n", 0), pytest.param("y", 1, marks=pytest.mark.release)])
 def test_a_person_is_asked_before_hours_even_if_the_spec_comes_through_a_pipe(
     at_a_terminal: Callable[[str, str, str], pexpect.spawn], sqlite_store: Store, answer: str, studies: int
 ) -> None:
