@@ -162,8 +162,8 @@ def test_details_are_reached_by_keyboard_and_are_in_the_address(api: Any, known:
     panel.scroll_into_view_if_needed()
     expect(panel.locator("tbody tr")).to_have_count(25)
     first = panel.locator("tbody tr").first.inner_text()
-    replay = panel.get_by_role("link", name="Replay").first.get_attribute("href")
-    assert replay == f"#/toy?experiment={known.ids[0]}&repetition=0&iteration=0"
+    step = panel.get_by_role("link", name="Step").first.get_attribute("href")
+    assert step == f"#/toy?experiment={known.ids[0]}&repetition=0&iteration=0"
     panel.get_by_role("button", name="Next").click()
     expect(page.get_by_text("Page 2")).to_be_visible()
     assert panel.locator("tbody tr").first.inner_text() != first
@@ -194,7 +194,7 @@ def test_its_files_are_saved(api: Any, known: Any, visit: Any) -> None:
         page.locator(".figure-curves").get_by_role("link", name="CSV").click()
     assert saved.value.path().read_text().startswith("experiment,name,strategy,repetition")
     links = page.locator(".figures .files a, .figure-curves .files a")
-    expect(links).to_have_count(3 * 3 + 4)
+    expect(links).to_have_count(4 * 3 + 4)
     drawn = httpx2.get(f"{api.url}/{links.first.get_attribute('href')}", timeout=120)
     assert drawn.status_code == 200
 
