@@ -10,7 +10,7 @@ import numpy as np
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.robots import robots
-from gaplab.services.core.types import Probed, Simulator, Transferred, Tuned
+from gaplab.services.core.types import Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
@@ -130,20 +130,25 @@ FILES = {"puppet": ENGINE, "strider": ROBOT}
 HIDDEN = {"static_friction": 0.9, "dynamic_friction": 0.6}
 
 
-def strode(store: Store, **changes: Any) -> str:
-    """Return the id of an experiment with this robot, whose iteration 0 is over."""
+def strode(store: Store, *, iterations: int = 1, **changes: Any) -> str:
+    """Return the id of an experiment with this robot, of which so many iterations are over; with two, it is."""
     spec = {"strategy": "simulated_fit", "robot": "strider", "engine": "puppet", "iterations": 1, "repetitions": 1}
     reality = {"engine": "puppet", "parameters": HIDDEN}
     more = {"budget": "smoke", "tunables": list(HIDDEN), "reality": reality}
     experiment = submission.submit_experiment(store, ExperimentSpec.model_validate(spec | more | changes)).id
     (claim,) = execution.claim(store, "me", 1)
     known, setting_ = robots[claim.spec.robot.name]().known, setting(claim.spec, 0)
-    simulated = float(setting_.simulate(known[None], np.array([[0.5, 0.3]]))[0, 0])
     real = setting_.reality(known)
-    for step in (
-        Tuned(0, (Simulator(frozen([0.5, 0.3])),)),
-        Transferred(0, known, simulated),
-        Probed(0, real.fitness, 0.1, real.readings),
-    ):
-        assert execution.record(store, claim, step)
+    for iteration, friction in enumerate((0.5, 0.7)[:iterations]):
+        tuned = np.array([friction, 0.3])
+        measured = (Selected(iteration, known), Measured(iteration, Sample(known, real.fitness, real.readings)))
+        for step in (
+            *measured[: 2 * iteration],
+            Tuned(iteration, (Simulator(frozen(tuned)),)),
+            Transferred(iteration, known, float(setting_.simulate(known[None], tuned[None])[0, 0])),
+            Probed(iteration, real.fitness, 0.1, real.readings),
+        ):
+            assert execution.record(store, claim, step)
+    if iterations > 1:
+        assert execution.complete(store, claim)
     return experiment

@@ -9,6 +9,7 @@ from zlib import crc32
 import numpy as np
 
 from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.records import StudyRead
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_study
 from gaplab.services.core.arrays import frozen
@@ -66,6 +67,15 @@ def log(recorded: Sequence[float]) -> Iterator[Step]:
 
 def archive(store: Store, label: str, study: Study, folder: Path) -> Path:
     """Run a study, whose fitness is made, and export it."""
+    exported = export_study(store, make(store, label, study).id)
+    path = folder / f"{label}.zip"
+    with exported.file as source, path.open("wb") as target:
+        copyfileobj(source, target)
+    return path
+
+
+def make(store: Store, label: str, study: Study) -> StudyRead:
+    """Run a study, whose fitness is made, and return it as it was submitted."""
     spec: dict[str, Any] = {"name": f"made: {label}", "strategies": list(study.curves), "robot": "toy_function"}
     spec |= {
         "budget": "smoke",
@@ -89,8 +99,4 @@ def archive(store: Store, label: str, study: Study, folder: Path) -> Path:
     if study.more:
         execution.hand_back(store, *(claim for claim in every if claim not in claims))
         lifecycle.ask_study(store, made.id, Verb.STOP)
-    exported = export_study(store, made.id)
-    path = folder / f"{label}.zip"
-    with exported.file as source, path.open("wb") as target:
-        copyfileobj(source, target)
-    return path
+    return made

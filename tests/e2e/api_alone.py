@@ -20,7 +20,7 @@ class Api:
         http: a client of it.
     """
 
-    def __init__(self, database_url: str, log: Any) -> None:
+    def __init__(self, database_url: str, log: Any, plugins: Any = "") -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self._port = probe.getsockname()[1]
@@ -28,6 +28,7 @@ class Api:
         self.http = httpx2.Client(base_url=self.url, timeout=120)
         self._log = log
         self._environment = os.environ | {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(self._port)}
+        self._environment |= {"GAPLAB_PLUGINS": str(plugins)}
         self._process: Any = None
 
     def start(self) -> Any:

@@ -32,6 +32,8 @@ FLAGS = [
 
 AXE = Path(axe_playwright_python.__file__).with_name("axe.min.js")
 SERIOUS = {"serious", "critical"}
+CONTRAST = "color-contrast"
+"""The rule of axe that depends on the theme."""
 
 BUSY = (r"^429 ", r"^console: .* status of 429 ")
 """Troubles of a slow machine: the page then asks again."""
@@ -43,7 +45,7 @@ def chromium() -> Any:
 
 
 class Chromium:
-    """One browser; each `visit` has a context of its own, and what goes wrong in it is kept until `end`."""
+    """One browser, whose tabs share what it has loaded; what goes wrong in them is kept until `end`."""
 
     def __init__(self) -> None:
         self._playwright = sync_playwright().start()
@@ -52,13 +54,19 @@ class Chromium:
         except BaseException:
             self._playwright.stop()
             raise
-        self._contexts: list[Any] = []
+        self._window = self._browser.new_context()
+        self._window.grant_permissions(["clipboard-read", "clipboard-write"])
+        self._window.set_default_timeout(180_000)
+        self._blank = self._window.new_page()
+        self._storage = self._window.new_cdp_session(self._blank)
         self._troubles: list[str] = []
         self._forgiven: list[str] = [*BUSY]
 
-    def visit(self, url: Any, *, beside: Any = None, **how: Any) -> Any:
-        """A page at the address: in another tab of the window of the page `beside`, or in a window of its own."""
-        page = (beside.context if beside else self._window(**how)).new_page()
+    def visit(self, url: Any, *, dark: Any = False, width: Any = 1280, height: Any = 900) -> Any:
+        """A tab at the address, in light or dark, as wide as a screen or a phone."""
+        page = self._window.new_page()
+        page.emulate_media(color_scheme="dark" if dark else "light", reduced_motion="reduce")
+        page.set_viewport_size({"width": width, "height": height})
         page.on("console", lambda said: said.type == "error" and self._note(f"console: {said.text}"))  # type: ignore[func-returns-value]
         page.on("pageerror", lambda error: self._note(f"error: {error}"))
         page.on("requestfailed", self._failed)
@@ -71,28 +79,22 @@ class Chromium:
         self._forgiven += patterns
 
     def end(self) -> None:
-        """Close what the test opened; fail it if anything went wrong there."""
-        for context in self._contexts:
-            context.close()
+        """Close what the test opened, and forget what the pages kept; fail the test if anything went wrong there."""
+        opened = [page for page in self._window.pages if page is not self._blank]
+        origins = {"/".join(page.url.split("/")[:3]) for page in opened}
+        for page in opened:
+            page.close()
+        for origin in origins:
+            self._storage.send("Storage.clearDataForOrigin", {"origin": origin, "storageTypes": "local_storage"})
+        self._window.unroute_all(behavior="ignoreErrors")
+        self._window.set_offline(False)
         troubles = [each for each in self._troubles if not any(re.search(one, each) for one in self._forgiven)]
-        self._contexts, self._troubles, self._forgiven = [], [], [*BUSY]
+        self._troubles, self._forgiven = [], [*BUSY]
         assert not troubles, "\n".join(troubles)
 
     def close(self) -> None:
         self._browser.close()
         self._playwright.stop()
-
-    def _window(self, *, dark: Any = False, width: Any = 1280, height: Any = 900) -> Any:
-        """In light or dark, as wide as a screen or a phone."""
-        context = self._browser.new_context(
-            color_scheme="dark" if dark else "light",
-            viewport={"width": width, "height": height},
-            reduced_motion="reduce",
-        )
-        context.grant_permissions(["clipboard-read", "clipboard-write"])
-        context.set_default_timeout(180_000)
-        self._contexts.append(context)
-        return context
 
     def _failed(self, request: Any) -> None:
         if request.failure != "net::ERR_ABORTED":  # a view that is left stops what it asked for
@@ -102,10 +104,12 @@ class Chromium:
         self._troubles.append(trouble)
 
 
-def axe(page: Any) -> None:
-    """Assert that axe finds nothing serious or critical in what the page shows."""
-    page.evaluate(AXE.read_text(encoding="utf-8"))
-    found = page.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+def axe(page: Any, *rules: Any) -> None:
+    """Assert that axe, or these rules of it, find nothing serious or critical in what the page shows."""
+    if not page.evaluate("() => 'axe' in globalThis"):
+        page.evaluate(AXE.read_text(encoding="utf-8"))
+    only = {"runOnly": list(rules)} if rules else {}
+    found = page.evaluate("(how) => axe.run(document, how)", {"resultTypes": ["violations"], **only})
     serious = [
         f"{each['id']}: {node['html']} ({node.get('failureSummary', '')})"
         for each in found["violations"]

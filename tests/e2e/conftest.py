@@ -1,39 +1,70 @@
 """Fixtures of the tests in a browser.
 
-`visit(address, dark=…, width=…)` opens the page in Chromium, and fails the test if the console, a script or a request
-reports an error; `visit(address, beside=page)` does so in another tab of that page's window, which shares its
-connections; `visit.forgive(pattern, …)` names those that a test causes. `archive` is the API alone on a database
-with ended experiments, `api` the same on the one of `written`, which tests fill as workers would, `shared_service` the
-real service with workers.
+`visit(address, dark=…, width=…)` opens the page in a tab of Chromium, and fails the test if the console, a script or a
+request reports an error; `visit.forgive(pattern, …)` names those that a test causes. `api` is the API alone on the
+database of `written`, which tests fill as workers would, beside what `Known` names. For releases there are `archive`,
+with a published study, and `shared_service`, the real service with workers.
 """
 
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.services.archives import import_archive
+from gaplab.services.core import external_plugins
 from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.session import Store
+from tests.drawn_robot import FILES, strode
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
 from tests.e2e.service import Service
 from tests.experiments import cancel, toy
 from tests.filling import fill
+from tests.made_studies import Made, Study, make
 
 STUDY = Path(__file__).parents[2] / "docs" / "studies" / "figure-4-mujoco.zip"
 
+RISING = [0.5 + 0.03 * number for number in range(11)]
+CURVES = {"simulated_fit": Made(RISING), "known_fit": Made([0.9] * 11), "direct": Made([1.0])}
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Of a module, not of all tests: Playwright keeps an event loop running, which others could not run beside."""
-    browser = Chromium()
-    yield browser
-    browser.close()
+_CHROMIUM = pytest.StashKey[Chromium]()
+
+
+class Known(NamedTuple):
+    """What is in the database of `api` from the beginning, besides seventy made-up experiments in ten studies.
+
+    Attributes:
+        study: the id of a study that has ended, of the strategies of `CURVES`.
+        ids: its experiments.
+        strider: the id of an ended experiment with a robot of every shape, and one iteration beside number 0.
+    """
+
+    study: str
+    ids: list[str]
+    strider: str
+
+
+@pytest.fixture
+def browser(request: pytest.FixtureRequest) -> Any:
+    """One for all tests that follow each other with it."""
+    stash = request.session.stash
+    if _CHROMIUM not in stash:
+        stash[_CHROMIUM] = Chromium()
+    return stash[_CHROMIUM]
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
+    """Close the browser before a test without it: Playwright keeps an event loop running, where no other can run."""
+    stash = item.session.stash
+    if _CHROMIUM in stash and "browser" not in getattr(nextitem, "fixturenames", ()):
+        stash[_CHROMIUM].close()
+        del stash[_CHROMIUM]
 
 
 @pytest.fixture
@@ -55,9 +86,34 @@ def written_file(folder: Path, sqlite_template: Path) -> Any:
 
 
 @pytest.fixture(scope="session")
-def api(written_file: Any, folder: Path) -> Iterator[Any]:
+def plugins(folder: Path) -> Path:
+    """The folder with the robot that has every shape."""
+    home = folder / "plugins"
+    home.mkdir()
+    for name, text in FILES.items():
+        (home / f"{name}.py").write_text(text)
+    return home
+
+
+@pytest.fixture(scope="session")
+def known(written_file: Path, plugins: Path) -> Known:
+    """What is in the database of `api` from the beginning."""
+    before = external_plugins.folders()
+    external_plugins.set_folders((*before, plugins))
+    store = Store(f"sqlite:///{written_file}")
+    fill(store, 70)
+    study = make(store, "a study", Study(CURVES, repetitions=4))
+    strider = strode(store, iterations=2)
+    cancel(store, submit_experiment(store, toy(name="given up")).id)
+    store.dispose()
+    external_plugins.set_folders(before)
+    return Known(study.id, [each.id for each in study.experiments], strider)
+
+
+@pytest.fixture(scope="session")
+def api(written_file: Path, folder: Path, plugins: Path, known: Known) -> Iterator[Any]:
     """The API alone, on a database that tests fill as workers would."""
-    api = Api(f"sqlite:///{written_file}", folder / "written.log").start()
+    api = Api(f"sqlite:///{written_file}", folder / "written.log", plugins=plugins).start()
     yield api
     api.close()
 

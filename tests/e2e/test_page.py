@@ -1,9 +1,16 @@
-"""The page on a real service: a study from the form to its end, called off, and in sight while the service dies."""
+"""The page on a real service: a study from the form to its end, called off, and in sight while the service dies.
+
+For a release: the page knows only the API, and other tests have both it on the API and the API with workers.
+"""
 
 from typing import Any
 
+import pytest
+
 from tests.e2e.browser import axe, screenshot
 from tests.waiting import wait_until
+
+pytestmark = pytest.mark.release
 
 LONG_MS = 240_000
 AWAY = ("ERR_CONNECTION_REFUSED", "ERR_CONNECTION_RESET", "ERR_EMPTY_RESPONSE", "ERR_INCOMPLETE_CHUNKED_ENCODING")

@@ -65,6 +65,10 @@ def test_an_operator_takes_measures_and_sends(visit: Any, api: Any, written: Sto
     expect(page.get_by_role("navigation", name="Pages").get_by_role("link", name="Bench")).to_be_visible()
 
     take(page)
+    page.get_by_role("button", name="Give it back").click()
+    page.get_by_role("button", name="Take it").wait_for()
+    assert waiting(written, experiment)[0].state == "open"
+    take(page)
     assert taking.read_request(written, request.id).taken_by == "Ada"
     page.reload()
     page.get_by_text("You have it, as Ada.").wait_for()
@@ -95,15 +99,7 @@ def test_an_operator_takes_measures_and_sends(visit: Any, api: Any, written: Sto
     expect(page.get_by_role("heading", name="Toy function: sample of iteration 1")).to_be_visible()
 
 
-def test_a_request_that_is_given_back_is_open(visit: Any, api: Any, written: Store) -> None:
-    experiment, _ = asked(written, "hall")
-    page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
-    take(page)
-    page.get_by_role("button", name="Give it back").click()
-    page.get_by_role("button", name="Take it").wait_for()
-    assert waiting(written, experiment)[0].state == "open"
-
-
+@pytest.mark.release
 def test_an_operator_keeps_the_form_when_the_experiment_is_paused(visit: Any, api: Any, written: Store) -> None:
     experiment, _ = asked(written, "stairs")
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}")
@@ -124,12 +120,14 @@ def test_an_operator_keeps_the_form_when_the_experiment_is_paused(visit: Any, ap
     expect(panel.get_by_role("link", name="To the bench")).to_have_count(1)
 
 
-@pytest.mark.parametrize("moment", ["before the service has it", "before it is acknowledged"])
+@pytest.mark.parametrize(
+    "moment", [pytest.param("before the service has it", marks=pytest.mark.release), "before it is acknowledged"]
+)
 def test_an_answer_in_a_cut_network_waits_and_is_stored_once(visit: Any, api: Any, written: Store, moment: str) -> None:
     visit.forgive(*CUT)
     experiment, request = asked(written, "cable")
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
-    other = visit(f"{api.url}/#/toy", beside=page)  # a second tab, with another view
+    other = visit(f"{api.url}/#/toy")  # a second tab, with another view
     keys = []
 
     def cut(route: Any) -> None:
@@ -160,6 +158,7 @@ def test_an_answer_in_a_cut_network_waits_and_is_stored_once(visit: Any, api: An
     assert len(set(keys)) == 1
 
 
+@pytest.mark.release
 def test_without_a_network_the_page_says_so_and_keeps_what_is_entered(visit: Any, api: Any, written: Store) -> None:
     visit.forgive(*CUT)
     experiment, request = asked(written, "shed")
@@ -176,6 +175,7 @@ def test_without_a_network_the_page_says_so_and_keeps_what_is_entered(visit: Any
     assert [each.values for each in answers_of(written, request)] == [(1.0, 2.0, 3.0)]
 
 
+@pytest.mark.release
 def test_a_take_whose_answer_is_lost_is_this_browsers_all_the_same(visit: Any, api: Any, written: Store) -> None:
     visit.forgive(*CUT)
     experiment, _ = asked(written, "attic")
@@ -276,6 +276,7 @@ def expire(store: Store) -> None:
     taking.open_again(store)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("mode", ["light", "dark", "phone"])
 def test_the_bench_and_its_experiment_are_accessible(visit: Any, api: Any, written: Store, mode: str) -> None:
     experiment, *_ = asked(written, f"lab {mode}", repetitions=2)
@@ -295,6 +296,7 @@ def test_the_bench_and_its_experiment_are_accessible(visit: Any, api: Any, writt
     screenshot(page, f"bench-experiment-{mode}")
 
 
+@pytest.mark.release
 def test_an_experiment_shows_repeats_history_and_closed_branches(visit: Any, api: Any, written: Store) -> None:
     experiment = submit_experiment(written, bench(name="told", reality={"bench": "told", "repeats": 2}))
     finish(written, lambda genome: genome[0])
@@ -324,7 +326,9 @@ def test_an_experiment_shows_repeats_history_and_closed_branches(visit: Any, api
     expect(page.locator(".event-list li").first).to_contain_text("was corrected: a slip of the keyboard")
 
 
-@pytest.mark.parametrize("mode", ["light", "dark", "phone"])
+@pytest.mark.parametrize(
+    "mode", ["light", *(pytest.param(mode, marks=pytest.mark.release) for mode in ("dark", "phone"))]
+)
 def test_the_form_takes_a_bench_with_samples_from_a_table(visit: Any, api: Any, written: Store, mode: str) -> None:
     visit.forgive("422")
     page = visit(f"{api.url}/#/new", **MODES[mode])

@@ -16,6 +16,7 @@ from tests.experiments import run, some_log, toy
 SLOW_MS = 120_000
 expect.set_options(timeout=SLOW_MS)
 STUDY = "Fig. 4, lean: MuJoCo in MuJoCo"
+MADE = "made: a study"
 
 
 @pytest.fixture
@@ -43,36 +44,35 @@ def lines(page: Any) -> Any:
     return page.locator(".large .scatterlayer .trace:has(.point)")
 
 
-def test_a_study_is_found_as_one_types_and_added_by_keyboard(archive: Any, study: Any, ids: Any, visit: Any) -> None:
-    page = visit(f"{archive.url}/#/compare")
+def test_a_study_is_found_as_one_types_and_added_by_keyboard(api: Any, known: Any, visit: Any) -> None:
+    page = visit(f"{api.url}/#/compare")
     expect(page.get_by_text("Choose experiments above")).to_be_visible()
     field = page.get_by_role("combobox", name="Add experiments")
-    field.fill("mujoco in")
-    expect(page.get_by_role("option")).to_have_text([re.compile(f"^{STUDY}study, all 7 experiments")])
+    field.fill("a study")
+    expect(page.get_by_role("option")).to_have_text([re.compile(f"^{MADE}study, all 3 experiments")])
     field.press("ArrowDown")
-    expect(page.get_by_role("option", name=STUDY).first).to_have_attribute("aria-selected", "true")
+    expect(page.get_by_role("option", name=MADE).first).to_have_attribute("aria-selected", "true")
     field.press("Enter")
     chosen = page.get_by_role("list", name="Experiments that are compared").get_by_role("listitem")
-    expect(chosen).to_have_count(7)
-    assert fragment(page) == f"#/compare?experiments={','.join(ids)}"
-    expect(lines(page)).to_have_count(6)
+    expect(chosen).to_have_count(3)
+    assert fragment(page) == f"#/compare?experiments={','.join(known.ids)}"
+    expect(lines(page)).to_have_count(2)
 
     page.get_by_role("button", name="Remove Known fit").click()
-    expect(chosen).to_have_count(6)
-    expect(lines(page)).to_have_count(5)
-    assert ids[5] not in fragment(page)
+    expect(chosen).to_have_count(2)
+    expect(lines(page)).to_have_count(1)
+    assert known.ids[1] not in fragment(page)
     page.go_back()
-    expect(chosen).to_have_count(7)
+    expect(chosen).to_have_count(3)
     page.go_back()
     expect(chosen).to_have_count(0)
     field.fill("no such thing")
     expect(page.get_by_role("option", name="No name or id contains this.")).to_be_visible()
-    axe(page)
 
 
-def test_the_address_holds_everything(archive: Any, ids: Any, visit: Any) -> None:
-    page = visit(address(archive, *ids[:3]))
-    expect(lines(page)).to_have_count(3)
+def test_the_address_holds_everything(api: Any, known: Any, visit: Any) -> None:
+    page = visit(address(api, *known.ids))
+    expect(lines(page)).to_have_count(2)
     page.get_by_role("radio", name="Time").check()
     page.get_by_label("each real evaluation costs").fill("90")
     page.get_by_label("Band").select_option("sd")
@@ -82,7 +82,7 @@ def test_the_address_holds_everything(archive: Any, ids: Any, visit: Any) -> Non
     page.get_by_label("to", exact=True).fill("4")
     page.get_by_label("to", exact=True).press("Tab")
     choices = "x=time&cost_s=90&band=sd&each=true&test=welch&from=2&to=4&margin=0.03"
-    wanted = f"#/compare?experiments={','.join(ids[:3])}&{choices}"
+    wanted = f"#/compare?experiments={','.join(known.ids)}&{choices}"
     page.get_by_label("equivalent within").fill("0.03")
     page.get_by_label("equivalent within").press("Tab")
     expect(page.get_by_text("over 2 to 4 real-world evaluations")).to_be_attached()
@@ -103,6 +103,7 @@ def test_the_address_holds_everything(archive: Any, ids: Any, visit: Any) -> Non
     assert fragment(other) == wanted
 
 
+@pytest.mark.release
 def test_a_number_of_evaluations_that_no_experiment_has_is_refused_in_one_sentence(
     archive: Any, ids: Any, visit: Any
 ) -> None:
@@ -113,13 +114,13 @@ def test_a_number_of_evaluations_that_no_experiment_has_is_refused_in_one_senten
     expect(page.locator("table.matrix")).to_be_visible()
 
 
-def test_what_differs_is_what_the_service_found(archive: Any, ids: Any, visit: Any) -> None:
-    page = visit(address(archive, *ids, to="1"))
+def test_what_differs_is_what_the_service_found(api: Any, known: Any, visit: Any) -> None:
+    page = visit(address(api, *known.ids, to="1"))
     matrix = page.locator("table.matrix")
     expect(page.get_by_text("The row against the column")).to_contain_text("after 1 real-world evaluation")
-    found = archive.get("/comparisons", experiment=ids, **{"from": 1, "to": 1})
+    found = api.get("/comparisons", experiment=known.ids, **{"from": 1, "to": 1})
     for pair in found:
-        row, column = ids.index(pair["first"]), ids.index(pair["second"])
+        row, column = known.ids.index(pair["first"]), known.ids.index(pair["second"])
         here = matrix.locator("tbody tr").nth(row).locator("td").nth(column)
         there = matrix.locator("tbody tr").nth(column).locator("td").nth(row)
         p, raw = pair["trusted"]["p_holm"], pair["trusted"]["p"]
@@ -146,6 +147,7 @@ def test_what_differs_is_what_the_service_found(archive: Any, ids: Any, visit: A
     expect(caution).to_be_visible()
 
 
+@pytest.mark.release
 def test_a_pair_that_shares_random_streams_is_marked_and_a_margin_is_judged(
     api: Any, written: Store, visit: Any
 ) -> None:
@@ -166,28 +168,7 @@ def test_a_pair_that_shares_random_streams_is_marked_and_a_margin_is_judged(
     axe(page)
 
 
-def test_a_small_difference_is_not_written_as_nothing(api: Any, written: Store, visit: Any) -> None:
-    ids = [submission.submit_experiment(written, toy(name=name, repetitions=6)).id for name in ("one", "two")]
-    for claim in execution.claim(written, "tests", 12):
-        better = 0.001 + 0.0001 * (claim.number % 3) if claim.experiment_id == ids[0] else 0.0
-        run(written, claim, some_log(recorded=0.5 + 0.0001 * claim.number + better))
-
-    page = visit(address(api, *ids))
-    page.get_by_text("Every pair, at every range").click()
-    page.get_by_text("Each experiment, with intervals").click()
-
-    expect(page.get_by_role("region", name="Pairs").locator("tbody tr")).to_contain_text("+0.0011 [0.001")
-    expect(page.get_by_role("region", name="Each experiment").locator("tbody tr").last).to_contain_text("0.000187")
-
-
-def test_a_comparison_begins_at_the_last_number_that_all_share(archive: Any, ids: Any, visit: Any) -> None:
-    page = visit(address(archive, *ids))
-
-    expect(page.get_by_text("The row against the column")).to_contain_text("after 10 real-world evaluations")
-    expect(page.get_by_role("button", name="at 10", exact=True)).to_have_attribute("aria-pressed", "true")
-    assert "from=" not in fragment(page)
-
-
+@pytest.mark.release
 def test_what_should_not_be_compared_is_warned_of(archive: Any, ids: Any, visit: Any) -> None:
     toys = archive.get("/experiments", text="experiment", limit=10)["items"]
     other = next(each for each in toys if each["spec"]["robot"]["name"] == "toy_function")
@@ -199,6 +180,7 @@ def test_what_should_not_be_compared_is_warned_of(archive: Any, ids: Any, visit:
     expect(warned).to_have_count(0)
 
 
+@pytest.mark.release
 def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api: Any, written: Store, visit: Any) -> None:
     first, second = (submission.submit_experiment(written, toy(name=name)).id for name in ("one", "two"))
     page = visit(address(api, first, second, "nowhere"))
@@ -207,6 +189,7 @@ def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api: Any, written: S
     visit.forgive("404")
 
 
+@pytest.mark.release
 def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive: Any, visit: Any) -> None:
     many = [each["id"] for each in archive.get("/experiments", limit=60)["items"]]
     page = visit(address(archive, *many))
@@ -220,6 +203,7 @@ def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive: 
     expect(page.locator(".results")).to_be_hidden()
 
 
+@pytest.mark.release
 def test_it_grows_as_an_experiment_goes_on(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(name="growing", repetitions=2))
     claims = execution.claim(written, "tests", 2)
@@ -235,6 +219,7 @@ def test_it_grows_as_an_experiment_goes_on(api: Any, written: Store, visit: Any)
     expect(page.locator(".chosen .state-badge.completed")).to_be_visible()
 
 
+@pytest.mark.release
 def test_its_figure_is_saved_in_every_format(archive: Any, ids: Any, visit: Any) -> None:
     page = visit(address(archive, *ids, band="sd", x="rollouts"))
     for words, begins in (("SVG", b"<?xml"), ("PNG", b"\x89PNG"), ("PDF", b"%PDF"), ("CSV", b"experiment,")):
@@ -243,6 +228,7 @@ def test_its_figure_is_saved_in_every_format(archive: Any, ids: Any, visit: Any)
         assert saved.value.path().read_bytes().startswith(begins)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("dark", [False, True])
 def test_it_is_accessible_and_fits_a_phone(archive: Any, ids: Any, visit: Any, dark: Any) -> None:
     for width in (1280, 375):
@@ -258,6 +244,7 @@ def test_it_is_accessible_and_fits_a_phone(archive: Any, ids: Any, visit: Any, d
         screenshot(page, f"compare-{'dark' if dark else 'light'}-{width}")
 
 
+@pytest.mark.release
 def test_the_tests_of_all_pairs_are_copied_as_a_table(archive: Any, ids: Any, visit: Any) -> None:
     page = visit(address(archive, *ids[:3]))
     page.get_by_role("button", name="Copy as LaTeX").click()

@@ -8,61 +8,25 @@ import pytest
 
 QUIET = "#/toy"  # a view that asks for nothing
 QUEUED = {"robot": "toy_function", "strategies": ["random"], "budget": "smoke"}
-FOLLOWED = """
-async () => {
-  const { follow } = await import("/assets/dashboard/lib/live.js");
-  const streams = [];
-  globalThis.fetch = async () => new Response(new ReadableStream({ start: (stream) => streams.push(stream) }));
-  const told = [];
-  const refresh = async (events) => {
-    told.push(events.map((each) => each.data.number));
-    if (told.length === 1) throw new Error("not yet");
-  };
-  const until = async (holds) => { while (!holds()) await new Promise((resume) => setTimeout(resume, 20)); };
-  const text = (number) => `id: ${number}\\ndata: {"number": ${number}}\\n\\n`;
-  const send = (number) => streams.at(-1).enqueue(new TextEncoder().encode(text(number)));
-  const leaving = new AbortController();
-  follow({ after: 0 }, refresh, leaving.signal);
-  await until(() => streams.length === 1);
-  streams[0].close();
-  await until(() => streams.length === 2);
-  send(1);
-  await until(() => told.length === 1);
-  send(2);
-  await until(() => told.length === 2);
-  send(3);
-  await until(() => told.length === 3);
-  leaving.abort();
-  return told;
-}
-"""
 
 
-def test_after_a_break_everything_is_asked_for_anew_until_it_is_there_also_if_something_happens_meanwhile(
-    visit: Any, archive: Any
-) -> None:
-    page = visit(f"{archive.url}/{QUIET}")
-    page.get_by_role("heading", level=1).wait_for()
+def test_an_address_that_cannot_be_an_id_is_no_page(visit: Any, api: Any) -> None:
+    page = visit(f"{api.url}/{QUIET}")
 
-    assert page.evaluate(FOLLOWED) == [[], [], [3]]
-
-
-@pytest.mark.parametrize(
-    "view",
-    [
+    for view in (
         "experiments/%",
         "experiments/..%2F..",
         "studies/%E0%A4%A",
         "replay?experiment=../studies",
         "toy?experiment=..%2Fcatalogue%3F",
-    ],
-)
-def test_an_address_that_cannot_be_an_id_is_no_page(visit: Any, archive: Any, view: Any) -> None:
-    page = visit(f"{archive.url}/#/{view}")
+    ):
+        page.get_by_role("heading", name="The toy function").wait_for()
+        page.goto(f"{api.url}/#/{view}")
+        page.get_by_role("heading", name="There is no such page").wait_for()
+        page.goto(f"{api.url}/{QUIET}")
 
-    page.get_by_role("heading", name="There is no such page").wait_for()
 
-
+@pytest.mark.release
 def test_what_was_typed_just_before_one_left_does_not_change_the_address_of_another_view(
     visit: Any, archive: Any
 ) -> None:
@@ -77,6 +41,7 @@ def test_what_was_typed_just_before_one_left_does_not_change_the_address_of_anot
     assert page.url.endswith(QUIET)
 
 
+@pytest.mark.release
 def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit: Any, archive: Any) -> None:
     page = visit(f"{archive.url}/#/?show=experiments")
     page.locator("tr.experiment").nth(19).wait_for()
@@ -94,6 +59,7 @@ def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit: Any,
     assert page.locator("tr.experiment").count() == 0
 
 
+@pytest.mark.release
 def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_presses(
     visit: Any, archive: Any
 ) -> None:
@@ -115,9 +81,9 @@ def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_
     assert len(set(numbers)) == len(numbers)
 
 
-def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit: Any, archive: Any) -> None:
+def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit: Any, api: Any) -> None:
     visit.forgive("422")
-    page = visit(f"{archive.url}/#/new")
+    page = visit(f"{api.url}/#/new")
     page.locator(".panel .big").wait_for()
     seed = 2**64 - 1
 
@@ -129,13 +95,14 @@ def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit: Any, archive
     typed = json.loads(sent.value.post_data)
     assert (typed["seed"], typed["max_parallel"]) == (seed, "1e999")
     spec = {"robot": "toy_function", "strategy": "random", "budget": "smoke", "seed": seed}
-    made = archive.http.post("/experiments", json=spec).json()["id"]
-    page.goto(f"{archive.url}/#/experiments/{made}?tab=spec")
+    made = api.http.post("/experiments", json=spec).json()["id"]
+    page.goto(f"{api.url}/#/experiments/{made}?tab=spec")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
     page.get_by_text(f'"seed": {seed}').wait_for()
-    archive.http.post(f"/experiments/{made}/cancel")
+    api.http.post(f"/experiments/{made}/cancel")
 
 
+@pytest.mark.release
 def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_none_stands_for_another(
     visit: Any, archive: Any
 ) -> None:
@@ -153,6 +120,7 @@ def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_no
     archive.http.post(f"/experiments/{made.json()['id']}/cancel")
 
 
+@pytest.mark.release
 def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit: Any, archive: Any) -> None:
     visit.forgive("429")
     page = visit(f"{archive.url}/{QUIET}")
@@ -164,10 +132,10 @@ def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit: Any, arch
     page.get_by_text("Live updates are refused: 20 streams are open; trying again…").wait_for()
 
 
-@pytest.mark.parametrize("status", [401, 409])
-def test_a_page_that_no_longer_holds_is_loaded_again(visit: Any, archive: Any, status: int) -> None:
+@pytest.mark.parametrize("status", [pytest.param(401, marks=pytest.mark.release), 409])
+def test_a_page_that_no_longer_holds_is_loaded_again(visit: Any, api: Any, status: int) -> None:
     visit.forgive("40")
-    page = visit(f"{archive.url}/{QUIET}")
+    page = visit(f"{api.url}/{QUIET}")
     refusals = iter([{"status": status, "title": "Over", "detail": "The database was replaced."}])
 
     def refuse_once(route: Any) -> None:
@@ -183,6 +151,7 @@ def test_a_page_that_no_longer_holds_is_loaded_again(visit: Any, archive: Any, s
     page.locator("tr.study").first.wait_for()
 
 
+@pytest.mark.release
 def test_a_list_that_did_not_come_is_not_said_to_be_empty_and_comes_by_itself(visit: Any, archive: Any) -> None:
     visit.forgive("ERR_FAILED")
     page = visit(f"{archive.url}/#/?show=experiments")
@@ -199,6 +168,7 @@ def test_a_list_that_did_not_come_is_not_said_to_be_empty_and_comes_by_itself(vi
     page.get_by_role("heading", name="The service does not answer").wait_for(state="detached")
 
 
+@pytest.mark.release
 def test_more_of_a_list_that_does_not_come_is_said_and_asked_for_again(visit: Any, archive: Any) -> None:
     visit.forgive("500")
     page = visit(f"{archive.url}/#/?show=experiments")
@@ -216,6 +186,7 @@ def test_more_of_a_list_that_does_not_come_is_said_and_asked_for_again(visit: An
     page.get_by_role("heading", name="Busy").wait_for(state="detached")
 
 
+@pytest.mark.release
 def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit: Any, archive: Any) -> None:
     visit.forgive("500", "console: ")
     made = archive.http.post("/experiments", json={"robot": "toy_function", "strategy": "random", "budget": "smoke"})
@@ -232,6 +203,7 @@ def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit: A
     page.locator("tbody .state-badge.cancelled").first.wait_for()
 
 
+@pytest.mark.release
 def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit: Any, archive: Any) -> None:
     visit.forgive("ERR_FAILED")
     study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
@@ -248,10 +220,10 @@ def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit:
     archive.http.post(f"/studies/{study}/cancel")
 
 
-def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit: Any, archive: Any) -> None:
+def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit: Any, api: Any) -> None:
     visit.forgive("ERR_FAILED", "412")
-    study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
-    page = visit(f"{archive.url}/#/studies/{study}")
+    study = api.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
+    page = visit(f"{api.url}/#/studies/{study}")
     page.get_by_role("button", name="Edit name, notes and tags").click()
     page.get_by_label("Name", exact=True).fill("second name")
 
@@ -263,9 +235,10 @@ def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit: A
 
     page.get_by_role("heading", name="second name").wait_for()
     page.locator("dialog").wait_for(state="detached")
-    archive.http.post(f"/studies/{study}/cancel")
+    api.http.post(f"/studies/{study}/cancel")
 
 
+@pytest.mark.release
 def test_an_estimate_that_comes_late_does_not_wipe_away_why_the_study_was_refused(visit: Any, archive: Any) -> None:
     visit.forgive("429")
     page = visit(f"{archive.url}/#/new")

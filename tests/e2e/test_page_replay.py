@@ -1,4 +1,7 @@
-"""Replays and the toy in a real browser: two worlds on one timeline, and Fig. 3 stepped through."""
+"""Replays and the toy in a real browser: two worlds on one timeline, and Fig. 3 stepped through.
+
+For a release, but for the toy: `test_page_any_robot` has a replay of a robot with every shape.
+"""
 
 from io import BytesIO
 from itertools import islice
@@ -63,6 +66,7 @@ def picture(canvas: Any) -> Any:
     return np.asarray(Image.open(BytesIO(canvas.screenshot())).convert("RGB"), dtype=int)
 
 
+@pytest.mark.release
 def test_a_controller_walks_in_both_worlds_on_one_timeline(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     canvases = page.locator(".stage-canvas")
@@ -87,6 +91,7 @@ def test_a_controller_walks_in_both_worlds_on_one_timeline(visit: Any, archive: 
         assert (np.abs(now - first).sum(axis=-1) > 60).mean() > 0.005
 
 
+@pytest.mark.release
 def test_it_plays_at_the_speed_that_is_chosen_and_stands_when_told(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
 
@@ -106,6 +111,7 @@ def test_it_plays_at_the_speed_that_is_chosen_and_stands_when_told(visit: Any, a
     eventually(page, lambda: time_of(page) > 0.1)
 
 
+@pytest.mark.release
 def test_the_camera_goes_round_by_keys_and_by_dragging(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     canvas = page.locator(".stage-canvas").first
@@ -126,6 +132,7 @@ def test_the_camera_goes_round_by_keys_and_by_dragging(visit: Any, archive: Any,
     assert time_of(page) == 0  # the arrows are the camera's
 
 
+@pytest.mark.release
 def test_the_cursor_of_the_gait_follows_the_time_and_a_click_moves_it(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     page.wait_for_selector(".gait .main-svg")
@@ -143,6 +150,7 @@ def test_the_cursor_of_the_gait_follows_the_time_and_a_click_moves_it(visit: Any
     eventually(page, lambda: abs(time_of(page) - 1) < 0.03)
 
 
+@pytest.mark.release
 def test_the_cursor_follows_a_gait_that_is_painted_late_at_another_width(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     page.wait_for_selector(".gait .main-svg")
@@ -159,6 +167,7 @@ def test_the_cursor_follows_a_gait_that_is_painted_late_at_another_width(visit: 
     eventually(page, on_the_time)
 
 
+@pytest.mark.release
 def test_another_controller_or_simulator_is_chosen_and_is_in_the_address(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
 
@@ -176,6 +185,7 @@ def test_another_controller_or_simulator_is_chosen_and_is_in_the_address(visit: 
     assert page.get_by_label("Iteration", exact=True).input_value() == "3"
 
 
+@pytest.mark.release
 def test_what_is_not_there_says_so_and_another_may_be_chosen(visit: Any, archive: Any, walker: Any) -> None:
     visit.forgive("404")
     page = visit(f"{archive.url}/#/replay?experiment={walker}&repetition=99&iteration=1")
@@ -187,6 +197,7 @@ def test_what_is_not_there_says_so_and_another_may_be_chosen(visit: Any, archive
     page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
 
 
+@pytest.mark.release
 def test_what_is_not_yet_there_may_be_looked_for_again(visit: Any, api: Any, written: Store) -> None:
     visit.forgive("409")
     spec = {"strategy": "random", "robot": "quadruped", "repetitions": 1, "budget": "smoke"}
@@ -201,6 +212,7 @@ def test_what_is_not_yet_there_may_be_looked_for_again(visit: Any, api: Any, wri
     assert page.get_by_role("button", name="Try again").is_visible()
 
 
+@pytest.mark.release
 def test_the_page_of_an_experiment_leads_to_its_replays(visit: Any, archive: Any, walker: Any) -> None:
     page = visit(f"{archive.url}/#/experiments/{walker}")
 
@@ -210,6 +222,7 @@ def test_the_page_of_an_experiment_leads_to_its_replays(visit: Any, archive: Any
     assert page.get_by_label("Iteration", exact=True).input_value() == "10"  # the last
 
 
+@pytest.mark.release
 def test_the_direct_baseline_is_seen_in_reality_alone(visit: Any, archive: Any) -> None:
     direct = of_the_study(archive, "direct")
 
@@ -219,6 +232,7 @@ def test_the_direct_baseline_is_seen_in_reality_alone(visit: Any, archive: Any) 
     assert page.get_by_text("This controller evolved in reality itself.").is_visible()
 
 
+@pytest.mark.release
 def test_without_webgl_it_is_seen_from_the_side(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     page.add_init_script(FLAT)
@@ -228,8 +242,8 @@ def test_without_webgl_it_is_seen_from_the_side(visit: Any, archive: Any, walker
     assert len(np.unique(picture(page.locator(".stage-canvas").first).reshape(-1, 3), axis=0)) > 5
 
 
-def test_the_toy_is_stepped_through(visit: Any, archive: Any, function: Any) -> None:
-    page = visit(f"{archive.url}/#/toy?experiment={function}")
+def test_the_toy_is_stepped_through(visit: Any, api: Any, known: Any) -> None:
+    page = visit(f"{api.url}/#/toy?experiment={known.ids[0]}")
     page.wait_for_selector(".toy .main-svg")
     page.wait_for_selector("text=Iteration 0: after 0 samples")
 
@@ -261,6 +275,7 @@ def seen_by_all(page: Any, name: Any) -> None:
     screenshot(page, f"{name}-phone")
 
 
+@pytest.mark.release
 def test_a_replay_can_be_seen_by_all(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     page.get_by_label("Time", exact=True).fill("1.2")
@@ -269,6 +284,7 @@ def test_a_replay_can_be_seen_by_all(visit: Any, archive: Any, walker: Any) -> N
     seen_by_all(page, "replay")
 
 
+@pytest.mark.release
 def test_the_toy_can_be_seen_by_all(visit: Any, archive: Any, function: Any) -> None:
     page = visit(f"{archive.url}/#/toy?experiment={function}&iteration=4")
     page.wait_for_selector(".toy .main-svg")

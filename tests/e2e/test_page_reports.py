@@ -33,6 +33,7 @@ def saved(page: Any, link: str, part: Any = None) -> Any:
     return download.value.suggested_filename, download.value.path().read_bytes()
 
 
+@pytest.mark.release
 def test_the_settings_that_differ_are_those_that_the_service_found(archive: Any, study: Any, visit: Any) -> None:
     ids = [each["id"] for each in study["experiments"]][:3]
     found = archive.get("/differences", experiment=ids)
@@ -47,6 +48,7 @@ def test_the_settings_that_differ_are_those_that_the_service_found(archive: Any,
     expect(page.get_by_text(f"{found['equal']} other settings are equal.")).to_be_visible()
 
 
+@pytest.mark.release
 def test_simulators_are_drawn_in_parallel_coordinates(archive: Any, walker: Any, visit: Any) -> None:
     tunables = [each["name"] for each in archive.get(f"/experiments/{walker}")["spec"]["tunables"]]
 
@@ -64,6 +66,7 @@ def test_simulators_are_drawn_in_parallel_coordinates(archive: Any, walker: Any,
     assert (name.rpartition("-")[2], content[:5]) == ("coordinates.svg", b"<?xml")
 
 
+@pytest.mark.release
 def test_on_a_phone_every_axis_of_the_coordinates_has_its_label(archive: Any, walker: Any, visit: Any) -> None:
     page = visit(f"{archive.url}/#/experiments/{walker}", width=390)
     figure = page.locator(".figure-coordinates")
@@ -78,6 +81,7 @@ def test_on_a_phone_every_axis_of_the_coordinates_has_its_label(archive: Any, wa
     screenshot(page, "coordinates-phone")
 
 
+@pytest.mark.release
 def test_in_the_dark_the_lines_of_the_coordinates_have_the_colours_of_their_bar(
     archive: Any, walker: Any, visit: Any
 ) -> None:
@@ -94,21 +98,20 @@ def test_in_the_dark_the_lines_of_the_coordinates_have_the_colours_of_their_bar(
     screenshot(page, "coordinates-dark")
 
 
-@pytest.mark.parametrize("of", ["studies", "experiments"])
-def test_a_report_is_saved_with_the_verdict_that_the_service_gives(
-    archive: Any, study: Any, walker: Any, visit: Any, of: str
-) -> None:
-    id_ = study["id"] if of == "studies" else walker
-    page = visit(f"{archive.url}/#/{of}/{id_}")
+@pytest.mark.parametrize("of", ["experiments", pytest.param("studies", marks=pytest.mark.release)])
+def test_a_report_is_saved_with_the_verdict_that_the_service_gives(api: Any, known: Any, visit: Any, of: str) -> None:
+    id_ = known.study if of == "studies" else known.ids[0]
+    page = visit(f"{api.url}/#/{of}/{id_}")
 
     name, content = saved(page, "Report")
 
     assert name == f"gaplab-{id_}-report.html"
     assert content.startswith(b"<!doctype html>")
-    assert archive.get(f"/{of}/{id_}/report", format="json")["headline"] in content.decode()
+    assert api.get(f"/{of}/{id_}/report", format="json")["headline"] in content.decode()
     expect(page.get_by_role("link", name="Report as PDF")).to_have_attribute("href", re.compile("format=pdf"))
 
 
+@pytest.mark.release
 def test_a_replay_is_saved_as_a_video_of_the_controller_that_is_shown(archive: Any, walker: Any, visit: Any) -> None:
     query = "repetition=0&iteration=1&kind=sample"
     computed = lambda: archive.http.get(f"/experiments/{walker}/replay?{query}").status_code  # noqa: E731

@@ -1,34 +1,19 @@
 """What may be asked of an experiment on its page: the verbs, its turn, its name, and what a reader may not."""
 
 import re
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import expect
 
-from gaplab.schemas.access import Role
 from gaplab.schemas.spec import StudySpec
-from gaplab.services.access import create_token
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
-from tests.e2e.api_alone import Api
 from tests.experiments import run, some_log, toy
 
 SLOW_MS = 120_000
 expect.set_options(timeout=SLOW_MS)
-
-
-@pytest.fixture
-def guarded(sqlite_url: str, sqlite_store: Store, tmp_path: Path) -> Iterator[Any]:
-    """A service with tokens, a reader's, and an experiment."""
-    submitted = submission.submit_experiment(sqlite_store, toy(name="guarded"))
-    token = create_token(sqlite_store, Role.READER).secret
-    api = Api(sqlite_url, tmp_path / "api.log").start()
-    yield api, token, submitted
-    api.close()
 
 
 def address(api: Any, experiment: Any) -> str:
@@ -81,6 +66,7 @@ def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api: Any, 
     expect(page.locator(".state-now")).to_contain_text("completed")
 
 
+@pytest.mark.release
 def test_the_direct_baseline_is_extended_by_repetitions_alone(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(strategy="direct", repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
@@ -109,6 +95,7 @@ def test_a_study_is_extended(api: Any, written: Store, visit: Any) -> None:
     assert [each["spec"]["repetitions"] for each in api.get(f"/studies/{study.id}")["experiments"]] == [3, 3]
 
 
+@pytest.mark.release
 def test_a_study_gets_more_iterations_and_its_baseline_no_more_repetitions(
     api: Any, written: Store, visit: Any
 ) -> None:
@@ -142,18 +129,3 @@ def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api: Any, w
     page.get_by_role("button", name="Save").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("<b>ours</b>")
     expect(page.locator(".notes")).to_have_text("On the second robot")
-
-
-def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look(guarded: Any, visit: Any) -> None:
-    api, token, submitted = guarded
-    visit.forgive("403")
-    page = visit(f"{api.url}/assets/dashboard/icon.svg")
-    page.evaluate("(token) => sessionStorage.setItem('gaplab-token', token)", token)
-    page.goto(address(api, submitted.id))
-    with page.expect_download() as saved:
-        page.get_by_role("link", name="Archive of everything").click()
-    assert saved.value.url.startswith("blob:")
-    assert saved.value.path().read_bytes().startswith(b"PK")
-    page.get_by_role("button", name="Pause").click()
-    expect(page.locator(".life-cycle .outcome").first).to_contain_text("runner")
-    expect(page.locator(".state-now")).to_contain_text("queued")

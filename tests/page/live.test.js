@@ -2,9 +2,9 @@ import { FakeNode } from "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-globalThis.document.addEventListener = () => {};
+Object.assign(globalThis.document, { addEventListener() {}, getElementById: () => new FakeNode("p") });
 const { ageOf, keepAges } = await import("../../api/dashboard/lib/ages.js");
-const { latestAnswers, reloadEvery } = await import("../../api/dashboard/lib/live.js");
+const { follow, latestAnswers, reloadEvery } = await import("../../api/dashboard/lib/live.js");
 const { rest } = await import("../../api/dashboard/lib/rest.js");
 const { newFromThis } = await import("../../api/dashboard/lib/new_from_this.js");
 
@@ -83,4 +83,29 @@ test("a new study has the seed of the old one to the last digit", async () => {
   newFromThis("/studies/s").querySelector("button").click();
   while (!location.hash) await new Promise((resume) => { setTimeout(resume); });
   assert.equal(new URLSearchParams(location.hash.split("?")[1]).get("spec"), '{"seed":18446744073709551615}');
+});
+
+test("after a break everything is asked for anew until it is there, also if something happens meanwhile", async () => {
+  const streams = [];
+  globalThis.fetch = () => Promise.resolve(new Response(new ReadableStream({ start: (stream) => streams.push(stream) })));
+  const told = [];
+  const refresh = (events) => {
+    told.push(events.map((each) => each.data.number));
+    return told.length === 1 ? Promise.reject(new Error("not yet")) : Promise.resolve();
+  };
+  const until = async (holds) => { while (!holds()) await new Promise((resume) => { setTimeout(resume, 20); }); };
+  const send = (number) => streams.at(-1).enqueue(new TextEncoder().encode(`id: ${number}\ndata: {"number": ${number}}\n\n`));
+  const leaving = new AbortController();
+  follow({ after: 0 }, refresh, leaving.signal);
+  await until(() => streams.length === 1);
+  streams[0].close();
+  await until(() => streams.length === 2);
+  send(1);
+  await until(() => told.length === 1);
+  send(2);
+  await until(() => told.length === 2);
+  send(3);
+  await until(() => told.length === 3);
+  leaving.abort();
+  assert.deepEqual(told, [[], [], [3]]);
 });
