@@ -72,22 +72,21 @@ def service(home: Path) -> Iterator[LocalService]:
         yield found
 
 
-def outputs_of(path: Path, folder: Path) -> list[Any]:
+def outputs_of(path: Path, folder: Path, **environment: str) -> list[Any]:
     """What the cells of a notebook show, run from its first to its last."""
     notebook = nbformat.read(path, as_version=4)
-    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute()
+    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute(
+        env=os.environ | environment
+    )
     return [output for cell in notebook.cells for output in cell.get("outputs", ())]
 
 
 @pytest.mark.parametrize("path", one_of(NOTEBOOKS, "compare"))
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
-def test_a_notebook_runs_from_its_first_cell_to_its_last(
-    path: Path, service: LocalService, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("GAPLAB_URL", service.url)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
+def test_a_notebook_runs_from_its_first_cell_to_its_last(path: Path, service: LocalService, tmp_path: Path) -> None:
+    found = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
-    shown = outputs_of(path, tmp_path)
+    shown = outputs_of(path, tmp_path, GAPLAB_URL=service.url, PYTHONPATH=found)
 
     data = [output["data"] for output in shown if "data" in output]
     assert any("image/svg+xml" in each for each in data)  # a figure

@@ -68,32 +68,30 @@ def test_anything_else_gets_json() -> None:
     }
 
 
+SECRETIVE = (
+    f"Authorization: Bearer {SECRET}",
+    f"{{'authorization': 'Bearer {SECRET}'}}",
+    f"headers [(b'authorization', b'Bearer {SECRET}')]",
+    f"Authorization: {SECRET}",
+    f"it sent bearer {SECRET}",
+    f"GET /events?after=3&token={SECRET}&kind=probed",
+    f"GET /events?access_token={SECRET}",
+    f"postgresql://me:{SECRET}@127.0.0.1/gaplab is away",
+    f"connection failed: host=db password={SECRET} user=me",
+    f"RAY_AUTH_TOKEN={SECRET}",
+    f'{{"api_key": "{SECRET}"}}',
+    f"GAPLAB_TOKEN: '{SECRET}'",
+    f"GET /experiments/gaplab_0a1b2c_{TOKEN} 404",
+    f"there is nothing with the id 'gaplab_0a1b2c_{TOKEN[:40]}'",
+)
+
+
 @pytest.mark.usefixtures("restored")
 @pytest.mark.parametrize("kind", [io.StringIO, Terminal])
-@pytest.mark.parametrize(
-    "message",
-    [
-        f"Authorization: Bearer {SECRET}",
-        f"{{'authorization': 'Bearer {SECRET}'}}",
-        f"headers [(b'authorization', b'Bearer {SECRET}')]",
-        f"Authorization: {SECRET}",
-        f"it sent bearer {SECRET}",
-        f"GET /events?after=3&token={SECRET}&kind=probed",
-        f"GET /events?access_token={SECRET}",
-        f"postgresql://me:{SECRET}@127.0.0.1/gaplab is away",
-        f"connection failed: host=db password={SECRET} user=me",
-        f"RAY_AUTH_TOKEN={SECRET}",
-        f'{{"api_key": "{SECRET}"}}',
-        f"GAPLAB_TOKEN: '{SECRET}'",
-        f"GET /experiments/gaplab_0a1b2c_{TOKEN} 404",
-        f"there is nothing with the id 'gaplab_0a1b2c_{TOKEN[:40]}'",
-    ],
-)
-def test_what_looks_like_a_secret_is_left_out(message: Any, kind: Any) -> None:
-    said = logged(kind(), "%s", message)
+def test_what_looks_like_a_secret_is_left_out(kind: Any) -> None:
+    said = {message: logged(kind(), "%s", message) for message in SECRETIVE}
 
-    assert SECRET not in said
-    assert TOKEN[:16] not in said
+    assert [message for message in said if SECRET in said[message] or TOKEN[:16] in said[message]] == []
 
 
 @pytest.mark.usefixtures("restored")

@@ -170,7 +170,7 @@ def hurry(monkeypatch: pytest.MonkeyPatch) -> None:
     ray = Ray()
     monkeypatch.setattr(checking, "ray", ray)
     monkeypatch.setattr(checking, "check", ray)
-    monkeypatch.setattr(Trying, "lost", False)
+    Trying.lost = False
 
 
 @pytest.fixture(autouse=True)

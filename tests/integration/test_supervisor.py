@@ -94,29 +94,25 @@ def test_ray_keeps_its_files_where_only_their_owner_looks_and_removes_them(tmp_p
     assert not folder.exists()
 
 
-def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with TemporaryDirectory(prefix="g-", dir="/tmp") as parent:
-        monkeypatch.setenv("RAY_TMPDIR", parent)
-        left, starting = (Path(parent) / f"{PREFIX}{name}" for name in ("left", "starting"))
+def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start() -> None:
+    with TemporaryDirectory(prefix="g-", dir="/tmp") as made:
+        parent = Path(made)
+        left, starting = (parent / f"{PREFIX}{name}" for name in ("left", "starting"))
         for folder in (left, starting):
             folder.mkdir()
             (folder / "lock").touch()
         os.utime(left, (0, 0))
-        with ray_folder() as held:
+        with ray_folder(parent) as held:
             os.utime(held, (0, 0))
-            with ray_folder():
-                found = sorted(Path(parent).iterdir())
+            with ray_folder(parent):
+                found = sorted(parent.iterdir())
 
     assert left not in found
     assert {held, starting} <= set(found)
 
 
-def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RAY_TMPDIR", str(tmp_path / ("long" * 20)))
-
-    with ray_folder() as folder:
+def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path) -> None:
+    with ray_folder(tmp_path / ("long" * 20)) as folder:
         assert folder.parent == Path("/tmp")
 
 
