@@ -65,7 +65,7 @@ class NoChecks:
 
 
 class HereRepetitions(Repetitions):
-    """Repetitions that this process computes: each answer of a simulator is a checkpoint, each round looks for work."""
+    """Repetitions that this process computes; each round looks for work."""
 
     def claim(self, capacity: Callable[[], int]) -> None:
         """Hand back what should not start now, and claim up to the capacity."""
@@ -74,7 +74,7 @@ class HereRepetitions(Repetitions):
 
     def launch(self, claim: Claim) -> Run:
         """Compute the repetition in this process."""
-        stream = delivered(lambda: setting(claim.spec, claim.number), claim, 0.0)
+        stream = delivered(lambda: setting(claim.spec, claim.number), claim, self._checkpoint_s)
         return HereRun(claim, stream)
 
     def receive(self) -> None:
@@ -85,13 +85,13 @@ class HereRepetitions(Repetitions):
 
 
 class Here(Supervisor):
-    """The supervisor as it is, but for Ray; each round has a heartbeat."""
+    """The supervisor as it is, but for Ray; each round has a heartbeat, and each answer of a simulator is a checkpoint."""
 
     repetitions: type[HereRepetitions] = HereRepetitions
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, checkpoint_s: float = 0.0) -> None:
         super().__init__(store, lambda: 2)
-        self._repetitions = self.repetitions(store, self._owner, {})
+        self._repetitions = self.repetitions(store, self._owner, {}, checkpoint_s)
         self._checks = NoChecks()  # type: ignore[assignment]
 
     def _heartbeat(self) -> None:

@@ -45,6 +45,7 @@ from tests.fakes import flat, install
 from tests.without_ray import Here, HereRepetitions, HereRun
 
 POLL_S = 0.001
+CHECKPOINT_S = 60.0
 SMALL = {
     "strategy": "simulated_fit",
     "robot": "toy_function",
@@ -112,7 +113,7 @@ def on_the_bench(**changes: Any) -> ExperimentSpec:
 
 def work(store: Store, here: Here | None = None) -> None:
     """Rounds of a supervisor until nothing can go on."""
-    here = here or Here(store)
+    here = here or Here(store, CHECKPOINT_S)
     for _ in range(400):
         here.step()
         with store.reading() as session:
@@ -185,7 +186,7 @@ class Nonsense(LeftOut):
 
 
 def with_repetitions(kind: type[HereRepetitions], store: Store) -> Here:
-    return type("Such", (Here,), {"repetitions": kind})(store)  # type: ignore[no-any-return]
+    return type("Such", (Here,), {"repetitions": kind})(store, CHECKPOINT_S)  # type: ignore[no-any-return]
 
 
 def test_what_cannot_be_stored_fails_its_repetition_alone(sqlite_store: Store) -> None:
