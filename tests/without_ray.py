@@ -85,7 +85,7 @@ class HereRepetitions(Repetitions):
 
 
 class Here(Supervisor):
-    """The supervisor as it is, but for Ray; each round has a heartbeat, and each answer of a simulator is a checkpoint."""
+    """The supervisor as it is, but for Ray: each round has a heartbeat, each answer of a simulator is a checkpoint."""
 
     repetitions: type[HereRepetitions] = HereRepetitions
 

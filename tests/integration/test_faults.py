@@ -177,12 +177,14 @@ class LeftOut(HereRepetitions):
         return HereRun(claim, stream())  # type: ignore[arg-type]
 
 
-class Nonsense(LeftOut):
+class Nonsense(HereRepetitions):
     """Repetition 1 delivers a step that no table holds."""
 
     def launch(self, claim: Claim) -> Run:
+        if claim.number != 1:
+            return super().launch(claim)
         nonsense = TimedStep(Tuned(0, ("no simulator",)), 0.0)  # type: ignore[arg-type]
-        return HereRun(claim, iter([(nonsense,)])) if claim.number == 1 else super().launch(claim)  # type: ignore[arg-type]
+        return HereRun(claim, (each for each in [(nonsense,)]))  # type: ignore[arg-type]
 
 
 def with_repetitions(kind: type[HereRepetitions], store: Store) -> Here:
