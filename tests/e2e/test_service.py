@@ -26,7 +26,7 @@ TOY = {
     "strategies": ["simulated_fit_and_informative", "known_fit", "direct"],
     "iterations": 2,
     "repetitions": 2,
-    "budget": {"controller_evaluations": 1_500, "selection_evaluations": 300},
+    "budget": {"controller_evaluations": 500, "selection_evaluations": 100},
     "seed": 5,
 }
 LONG_STEPS = {
