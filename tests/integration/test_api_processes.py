@@ -27,7 +27,7 @@ from gaplab.services.access import create_token, revoke_token
 from gaplab.services.core.errors import StoreUnavailable, Unauthenticated
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 
 def alive(pid: int) -> bool:
@@ -51,10 +51,10 @@ def ended(environment: dict[str, str], *arguments: str) -> tuple[int, str]:
     """Return the exit code and the output of a service that does not start; one that does is ended, and fails."""
     process = serve(environment, *arguments)
     try:
-        said, _ = process.communicate(timeout=60)
+        said, _ = process.communicate(timeout=LONGEST_S)
     finally:
         process.terminate()
-        process.wait(60)
+        process.wait(LONGEST_S)
     return process.returncode, said
 
 
@@ -75,7 +75,7 @@ def test_a_service_migrates_its_database_answers_and_ends_in_order(
     with Client(f"http://127.0.0.1:{port}") as client:
         wait_until(client.ready)
     process.send_signal(how)
-    said, _ = process.communicate(timeout=60)
+    said, _ = process.communicate(timeout=LONGEST_S)
 
     assert process.returncode == 0, said
     assert json.loads(said)["message"].startswith(f"gaplab serves on http://127.0.0.1:{port}")
@@ -104,7 +104,7 @@ def test_links_of_notifications_have_the_port_of_the_command(
             wait_until(told.exists)
     finally:
         process.terminate()
-        process.communicate(timeout=60)
+        process.communicate(timeout=LONGEST_S)
 
     assert json.loads(told.read_text())["url"] == f"http://127.0.0.1:{port}/#/experiments/{made}"
 
@@ -153,7 +153,7 @@ def test_a_supervisor_on_no_database_of_a_known_kind_ends_with_a_sentence() -> N
         env=os.environ | {"GAPLAB_DATABASE_URL": "mysql://me:secret@127.0.0.1/x"},
         capture_output=True,
         text=True,
-        timeout=180,
+        timeout=LONGEST_S,
         check=False,
     )
 
@@ -175,7 +175,7 @@ def test_beyond_loopback_a_service_without_a_token_does_not_start_and_says_how_t
         env=os.environ | environment | {"GAPLAB_PORT": str(port)},
         capture_output=True,
         text=True,
-        timeout=180,
+        timeout=LONGEST_S,
         check=False,
     )
 
@@ -204,7 +204,7 @@ def test_a_port_that_is_taken_is_a_sentence(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         process = serve({"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'x.db'}"}, "--port", str(port))
-        said, _ = process.communicate(timeout=60)
+        said, _ = process.communicate(timeout=LONGEST_S)
 
     assert process.returncode == 1
     assert re.fullmatch(rf"gaplab: cannot serve on 127\.0\.0\.1:{port}: address already in use\n", said)

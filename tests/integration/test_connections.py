@@ -24,7 +24,7 @@ from gaplab.api.process.server import Server, listen
 from gaplab.services.logs import Repeats
 from gaplab.services.settings import Limits
 from gaplab.services.store.session import Store
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 DEADLINE_S = 120.0
 HALF = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "
@@ -88,7 +88,7 @@ def test_more_half_sent_requests_than_files_leave_the_service_alive_and_its_log_
             wait_until(lambda: is_alive(url))
     finally:
         process.terminate()
-        process.communicate(timeout=60)
+        process.communicate(timeout=LONGEST_S)
     assert log.stat().st_size < 100_000
 
 

@@ -19,7 +19,7 @@ from gaplab.services import logs
 from gaplab.services.experiments import submission
 from gaplab.services.store.session import Store
 from tests.experiments import toy
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 SECRET = "Zm9vYmFyLTEyMzQ1"
 TOKEN = "0123456789abcdef" * 4
@@ -173,7 +173,7 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
         process = subprocess.Popen([sys.executable, "-c", script, str(place)], stdout=output, stderr=output)
     try:
         wait_until(lambda: place.exists() and place.read_text())
-        with httpx2.Client(base_url=f"http://127.0.0.1:{place.read_text()}", timeout=60) as http:
+        with httpx2.Client(base_url=f"http://127.0.0.1:{place.read_text()}", timeout=LONGEST_S) as http:
             wait_until(lambda: http.get("/readyz").status_code == 200)
             secret = {"Authorization": f"Bearer {SECRET}", "X-Token": SECRET}
             assert http.get("/experiments/abc", headers=secret).status_code == 401
@@ -183,7 +183,7 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
             assert http.get(f"/gaplab%5Fabc%5F{TOKEN}", params={"gaplab_abc_": TOKEN}).status_code == 404
     finally:
         process.terminate()
-        process.wait(60)
+        process.wait(LONGEST_S)
 
     said = log.read_text()
     lines = [json.loads(line) for line in said.splitlines()]

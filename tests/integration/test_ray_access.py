@@ -13,6 +13,7 @@ from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.settings import Settings
 from gaplab.workers.__main__ import choose_authentication
 from gaplab.workers.cluster import cluster
+from tests.waiting import LONGEST_S
 
 OWN = """
 import os, subprocess, sys
@@ -78,7 +79,7 @@ def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_env
         env=inherited | {"PYTHONPATH": str(root), "RAY_AUTH_MODE": "disabled", "HOME": str(tmp_path)},
         capture_output=True,
         text=True,
-        timeout=180,
+        timeout=LONGEST_S,
         check=False,
     )
 
