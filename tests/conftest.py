@@ -4,13 +4,13 @@
 does. `sqlite_store` is one on SQLite alone, for tests in which the database does not matter. `store_url` and
 `sqlite_url` are the URLs of the same, and `database_url` is an empty database of either kind, for migrations. Each test
 has a database of its own: a copy of one that was migrated once. All test processes share one Postgres server.
-`tests/tiers.py` decides which tests a run has.
+`ray` is a Ray with two cores that all tests which want one share. `tests/tiers.py` decides which tests a run has.
 """
 
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,6 +26,9 @@ from gaplab.services.store.session import Store
 from tests import postgres as servers
 
 pytest_plugins = ["tests.tiers"]
+
+STARTS = 8
+"""Most starts of a Ray, each of which has half a minute."""
 
 _DATABASES = ("sqlite", "postgres")
 _SHARED = pytest.StashKey[str]()
@@ -168,6 +171,33 @@ def _opened(url: str) -> Iterator[Store]:
     store = Store(url)
     yield store
     store.dispose()
+
+
+@pytest.fixture(scope="session")
+def shared_ray() -> Iterator[ExitStack]:
+    """Holds the Ray of this process, once it has one; a test that starts another one ends it first."""
+    with ExitStack() as stack:
+        yield stack
+
+
+@pytest.fixture
+def ray(shared_ray: ExitStack) -> None:
+    """This process has a Ray with two cores."""
+    import ray  # takes a second
+
+    from gaplab.services.core.errors import ClusterUnusable
+    from gaplab.services.settings import Settings
+    from gaplab.workers.cluster import cluster
+
+    tries = 0
+    while not ray.is_initialized():
+        shared_ray.close()
+        tries += 1
+        try:
+            shared_ray.enter_context(cluster(Settings(workers=2)))
+        except ClusterUnusable:  # a start that takes more than half a minute: the machine is busy
+            if tries == STARTS:
+                raise
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """Stand-ins of a few lines: simulations that are formulas, and settings that run in milliseconds."""
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -106,6 +107,5 @@ class Careful(Strategy):
 def install(monkeypatch: pytest.MonkeyPatch, registry: Registry[Any], plugin: type[Plugin]) -> None:
     """Let this process have one more plug-in until the end of the test."""
     monkeypatch.setitem(registry._found.usable, plugin.name, plugin)
-    for module, name in ((blame, "_plugins"), (versions, "_provenance")):  # without their caches
-        cached = getattr(module, name)
-        monkeypatch.setattr(module, name, getattr(cached, "__wrapped__", cached))
+    for module, name in ((blame, "_plugins"), (versions, "_provenance")):  # with caches of their own
+        monkeypatch.setattr(module, name, lru_cache(getattr(module, name).__wrapped__))

@@ -9,10 +9,11 @@ import argparse
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from hashlib import sha256
 from pathlib import Path
+from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -161,7 +162,12 @@ def survived(databases: Databases, point: str, when: str, occurrence: int, expec
     return went_on and found == expected
 
 
-def rows(databases: Databases, kills: int) -> dict[tuple[str, str], tuple[int, int]]:
+CASES = [(point, when) for point in POINTS for when in ("before", "after")]
+
+
+def rows(
+    databases: Databases, kills: int, cases: Sequence[tuple[str, str]] = CASES
+) -> dict[tuple[str, str], tuple[int, int]]:
     """For each point, before and after: kills that were survived, and all of them."""
     url = databases.new()
     totals = occurrences(url)
@@ -172,8 +178,7 @@ def rows(databases: Databases, kills: int) -> dict[tuple[str, str], tuple[int, i
             sum(survived(databases, point, when, each, expected) for each in spread(totals[point], kills)),
             len(spread(totals[point], kills)),
         )
-        for point in POINTS
-        for when in ("before", "after")
+        for point, when in cases
     }
 
 
@@ -181,10 +186,13 @@ def main() -> int:
     """Print the table; 1 if a kill was not survived, or a point never passed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=10, help="at each point, spread over a whole run")
+    parser.add_argument("--once", action="store_true", help="each point before or after, drawn from a fixed seed")
     parser.add_argument("--only", choices=("SQLite", "Postgres"), help="left out: both")
     parser.add_argument("--postgres", help="URL of a running server; left out: one is started")
     parser.add_argument("--folder", type=Path, help="for the SQLite files; left out: a temporary one")
     arguments = parser.parse_args()
+    draw = Random(1)
+    cases = [(point, draw.choice(("before", "after"))) for point in POINTS] if arguments.once else CASES
     with ExitStack() as stack:
         folder = arguments.folder or Path(stack.enter_context(TemporaryDirectory()))
         found = {}
@@ -192,7 +200,7 @@ def main() -> int:
             on_postgres = name == "Postgres"
             server = (arguments.postgres or stack.enter_context(running(folder))) if on_postgres else None
             databases = Databases(folder, server, SPEC)
-            found[name] = rows(databases, arguments.kills)
+            found[name] = rows(databases, arguments.kills, cases)
             databases.close()
     table = Table("killed", *found, title="kills survived with equal results")
     for point, when in next(iter(found.values())):

@@ -1,6 +1,8 @@
 """The real supervisor, repetitions and store in one process, without Ray: quick to kill, and to start again."""
 
 import sys
+from collections.abc import Callable
+from math import inf
 from time import sleep
 
 from sqlalchemy import select
@@ -12,7 +14,6 @@ from gaplab.services.running.execution import Claim
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.session import Store
-from gaplab.workers import repetitions, supervisor
 from gaplab.workers.repetitions import Repetitions
 from gaplab.workers.run import Run
 from gaplab.workers.supervisor import Supervisor
@@ -64,11 +65,16 @@ class NoChecks:
 
 
 class HereRepetitions(Repetitions):
-    """Repetitions that this process computes; every answer of a simulator is a checkpoint."""
+    """Repetitions that this process computes; each round looks for work."""
+
+    def claim(self, capacity: Callable[[], int]) -> None:
+        """Hand back what should not start now, and claim up to the capacity."""
+        self._looked = -inf
+        super().claim(capacity)
 
     def launch(self, claim: Claim) -> Run:
         """Compute the repetition in this process."""
-        stream = delivered(lambda: setting(claim.spec, claim.number), claim, 0.0)
+        stream = delivered(lambda: setting(claim.spec, claim.number), claim, self._checkpoint_s)
         return HereRun(claim, stream)
 
     def receive(self) -> None:
@@ -79,14 +85,18 @@ class HereRepetitions(Repetitions):
 
 
 class Here(Supervisor):
-    """The supervisor as it is, but for Ray."""
+    """The supervisor as it is, but for Ray: each round has a heartbeat, each answer of a simulator is a checkpoint."""
 
     repetitions: type[HereRepetitions] = HereRepetitions
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, checkpoint_s: float = 0.0) -> None:
         super().__init__(store, lambda: 2)
-        self._repetitions = self.repetitions(store, self._owner, {})
+        self._repetitions = self.repetitions(store, self._owner, {}, checkpoint_s)
         self._checks = NoChecks()  # type: ignore[assignment]
+
+    def _heartbeat(self) -> None:
+        self._beat = -inf
+        super()._heartbeat()
 
 
 class Stop:
@@ -107,8 +117,6 @@ class Stop:
 
 def work(url: str) -> None:
     """What a supervisor does from its start to the end of all that is queued; it is told to stop once on the way."""
-    supervisor.HEARTBEATS = 10**9  # a heartbeat in each round
-    repetitions.WAIT_S = repetitions.LOOK_S = 0.0
     store = Store(url)
     execution.requeue_lost(store, stale_after_s=-1.0)  # half a minute has passed since the last one died
     Here(store).serve(Stop(8))  # type: ignore[arg-type]

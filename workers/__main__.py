@@ -4,7 +4,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import contextmanager
 from secrets import token_hex
 
@@ -103,19 +103,19 @@ def _answer_s(lease_s: float) -> float:
     return min(ANSWER_S, max(SHORTEST_ANSWER_S, lease_s / 2))
 
 
-def choose_authentication(settings: Settings) -> None:
+def choose_authentication(settings: Settings, environment: MutableMapping[str, str] = os.environ) -> None:
     """Require a token of clients of our own Ray, and send one to a cluster unless the environment forbids it.
 
     Ray reads these variables when it is imported. By default it sends its token only to a cluster that it started, and
     keeps the token in a file of the home folder that other users may read.
     """
     if settings.ray_address:
-        os.environ.setdefault("RAY_AUTH_MODE", "token")
+        environment.setdefault("RAY_AUTH_MODE", "token")
     else:
-        os.environ["RAY_AUTH_MODE"] = "token"
-        os.environ["RAY_AUTH_TOKEN"] = token_hex(32)
+        environment["RAY_AUTH_MODE"] = "token"
+        environment["RAY_AUTH_TOKEN"] = token_hex(32)
         for name, value in RAY_NOTICES.items():
-            os.environ.setdefault(name, value)
+            environment.setdefault(name, value)
 
 
 def check(settings: Settings) -> int:

@@ -75,6 +75,7 @@ class PermittedReality:
         stop: stops the hardware at once; called from another thread.
         left: returns the seconds until the permit of a step expires, or raises as `asking` says.
         end: ends this process.
+        poll_s: seconds between questions for a permit.
     """
 
     def __init__(
@@ -83,8 +84,9 @@ class PermittedReality:
         stop: Callable[[], None],
         left: Callable[[int], float],
         end: Callable[[], None] = lambda: os._exit(1),
+        poll_s: float = POLL_S,
     ) -> None:
-        self._reality, self._stop, self._left, self._end = reality, stop, left, end
+        self._reality, self._stop, self._left, self._end, self._poll_s = reality, stop, left, end, poll_s
 
     def __call__(self, genome: Genome, step: int = 0) -> Outcome:
         """Return the outcome of the genome `(g,)` in reality, once it is permitted to ask.
@@ -96,7 +98,7 @@ class PermittedReality:
             step: place in the log of the step that it is measured for.
         """
         while (until := self._expiry(step, 0.0)) <= monotonic():
-            sleep(POLL_S)
+            sleep(self._poll_s)
         answered, expired = Event(), Event()
         Thread(target=self._watch, args=(answered, expired, step, until), name="permit", daemon=True).start()
         try:
@@ -114,7 +116,7 @@ class PermittedReality:
         return known
 
     def _watch(self, answered: Event, expired: Event, step: int, until: float) -> None:
-        while not answered.wait(POLL_S):
+        while not answered.wait(self._poll_s):
             until = self._expiry(step, until)
             if monotonic() > until and not answered.is_set():  # an answer ends its permit
                 expired.set()

@@ -26,13 +26,16 @@ STARTING_S = 60.0
 
 
 @contextmanager
-def ray_folder() -> Iterator[Path]:
+def ray_folder(wanted: Path | None = None) -> Iterator[Path]:
     """Make a folder that only this user can enter, and remove it when the context ends.
 
     Ray's own default is one that all users of the machine share, where others could connect to its sockets. Folders of
     processes that were killed are removed at the next start.
+
+    Args:
+        wanted: where to make it; left out: RAY_TMPDIR, or the folder for temporary files.
     """
-    parent = _parent()
+    parent = _parent(wanted or Path(os.environ.get("RAY_TMPDIR") or tempfile.gettempdir()).absolute())
     _sweep(parent)
     folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))  # with mode 0700
     held = _hold(folder)
@@ -44,9 +47,8 @@ def ray_folder() -> Iterator[Path]:
             os.close(held)
 
 
-def _parent() -> Path:
-    """Return the folder for temporary files, or /tmp if its path is too long for the sockets."""
-    wanted = Path(os.environ.get("RAY_TMPDIR") or tempfile.gettempdir()).absolute()
+def _parent(wanted: Path) -> Path:
+    """Return the wanted folder, or /tmp if its path is too long for the sockets."""
     return wanted if len(str(wanted)) <= LONGEST_PARENT else Path("/tmp")  # noqa: S108 - the folder in it is private
 
 

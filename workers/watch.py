@@ -1,5 +1,6 @@
 """A watch on Ray, from a thread of its own: a call to a Ray that died or stands still may not return."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from threading import Event, Thread
 from time import monotonic
@@ -25,10 +26,12 @@ class RayWatch:
 
     Args:
         own: whether this process started Ray, so that its parts are processes of ours.
+        clock: returns seconds that never go back.
     """
 
-    def __init__(self, *, own: bool) -> None:
+    def __init__(self, *, own: bool, clock: Callable[[], float] = monotonic) -> None:
         self._own = own
+        self._clock = clock
         self._here = ray.get_runtime_context().get_node_id()
         self._stopping = Event()
         self._ask()
@@ -45,7 +48,7 @@ class RayWatch:
             raise RayGone(f"Ray died on this machine: its {' and '.join(dead)} ended")
         if not self._is_alive:
             raise RayGone("Ray died on this machine")
-        if (silence_s := monotonic() - self._answered) > SILENT_S:
+        if (silence_s := self._clock() - self._answered) > SILENT_S:
             raise RayGone(f"Ray does not answer: it was last heard of {silence_s:.0f} s ago")
         return self._cores
 
@@ -64,7 +67,7 @@ class RayWatch:
         alive = [node for node in nodes if node["Alive"]]
         self._is_alive = not any(node["NodeID"] == self._here for node in nodes if not node["Alive"])
         self._cores = int(sum(node["Resources"].get("CPU", 0) for node in alive))
-        self._answered = monotonic()
+        self._answered = self._clock()
 
 
 def kill_ray() -> None:

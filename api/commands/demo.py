@@ -68,9 +68,14 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     _print(f"{serve}\n  {gaplab} list; {gaplab} curve ID; http://127.0.0.1:8000/", console, style="bold")
 
 
-def command_here() -> str:
-    """Return the command that runs this `gaplab` from this folder: its name if it is on the path, else its place."""
-    beside, found = Path(sys.executable).with_name("gaplab"), shutil.which("gaplab")
+def command_here(python: Path | None = None, path: str | None = None) -> str:
+    """Return the command that runs this `gaplab` from this folder: its name if it is on the path, else its place.
+
+    Args:
+        python: that runs it; left out: this one.
+        path: folders of commands; left out: PATH.
+    """
+    beside, found = (python or Path(sys.executable)).with_name("gaplab"), shutil.which("gaplab", path=path)
     if not beside.exists() or (found is not None and beside.samefile(found)):
         return "gaplab"
     return quote(os.path.relpath(beside) if beside.is_relative_to(Path.cwd()) else str(beside))

@@ -69,9 +69,14 @@ def _counted(receive: Receive, most: int, detail: str) -> Receive:
     return count
 
 
-def most_requests(limits: Limits) -> int:
-    """Return the most requests to serve at once: the limit, or what half of the files that may be open permit."""
-    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+def most_requests(limits: Limits, files: int | None = None) -> int:
+    """Return the most requests to serve at once: the limit, or what half of the files that may be open permit.
+
+    Args:
+        limits: of the service.
+        files: that may be open; left out: as this process may.
+    """
+    files = resource.getrlimit(resource.RLIMIT_NOFILE)[0] if files is None else files
     return limits.requests if files == resource.RLIM_INFINITY else min(limits.requests, max(1, files // 2 - SPARE))
 
 

@@ -10,14 +10,6 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-REQUEST_S = 20.0
-"""Time for a request to arrive, besides the time of its body at `SLOWEST_BYTES_PER_S`."""
-
-SLOWEST_BYTES_PER_S = 10_000.0
-
-TAKE_S = 120.0
-"""Time for a client to take the part of an answer that was sent to it."""
-
 _OF_TCP = {socket.AF_INET, socket.AF_INET6}
 
 _TOO_LATE = b"HTTP/1.1 408 Request Timeout\r\nconnection: close\r\ncontent-length: 0\r\n\r\n"
@@ -28,7 +20,16 @@ class TimedConnection(H11Protocol):
 
     The idle one is the one that has waited longest for a request to be complete. If there is none, the new one is
     closed: the application itself refuses requests before it comes to that.
+
+    Attributes:
+        request_s: time for a request to arrive, besides the time of its body at `slowest_bytes_per_s`.
+        slowest_bytes_per_s: pace at which a body must arrive.
+        take_s: time for a client to take the part of an answer that was sent to it.
     """
+
+    request_s = 20.0
+    slowest_bytes_per_s = 10_000.0
+    take_s = 120.0
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401 - as the base takes them
         super().__init__(*args, **kwargs)
@@ -75,7 +76,7 @@ class TimedConnection(H11Protocol):
     def pause_writing(self) -> None:
         """Begin to wait for the client to take a part of the answer."""
         super().pause_writing()
-        self._answer_timer = self.loop.call_later(TAKE_S, self.transport.abort)
+        self._answer_timer = self.loop.call_later(self.take_s, self.transport.abort)
 
     def resume_writing(self) -> None:
         """Go on with the answer."""
@@ -86,7 +87,7 @@ class TimedConnection(H11Protocol):
 
     def _await_request(self, arrived: int = 0) -> None:
         self._began, self._arrived = self.loop.time(), arrived
-        self._request_timer = self.loop.call_later(REQUEST_S, self._check_request)
+        self._request_timer = self.loop.call_later(self.request_s, self._check_request)
 
     def _stop_request_timer(self) -> None:
         if self._request_timer is not None:
@@ -100,7 +101,7 @@ class TimedConnection(H11Protocol):
         if self.flow.read_paused or (self.cycle is not None and self.cycle.waiting_for_100_continue):
             self._await_request()
             return
-        left_s = self._began + REQUEST_S + self._arrived / SLOWEST_BYTES_PER_S - self.loop.time()
+        left_s = self._began + self.request_s + self._arrived / self.slowest_bytes_per_s - self.loop.time()
         if left_s > 0:
             self._request_timer = self.loop.call_later(left_s, self._check_request)
             return

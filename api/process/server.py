@@ -93,12 +93,17 @@ def require_token(settings: Settings) -> None:
 
 
 class Server(uvicorn.Server):
-    """Uvicorn that ends event streams at shutdown, rather than waiting for them forever."""
+    """Uvicorn that ends event streams at shutdown, rather than waiting for them forever.
 
-    def __init__(self, app: FastAPI) -> None:
+    Args:
+        app: to serve.
+        connection: class of its connections.
+    """
+
+    def __init__(self, app: FastAPI, connection: type[TimedConnection] = TimedConnection) -> None:
         config = uvicorn.Config(
             app,
-            http=TimedConnection,
+            http=connection,
             limit_concurrency=app.state.connections,
             backlog=BACKLOG,
             log_config=None,

@@ -22,12 +22,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("gaplab.service")
 
-LONG_LIFE_S = 15.0
-"""A supervisor that lived longer is restarted after the shortest pause: its start succeeded."""
-
-LONGEST_PAUSE_S = 30.0
-"""Together with the start of Ray, the service recovers within a minute."""
-
 GRACE_S = 24.0
 """Time for the supervisor to store its last steps and stop Ray.
 
@@ -69,6 +63,8 @@ class SupervisorProcess:
         module: that runs as `python -m MODULE serve`.
         silence: how long it may be silent; left out: as with the default lease.
         store: where the work of a supervisor that died is queued again; None leaves it until its lease ends.
+        long_life_s: one that lived longer is restarted after the shortest pause: its start succeeded.
+        longest_pause_s: together with the start of Ray, the service recovers within a minute.
     """
 
     def __init__(
@@ -78,11 +74,14 @@ class SupervisorProcess:
         *,
         silence: Silence | None = None,
         store: Store | None = None,
+        long_life_s: float = 15.0,
+        longest_pause_s: float = 30.0,
     ) -> None:
         self._environment = environment
         self._module = module
         self._silence = silence or Silence()
         self._store = store
+        self._long_life_s, self._longest_pause_s = long_life_s, longest_pause_s
         self._stopping = Event()
         self._short_lives = 0
         self._end: str | None = None
@@ -123,9 +122,9 @@ class SupervisorProcess:
             self._run_once()
             if self._stopping.is_set():
                 return
-            lived_long = monotonic() - began > LONG_LIFE_S
+            lived_long = monotonic() - began > self._long_life_s
             self._short_lives = 1 if lived_long else self._short_lives + 1
-            pause_s = 1.0 if lived_long else min(2 * pause_s, LONGEST_PAUSE_S)
+            pause_s = 1.0 if lived_long else min(2 * pause_s, self._longest_pause_s)
             log.warning("the supervisor ended by itself (%s); another starts in %.0f s", self._end, pause_s)
             self._stopping.wait(pause_s)
 
@@ -151,7 +150,7 @@ class SupervisorProcess:
         """Take what the supervisor says, and kill it if it says nothing for too long."""
         silence_s = heard.silence_s()
         self._silence_s = silence_s if heard.begun else 0.0
-        if heard.begun and monotonic() - began > LONG_LIFE_S:
+        if heard.begun and monotonic() - began > self._long_life_s:
             self._short_lives, self._end = 0, None
         if silence_s > (self._silence.killed_s if heard.begun else self._silence.start_s):
             heard.reason = f"it did not answer for {silence_s:.0f} s, and was killed"

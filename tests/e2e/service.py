@@ -11,7 +11,7 @@ from typing import Any
 import httpx2
 
 from tests.processes import processes, processes_with
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 STUDY_S = 2_000.0
 """Longest wait for the end of a study."""
@@ -51,7 +51,7 @@ class Service:
     def stop(self, how: Any = signal.SIGINT) -> None:
         """In order, as Ctrl-C does."""
         self._process.send_signal(how)
-        assert self._process.wait(40) == 0, self.log()
+        assert self._process.wait(LONGEST_S) == 0, self.log()
 
     def kill(self) -> None:
         """Everything at once, with no time to say goodbye: the API, the supervisor, Ray and its workers."""

@@ -11,6 +11,8 @@ import pytest
 
 from tests.waiting import wait_until
 
+pytestmark = pytest.mark.release
+
 TINY = {"robot": "toy_function", "strategies": ["simulated_fit", "random", "direct"], "iterations": 3, "repetitions": 4}
 TINY_BUDGET = {"controller_evaluations": 40, "selection_evaluations": 40, "simulator_evaluations": 40}
 

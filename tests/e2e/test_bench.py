@@ -1,4 +1,7 @@
-"""A robot in another process, which speaks only HTTP: driven, killed, restarted, and measured as the engine it is."""
+"""A robot in another process, which speaks only HTTP: driven, killed, restarted, and measured as the engine it is.
+
+tests/integration/test_drivers.py has what `gaplab drive` does, without processes.
+"""
 
 import json
 import os
@@ -14,6 +17,8 @@ from gaplab.api.process.local_service import LocalService, local_service
 from tests.experiments import same
 from tests.pretended_robot import SETTINGS
 from tests.waiting import wait_until
+
+pytestmark = pytest.mark.release
 
 ROOT = Path(__file__).parents[2]
 SPEC = {
@@ -82,55 +87,3 @@ def test_without_noise_the_simulators_equal_those_of_the_engine_to_the_bit_also_
     columns = [name for name in theirs.columns if name not in {"experiment", "name"}]
     assert mine[columns].equals(theirs[columns])
     assert same(tuple(service.curve(physical.id)["mean"]), tuple(service.curve(engine.id)["mean"]))
-
-
-def test_a_driver_that_hangs_is_stopped_and_told(service: LocalService, tmp_path: Path) -> None:
-    physical = service.submit(SPEC | {"reality": {"kind": "physical", "probes": "each"}})
-    driver = tmp_path / "hangs.py"
-    driver.write_text(
-        "import time\n"
-        "class Driver:\n"
-        "    def connect(self): pass\n"
-        "    def run(self, motion): time.sleep(3600)\n"
-        "    def stop(self): print('stopped', flush=True)\n"
-    )
-    arguments = [sys.executable, "-m", "gaplab", "drive", physical.id, "--driver", str(driver), "--limit-s", "0.5"]
-    done = subprocess.run(
-        arguments, env=os.environ | {"GAPLAB_URL": service.url}, cwd=tmp_path, capture_output=True, text=True
-    )
-    assert done.returncode == 1
-    assert "took more than 0.5 s" in done.stderr
-    assert "stopped" in done.stdout
-    (request,) = service.bench.pending(physical.id)
-    assert request.state == "open"
-    service.cancel(physical.id)
-
-
-@pytest.mark.parametrize(
-    ("answer", "said"),
-    [
-        ("'fast'", "it must return the fitness"),
-        ("float('nan')", "raise MeasurementFailed"),
-        ("1/0", "ZeroDivisionError"),
-    ],
-)
-def test_a_driver_that_answers_nonsense_sends_nothing(
-    service: LocalService, tmp_path: Path, answer: str, said: str
-) -> None:
-    physical = service.submit(SPEC | {"reality": {"kind": "physical", "probes": "each"}})
-    driver = tmp_path / "nonsense.py"
-    driver.write_text(
-        "class Driver:\n"
-        "    def connect(self): pass\n"
-        f"    def run(self, motion): return {answer}\n"
-        "    def stop(self): pass\n"
-    )
-    arguments = [sys.executable, "-m", "gaplab", "drive", physical.id, "--driver", str(driver)]
-    done = subprocess.run(
-        arguments, env=os.environ | {"GAPLAB_URL": service.url}, cwd=tmp_path, capture_output=True, text=True
-    )
-    assert done.returncode == 1
-    assert said in done.stderr
-    (request,) = service.bench.pending(physical.id)
-    assert request.answers == ()
-    service.cancel(physical.id)

@@ -1,4 +1,7 @@
-"""Notebooks, tutorial and how-tos, run as their readers run them, on one real service that has their plug-ins."""
+"""Notebooks, tutorial and how-tos, run as their readers run them, on one real service that has their plug-ins.
+
+Of each kind, one is run for every change.
+"""
 
 import json
 import os
@@ -51,6 +54,12 @@ SMALL_TOY = {
 }
 
 
+def one_of(paths: list[Path], name: str) -> list[Any]:
+    """Parameters of a test, of which only one is for every change."""
+    marks = {path: () if path.stem == name else pytest.mark.release for path in paths}
+    return [pytest.param(path, marks=marks[path], id=path.stem) for path in paths]
+
+
 @pytest.fixture(scope="module")
 def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the service."""
@@ -63,22 +72,21 @@ def service(home: Path) -> Iterator[LocalService]:
         yield found
 
 
-def outputs_of(path: Path, folder: Path) -> list[Any]:
+def outputs_of(path: Path, folder: Path, **environment: str) -> list[Any]:
     """What the cells of a notebook show, run from its first to its last."""
     notebook = nbformat.read(path, as_version=4)
-    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute()
+    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute(
+        env=os.environ | environment
+    )
     return [output for cell in notebook.cells for output in cell.get("outputs", ())]
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", one_of(NOTEBOOKS, "compare"))
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
-def test_a_notebook_runs_from_its_first_cell_to_its_last(
-    path: Path, service: LocalService, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("GAPLAB_URL", service.url)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
+def test_a_notebook_runs_from_its_first_cell_to_its_last(path: Path, service: LocalService, tmp_path: Path) -> None:
+    found = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
-    shown = outputs_of(path, tmp_path)
+    shown = outputs_of(path, tmp_path, GAPLAB_URL=service.url, PYTHONPATH=found)
 
     data = [output["data"] for output in shown if "data" in output]
     assert any("image/svg+xml" in each for each in data)  # a figure
@@ -87,21 +95,19 @@ def test_a_notebook_runs_from_its_first_cell_to_its_last(
     assert not [output for output in shown if output["output_type"] == "stream" and output["name"] == "stderr"]
 
 
-def test_there_are_three() -> None:
+def test_there_are_three_with_the_outputs_of_one_run_and_no_place_of_the_machine_that_ran_it() -> None:
     assert [path.stem for path in NOTEBOOKS] == ["compare", "own_robot", "own_strategy"]
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_it_has_the_outputs_of_one_run_and_no_place_of_the_machine_that_ran_it(path: Path) -> None:
-    notebook = nbformat.read(path, as_version=4)
-
-    nbformat.validate(notebook)
-    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert [cell.execution_count for cell in cells] == list(range(1, len(cells) + 1))
-    assert any(output.output_type in {"display_data", "execute_result"} for cell in cells for output in cell.outputs)
-    assert [output for cell in cells for output in cell.outputs if output.output_type == "error"] == []
-    assert [folder for folder in ("/tmp/", "/root/", "/home/", "/var/", "/Users/") if folder in path.read_text()] == []
-    assert set(notebook.metadata) == {"kernelspec", "language_info"}
+    for path in NOTEBOOKS:
+        notebook = nbformat.read(path, as_version=4)
+        nbformat.validate(notebook)
+        cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+        outputs = {output.output_type for cell in cells for output in cell.outputs}
+        places = [each for each in ("/tmp/", "/root/", "/home/", "/var/", "/Users/") if each in path.read_text()]
+        assert [cell.execution_count for cell in cells] == list(range(1, len(cells) + 1)), path
+        assert outputs & {"display_data", "execute_result"}, path
+        assert "error" not in outputs, path
+        assert places == [], path
+        assert set(notebook.metadata) == {"kernelspec", "language_info"}, path
 
 
 @pytest.fixture
@@ -116,7 +122,7 @@ def folder(tmp_path: Path) -> Path:
 HERE = [path for path in DOCUMENTS if any(each.mark is None for each in blocks(path))]
 
 
-@pytest.mark.parametrize("path", HERE, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", one_of(HERE, "scripts"))
 def test_what_a_document_says_can_be_done(path: Path, service: LocalService, home: Path, folder: Path) -> None:
     environment = os.environ | {
         "GAPLAB_URL": service.url,

@@ -16,6 +16,8 @@ from tests.e2e.elsewhere import PASSWORD, Postgres, Shell, free_port
 from tests.e2e.reading import DOCUMENTS, ROOT, blocks
 from tests.waiting import wait_until
 
+pytestmark = pytest.mark.release
+
 POSTGRES, CLUSTER = (ROOT / "docs" / "how-to" / f"{name}.md" for name in ("postgres", "cluster"))
 TINY = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
 NO_DASHBOARD = " --include-dashboard false"

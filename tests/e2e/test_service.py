@@ -1,16 +1,22 @@
-"""From POST to curve through the real service: HTTP, database, Ray, physics."""
+"""From POST to curve through the real service: HTTP, database, Ray, physics.
 
+One test of it is for every change: killed outright and told to stop, with the numbers of one process.
+"""
+
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import text
 
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.store.session import Store
 from tests.e2e.service import Service
 from tests.waiting import wait_until
 
@@ -18,12 +24,18 @@ TOY = {
     "name": "toy",
     "robot": "toy_function",
     "strategies": ["simulated_fit_and_informative", "known_fit", "direct"],
-    "iterations": 3,
-    "repetitions": 4,
-    "budget": {"controller_evaluations": 60, "selection_evaluations": 40, "simulator_evaluations": 40},
+    "iterations": 2,
+    "repetitions": 2,
+    "budget": {"controller_evaluations": 500, "selection_evaluations": 100},
     "seed": 5,
 }
-SLOW_TOY = TOY | {"budget": {"controller_evaluations": 1_500, "selection_evaluations": 300}, "iterations": 2}
+LONG_STEPS = {
+    "robot": "toy_function",
+    "strategies": ["random"],
+    "iterations": 1,
+    "repetitions": 6,
+    "budget": {"controller_evaluations": 2_000_000, "selection_evaluations": 20, "simulator_evaluations": 20},
+}
 OWN = '''
 """A strategy."""
 
@@ -97,21 +109,47 @@ def told_by(service: Any, study: Any) -> Any:
     return experiments
 
 
-def test_a_toy_study_goes_from_post_to_curve_with_the_numbers_of_one_process(service: Any) -> None:
+def test_killed_it_goes_on_to_the_numbers_of_one_process_and_told_to_stop_it_hands_back_what_is_under_way(
+    service: Any, tmp_path: Path
+) -> None:
+    service.start()
+    study = service.post("/studies", TOY)["id"]
+    wait_until(lambda: service.get(f"/studies/{study}")["progress"]["iterations_done"] >= 3)
+
+    service.kill()
+    wait_until(lambda: not service.processes(), otherwise=service.processes)
     service.start()
 
-    study = service.post("/studies", TOY)["id"]
-
+    assert service.get(f"/studies/{study}")["progress"]["iterations_done"] >= 3
     ended = service.finish(f"/studies/{study}")
-    assert ended["state"] == "COMPLETED"
     progress = ended["progress"]
+    assert ended["state"] == "COMPLETED"
     assert progress["rollouts_done"] + progress["rollouts_saved"] == progress["rollouts"]
     assert told_by(service, study) == computed_here(TOY)
     ids = [each["id"] for each in ended["experiments"]]
     assert len(service.get("/comparisons", experiment=ids)) == 3
     assert "<svg" in service.http.get("/figures/curves", params={"study": study, "format": "svg"}).text
 
+    long = service.get(f"/studies/{service.post('/studies', LONG_STEPS)['id']}")["experiments"][0]["id"]
+    wait_until(lambda: stored(tmp_path, "SELECT sum(steps) FROM repetition WHERE experiment_id = :id", long)[0][0])
+    service.stop(signal.SIGTERM)
 
+    wait_until(lambda: not service.processes(), otherwise=service.processes)
+    rows = stored(tmp_path, "SELECT state, attempts, losses FROM repetition WHERE experiment_id = :id", long)
+    assert rows == [("QUEUED", 0, 0)] * 6
+    assert stored(tmp_path, "SELECT count(*) FROM checkpoint")[0][0] > 0
+
+
+def stored(folder: Path, query: str, experiment: str = "") -> Any:
+    """Rows of the service's database."""
+    store = Store(f"sqlite:///{folder / 'gaplab.db'}")
+    with store.reading() as session:
+        found = session.execute(text(query), {"id": experiment} if experiment else {}).all()
+    store.dispose()
+    return found
+
+
+@pytest.mark.release
 def test_a_quadruped_study_on_pybullet_goes_from_post_to_curve(service: Any) -> None:
     service.start()
 
@@ -123,29 +161,13 @@ def test_a_quadruped_study_on_pybullet_goes_from_post_to_curve(service: Any) -> 
     assert told_by(service, study) == computed_here(QUADRUPED)
 
 
-def test_killed_in_the_middle_it_goes_on_where_it_was_with_the_same_numbers(service: Any) -> None:
-    service.start()
-    study = service.post("/studies", SLOW_TOY)["id"]
-    wait_until(lambda: service.get(f"/studies/{study}")["progress"]["iterations_done"] >= 5)
-
-    service.kill()
-    wait_until(lambda: not service.processes(), otherwise=service.processes)
-    service.start()
-
-    before = service.get(f"/studies/{study}")
-    assert before["state"] == "RUNNING"
-    assert before["progress"]["iterations_done"] >= 5
-    assert service.finish(f"/studies/{study}")["state"] == "COMPLETED"
-    assert told_by(service, study) == computed_here(SLOW_TOY)
-
-
 EDITED = OWN.replace("fittest", "very fittest")
 QUICK = {"robot": "toy_function", "strategy": "random", "budget": "smoke", "repetitions": 1, "iterations": 1}
 
 
 def own_begun(service: Any) -> Any:
     """The path of an experiment with the strategy of one's own, some iterations after it began."""
-    spec = {each: SLOW_TOY[each] for each in ("robot", "budget", "seed")} | {"repetitions": 2, "iterations": 4}
+    spec = {each: TOY[each] for each in ("robot", "budget", "seed")} | {"repetitions": 2, "iterations": 4}
     path = f"/experiments/{service.post('/experiments', spec | {'strategy': 'own'})['id']}"
     wait_until(lambda: service.get(path)["progress"]["iterations_done"] >= 1)
     return path
@@ -157,6 +179,7 @@ def supervisors_that_broke(service: Any) -> int:
     return log.count("another starts in") - log.count("exit code 1: Ray did not start")
 
 
+@pytest.mark.release
 def test_an_edit_concerns_the_experiments_that_name_the_plug_in_and_a_person_may_accept_it(
     tmp_path: Path, service_in: Any
 ) -> None:
@@ -189,6 +212,7 @@ def test_an_edit_concerns_the_experiments_that_name_the_plug_in_and_a_person_may
     assert supervisors_that_broke(service) == 0
 
 
+@pytest.mark.release
 def test_a_plug_in_that_is_broken_when_the_service_starts_holds_up_its_own_experiments_alone(
     tmp_path: Path, service_in: Any
 ) -> None:
@@ -217,13 +241,3 @@ def test_a_plug_in_that_is_broken_when_the_service_starts_holds_up_its_own_exper
     ended = service.finish(path)
     assert (ended["state"], ended["warnings"]) == ("COMPLETED", [])
     assert supervisors_that_broke(service) == 0
-
-
-def test_stopped_in_order_it_leaves_no_process_behind(service: Any) -> None:
-    service.start()
-    service.post("/studies", SLOW_TOY)
-    wait_until(lambda: service.get("/studies")["items"][0]["state"] == "RUNNING")
-
-    service.stop()
-
-    wait_until(lambda: not service.processes(), otherwise=service.processes)

@@ -16,6 +16,8 @@ import pytest
 from tests.e2e.elsewhere import free_port
 from tests.waiting import wait_until
 
+pytestmark = pytest.mark.release
+
 ROOT = Path(__file__).parents[2]
 PARTS = ("api", "migrations", "schemas", "services", "src", "workers", "pyproject.toml", "README.md", "LICENSE")
 SPEC = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 1}

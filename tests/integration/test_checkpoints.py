@@ -108,6 +108,7 @@ def checkpoints_left(store: Store) -> Any:
         return session.query(CheckpointRow).count()
 
 
+@pytest.mark.dialects
 def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store: Store) -> None:
     submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
@@ -122,6 +123,7 @@ def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store: 
     assert claim.checkpoints == (part(1, 0, b"a\0b"), part(1, 1), part(1, 2, b""))
 
 
+@pytest.mark.dialects
 def test_a_checkpoint_that_is_delivered_twice_is_stored_once(store: Store) -> None:
     submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)

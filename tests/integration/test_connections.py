@@ -19,12 +19,12 @@ from fastapi import FastAPI, Request
 
 from gaplab.api.app import create_app
 from gaplab.api.http.limits import SPARE, RequestLimit, most_requests
-from gaplab.api.process import connections
+from gaplab.api.process.connections import TimedConnection
 from gaplab.api.process.server import Server, listen
 from gaplab.services.logs import Repeats
 from gaplab.services.settings import Limits
 from gaplab.services.store.session import Store
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 DEADLINE_S = 120.0
 HALF = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "
@@ -55,6 +55,7 @@ def rest(connection: socket.socket) -> bytes:
     return found
 
 
+@pytest.mark.release
 def test_more_half_sent_requests_than_files_leave_the_service_alive_and_its_log_small(
     tmp_path: Path, sqlite_url: str
 ) -> None:
@@ -87,13 +88,15 @@ def test_more_half_sent_requests_than_files_leave_the_service_alive_and_its_log_
             wait_until(lambda: is_alive(url))
     finally:
         process.terminate()
-        process.communicate(timeout=60)
+        process.communicate(timeout=LONGEST_S)
     assert log.stat().st_size < 100_000
 
 
 @contextmanager
-def serving(app: FastAPI, most: int = 100) -> Iterator[int]:
-    """The port of a service of this app in a thread."""
+def serving(
+    app: FastAPI, most: int = 100, connection: type[TimedConnection] = TimedConnection, **times: float
+) -> Iterator[int]:
+    """The port of a service of this app in a thread, whose connections have other times."""
 
     class Feed:
         def close(self) -> None:
@@ -102,7 +105,7 @@ def serving(app: FastAPI, most: int = 100) -> Iterator[int]:
     app.state.feed = app.state.rollout_process = app.state.drawing_process = Feed()
     app.state.connections = most
     listener = listen("127.0.0.1", 0)
-    served = Server(app)
+    served = Server(app, type("Connection", (connection,), times))
     thread = threading.Thread(target=served.run, args=([listener],))
     thread.start()
     try:
@@ -147,48 +150,38 @@ def app() -> FastAPI:
     ],
     ids=["nothing", "half a head", "half a body", "half of a second request"],
 )
-def test_half_a_request_ends_its_connection(
-    app: FastAPI, monkeypatch: pytest.MonkeyPatch, content: bytes, answer: bytes
-) -> None:
-    monkeypatch.setattr(connections, "REQUEST_S", 0.3)
-    with serving(app) as port, sent(port, content) as connection:
+def test_half_a_request_ends_its_connection(app: FastAPI, content: bytes, answer: bytes) -> None:
+    with serving(app, request_s=0.3) as port, sent(port, content) as connection:
         assert rest(connection).startswith(answer)
 
 
-def test_no_part_of_an_answer_waits_until_the_client_has_confirmed_another(
-    app: FastAPI, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_part_of_an_answer_waits_until_the_client_has_confirmed_another(app: FastAPI) -> None:
     """Else every answer on a kept connection takes 40 ms."""
     at_once = []
-    made = connections.TimedConnection.connection_made
 
-    def observed(self: Any, transport: Any) -> None:
-        made(self, transport)
-        at_once.append(transport.get_extra_info("socket").getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+    class Observed(TimedConnection):
+        def connection_made(self, transport: Any) -> None:
+            super().connection_made(transport)
+            at_once.append(transport.get_extra_info("socket").getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
 
-    monkeypatch.setattr(connections.TimedConnection, "connection_made", observed)
-    with serving(app) as port:
+    with serving(app, connection=Observed) as port:
         assert httpx2.get(f"http://127.0.0.1:{port}/livez").status_code == 200
     assert all(at_once)
     assert at_once
 
 
-def test_half_an_archive_is_no_incident(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(connections, "REQUEST_S", 0.3)
+def test_half_an_archive_is_no_incident(sqlite_store: Store, caplog: pytest.LogCaptureFixture) -> None:
     head = b"POST /import HTTP/1.1\r\nHost: x\r\nContent-Type: application/zip\r\nContent-Length: 99\r\n\r\n"
-    with serving(create_app(sqlite_store)) as port, sent(port, head + b"PK") as connection:
+    with serving(create_app(sqlite_store), request_s=0.3) as port, sent(port, head + b"PK") as connection:
         assert rest(connection) == b""
 
     assert "incident" not in caplog.text
     assert "Exception" not in caplog.text
 
 
-def test_requests_that_go_on_are_served_however_slow_the_service(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "REQUEST_S", 0.3)
-    monkeypatch.setattr(connections, "SLOWEST_BYTES_PER_S", 1.0)
-    with serving(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http:
+def test_requests_that_go_on_are_served_however_slow_the_service(app: FastAPI) -> None:
+    slow = serving(app, request_s=0.3, slowest_bytes_per_s=1.0)
+    with slow as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http:
 
         def parts() -> Iterator[bytes]:
             for _ in range(5):
@@ -199,9 +192,8 @@ def test_requests_that_go_on_are_served_however_slow_the_service(app: FastAPI, m
         assert http.get("/slow").json() == "late"
 
 
-def test_a_client_that_takes_no_answer_is_disconnected(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "TAKE_S", 0.3)
-    with serving(app) as port, sent(port, b"GET /large HTTP/1.1\r\nHost: x\r\n\r\n") as connection:
+def test_a_client_that_takes_no_answer_is_disconnected(app: FastAPI) -> None:
+    with serving(app, take_s=0.3) as port, sent(port, b"GET /large HTTP/1.1\r\nHost: x\r\n\r\n") as connection:
         time.sleep(1.5)
 
         assert 0 < len(rest(connection)) < 50_000_000
@@ -232,10 +224,9 @@ def test_beyond_the_most_requests_at_once_all_but_the_sign_of_life_are_refused(a
     assert (alive.status_code, room.status_code) == (200, 200)
 
 
-def test_the_files_that_may_be_open_limit_the_requests(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_files_that_may_be_open_limit_the_requests() -> None:
     for files, most in [(1024, 512 - SPARE), (resource.RLIM_INFINITY, 1_000), (2**20, 1_000), (8, 1)]:
-        monkeypatch.setattr(resource, "getrlimit", lambda _, files=files: (files, files))
-        assert most_requests(Limits()) == most
+        assert most_requests(Limits(), files) == most
 
 
 def test_what_a_library_repeats_is_logged_five_times_a_minute_and_counted() -> None:

@@ -177,6 +177,7 @@ def test_a_claim_never_fits_the_work_of_another_database(sqlite_store: Store, fi
     assert execution.record(sqlite_store, theirs, step)
 
 
+@pytest.mark.dialects
 def test_a_supervisor_notices_that_its_database_is_of_an_earlier_moment(store: Store) -> None:
     first = supervisors.heartbeat(store, "me")
     second = supervisors.heartbeat(store, "me", first)

@@ -22,6 +22,7 @@ from gaplab.services.store.texts import LONGEST_REASON
 from tests.experiments import cancel, run, same, some_log, toy
 
 
+@pytest.mark.dialects
 def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(reality={"parameters": {"static_friction": 0.9}}))
 
@@ -43,6 +44,7 @@ def test_the_first_claim_starts_the_experiment(store: Store) -> None:
     assert reading.read_experiment(store, waiting.id).state is State.QUEUED
 
 
+@pytest.mark.dialects
 def test_claims_of_many_owners_never_overlap(store: Store) -> None:
     for _ in range(3):
         submission.submit_experiment(store, toy(repetitions=20))
@@ -59,6 +61,7 @@ def test_claims_of_many_owners_never_overlap(store: Store) -> None:
     assert len(claimed) == len(set(claimed)) == 60
 
 
+@pytest.mark.dialects
 def test_the_log_that_is_read_is_the_log_that_was_written(store: Store) -> None:
     submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
@@ -107,6 +110,7 @@ def by_experiment(claims: Any, *ids: Any) -> Any:
     return tuple(sorted(claims, key=lambda each: (ids.index(each.experiment_id), each.number)))
 
 
+@pytest.mark.dialects
 def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_be(store: Store) -> None:
     one_by_one, together = (submission.submit_experiment(store, toy()).id for _ in range(2))
     claims = by_experiment(execution.claim(store, "me", 6), one_by_one, together)
@@ -187,6 +191,7 @@ def test_a_heartbeat_keeps_a_claim(store: Store) -> None:
     assert execution.requeue_lost(store, stale_after_s=30) == 0
 
 
+@pytest.mark.dialects
 def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "killed", 1)
@@ -300,6 +305,7 @@ def test_a_long_reason_is_stored_and_shown_as_its_beginning(store: Store) -> Non
     assert max(map(len, shown)) <= LONGEST_REASON >= max(stored)
 
 
+@pytest.mark.dialects
 def test_repetitions_that_end_at_once_end_their_experiment(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=8))
     claims = execution.claim(store, "me", 8)
@@ -343,6 +349,7 @@ def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_i
     assert len(reading.list_simulators(store, submitted.id).items) == 2
 
 
+@pytest.mark.dialects
 def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(store: Store) -> None:
     ids = [submission.submit_experiment(store, toy(repetitions=1)).id for _ in range(10)]
     claims = execution.claim(store, "me", 10)
@@ -362,6 +369,7 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
     assert all(reading.read_experiment(store, each).state.ended for each in ids)
 
 
+@pytest.mark.dialects
 def test_progress_counts_what_the_steps_took(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy())
     waiting = submitted.progress
@@ -388,22 +396,6 @@ def test_nothing_is_left_to_do_at_the_end(store: Store) -> None:
     run(store, claim)
 
     assert reading.read_experiment(store, submitted.id).progress.seconds_left == 0
-
-
-@pytest.mark.parametrize("strategy", ["simulated_fit_and_informative", "known_fit", "direct"])
-def test_a_repetition_killed_after_every_step_ends_as_one_that_never_stopped(store: Store, strategy: Any) -> None:
-    submission.submit_experiment(store, toy(strategy=strategy, repetitions=1))
-    claim, steps = execution.claim(store, "me", 1)[0], []
-
-    while (step := next(repetition(setting(claim.spec, claim.number), claim.log), None)) is not None:
-        steps.append(step)
-        assert execution.record(store, claim, step)
-        execution.release(store, claim, "killed")
-        (claim,) = execution.claim(store, "me", 1)
-
-    assert execution.complete(store, claim)
-    assert same(tuple(repetition(setting(claim.spec, claim.number))), claim.log)
-    assert same(tuple(steps), claim.log)
 
 
 def test_the_budgeted_rollouts_are_those_that_a_repetition_takes_or_saves(store: Store) -> None:

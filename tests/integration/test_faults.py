@@ -1,5 +1,6 @@
 """Faults of plug-ins, of reality and of hardware: each concerns the repetitions that it hits, and nothing else."""
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from datetime import timedelta
@@ -20,7 +21,7 @@ from gaplab.services.core.errors import Conflict, InvalidSpec, TryAgain
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
-from gaplab.services.core.types import Measured, Outcome, Probed, Sample
+from gaplab.services.core.types import Measured, Outcome, Probed, Sample, Tuned
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, lifecycle, reading, submission
@@ -36,13 +37,15 @@ from gaplab.services.store.models import EventRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Session, Store
-from gaplab.workers import checkpoints, permits, supervisor
+from gaplab.workers import checkpoints, permits
 from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
 from gaplab.workers.run import Run
 from tests.fakes import flat, install
-from tests.without_ray import Here
+from tests.without_ray import Here, HereRepetitions, HereRun
 
+POLL_S = 0.001
+CHECKPOINT_S = 60.0
 SMALL = {
     "strategy": "simulated_fit",
     "robot": "toy_function",
@@ -63,7 +66,8 @@ class Liar(Strategy):
     def select(self, belief: Any, search: Any, rng: Any) -> Any:
         if isinstance(self.answer, BaseException):
             raise self.answer
-        return self.answer(belief.known) if callable(self.answer) else self.answer
+        answer = type(self).answer
+        return answer(belief.known) if callable(answer) else answer
 
 
 class Bench(Analytic):
@@ -95,10 +99,8 @@ class Unsendable(Exception):
 def plugins(monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch, strategies, Liar)
     install(monkeypatch, engines, Bench)
-    monkeypatch.setattr(Bench, "asked", 0)
-    monkeypatch.setattr(Bench, "errors", [])
+    Bench.asked, Bench.errors, Liar.answer = 0, [], None
     monkeypatch.setattr(checkpoints, "PAUSES_S", (0.0, 0.0, 0.0))
-    monkeypatch.setattr(supervisor, "HEARTBEATS", 10**9)
 
 
 def small(**changes: Any) -> ExperimentSpec:
@@ -109,10 +111,10 @@ def on_the_bench(**changes: Any) -> ExperimentSpec:
     return small(reality={"engine": "bench"}, **changes)
 
 
-def work(store: Store, rounds: int = 400) -> None:
+def work(store: Store, here: Here | None = None) -> None:
     """Rounds of a supervisor until nothing can go on."""
-    here = Here(store)
-    for _ in range(rounds):
+    here = here or Here(store, CHECKPOINT_S)
+    for _ in range(400):
         here.step()
         with store.reading() as session:
             if not here.busy and not session.query(RepetitionRow).filter_by(state=State.RUNNING).count():
@@ -139,17 +141,14 @@ def computed(spec: ExperimentSpec) -> dict[int, Any]:
         (lambda known: known[None, :], "strategy 'liar' returned an array of shape (1, 1)"),
         (lambda known: np.full_like(known, np.nan), "strategy 'liar' returned nan as number 0"),
         (lambda known: known + 1e9, "permitted: 0.0 to 1.0"),
-        (0.5, "strategy 'liar' returned 0.5; permitted: one vector of 1 numbers"),
         (None, "strategy 'liar' returned None"),
         (SystemExit("the end"), "strategy 'liar' raised SystemExit (test_faults.py, line "),
         (IndexError("no such leg"), "): no such leg"),
         (Unsendable(), "its message cannot be shown"),
     ],
 )
-def test_a_strategy_that_lies_fails_alone_and_is_named(
-    store: Store, monkeypatch: Any, answer: Any, reason: str
-) -> None:
-    monkeypatch.setattr(Liar, "answer", staticmethod(answer) if callable(answer) else answer)
+def test_a_strategy_that_lies_fails_alone_and_is_named(store: Store, answer: Any, reason: str) -> None:
+    Liar.answer = answer
     lying = submission.submit_experiment(store, small(strategy="liar")).id
     honest = submission.submit_experiment(store, small()).id
 
@@ -162,22 +161,75 @@ def test_a_strategy_that_lies_fails_alone_and_is_named(
     assert stored(store, honest) == computed(small())
 
 
-def test_what_cannot_be_stored_fails_its_repetition_alone(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    record_all = execution.record_all
+class LeftOut(HereRepetitions):
+    """Repetition 1 leaves out a part of what it has done, in its first attempts."""
 
-    def refusing(store: Store, deliveries: Any) -> Any:
-        if any(claim.number == 1 for claim, _ in deliveries):
-            raise TypeError("only size-1 arrays can be converted")
-        return record_all(store, deliveries)
+    part: ClassVar[Any]
+    attempts: ClassVar[int]
 
-    monkeypatch.setattr(execution, "record_all", refusing)
+    def launch(self, claim: Claim) -> Run:
+        def stream() -> Iterator[Any]:
+            steps = [TimedStep(step, 0.0) for step in repetition(setting(claim.spec, claim.number), claim.log)]
+            if claim.number == 1 and claim.epoch <= self.attempts:
+                del steps[self.part]
+            yield tuple(steps)
+
+        return HereRun(claim, stream())  # type: ignore[arg-type]
+
+
+class Nonsense(HereRepetitions):
+    """Repetition 1 delivers a step that no table holds."""
+
+    def launch(self, claim: Claim) -> Run:
+        if claim.number != 1:
+            return super().launch(claim)
+        nonsense = TimedStep(Tuned(0, ("no simulator",)), 0.0)  # type: ignore[arg-type]
+        return HereRun(claim, (each for each in [(nonsense,)]))  # type: ignore[arg-type]
+
+
+def with_repetitions(kind: type[HereRepetitions], store: Store) -> Here:
+    return type("Such", (Here,), {"repetitions": kind})(store, CHECKPOINT_S)  # type: ignore[no-any-return]
+
+
+def test_what_cannot_be_stored_fails_its_repetition_alone(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, small()).id
 
-    work(sqlite_store)
+    work(sqlite_store, with_repetitions(Nonsense, sqlite_store))
 
     states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
     assert states == [State.COMPLETED, State.FAILED]
-    assert "only size-1 arrays" in reading.read_experiment(sqlite_store, experiment).reasons[0]
+    assert "what it delivered cannot be stored" in reading.read_experiment(sqlite_store, experiment).reasons[0]
+
+
+@pytest.mark.parametrize(
+    ("part", "reason"),
+    [
+        (slice(0, 1), "could not be stored: step 1 of repetition 1 cannot be recorded: the log has 0 steps"),
+        (slice(-2, None), "it ended too early: repetition 1"),
+    ],
+)
+def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store: Store, part: Any, reason: str) -> None:
+    LeftOut.part, LeftOut.attempts = part, 1
+    experiment = submission.submit_experiment(sqlite_store, small()).id
+
+    work(sqlite_store, with_repetitions(LeftOut, sqlite_store))
+
+    first, second = reading.list_attempts(sqlite_store, experiment, 1)
+    assert (first.ending, second.ending) == (Ending.LOST, Ending.COMPLETED)
+    assert reason in str(first.reason)
+    assert [each.attempts for each in reading.list_repetitions(sqlite_store, experiment)] == [1, 2]
+    assert stored(sqlite_store, experiment) == computed(small())
+
+
+def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlite_store: Store) -> None:
+    LeftOut.part, LeftOut.attempts = slice(0, 1), 99
+    experiment = submission.submit_experiment(sqlite_store, small()).id
+
+    work(sqlite_store, with_repetitions(LeftOut, sqlite_store))
+
+    repetitions = reading.list_repetitions(sqlite_store, experiment)
+    assert [each.state for each in repetitions] == [State.COMPLETED, State.FAILED]
+    assert "cannot be recorded" in str(repetitions[1].error)
 
 
 def test_an_error_of_reality_pauses_says_so_hides_what_it_names_and_costs_no_sample(store: Store) -> None:
@@ -206,8 +258,9 @@ def test_an_error_of_reality_pauses_says_so_hides_what_it_names_and_costs_no_sam
     assert Bench.asked == 2 * (1 + 2 * 2) + 1  # each once here and once in `computed`, and the one that failed
 
 
-@pytest.mark.parametrize("error", [ConnectionError("wireless"), TimeoutError(), MemoryError(), TryAgain("dropped")])
-def test_an_error_that_may_pass_is_tried_again_by_itself(sqlite_store: Store, error: BaseException) -> None:
+def test_an_error_that_may_pass_is_tried_again_by_itself(sqlite_store: Store) -> None:
+    error = TryAgain("dropped")
+    assert all(map(checkpoints.may_pass, (error, ConnectionError("wireless"), TimeoutError(), MemoryError())))
     Bench.errors[:] = [None, error, error, error]  # type: ignore[list-item]
     experiment = submission.submit_experiment(sqlite_store, on_the_bench(repetitions=1)).id
 
@@ -218,15 +271,15 @@ def test_an_error_that_may_pass_is_tried_again_by_itself(sqlite_store: Store, er
     assert stored(sqlite_store, experiment) == computed(on_the_bench(repetitions=1))
 
 
-def test_what_failed_is_retried_from_its_stored_steps(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_failed_is_retried_from_its_stored_steps(store: Store) -> None:
     spec = small(strategy="liar")
     answers = iter([np.array([0.25]), None])
-    monkeypatch.setattr(Liar, "answer", staticmethod(lambda _: next(answers, None)))
+    Liar.answer = lambda _: next(answers, None)
     experiment = submission.submit_experiment(store, spec).id
     work(store)
     failed = stored(store, experiment)
 
-    monkeypatch.setattr(Liar, "answer", staticmethod(lambda _: np.array([0.75])))
+    Liar.answer = lambda _: np.array([0.75])
     retried = lifecycle.ask_experiment(store, experiment, Verb.RETRY)
     work(store)
 
@@ -280,6 +333,7 @@ def test_a_measurement_that_is_cut_off_is_no_fault_of_a_plugin(store: Store) -> 
     assert reading.list_repetitions(store, experiment)[0].state is State.QUEUED
 
 
+@pytest.mark.dialects
 def test_hardware_has_one_holder_at_a_time(store: Store) -> None:
     first, second = (submission.submit_experiment(store, on_the_bench(repetitions=3)).id for _ in range(2))
     other = submission.submit_experiment(store, small()).id
@@ -300,6 +354,7 @@ def test_hardware_has_one_holder_at_a_time(store: Store) -> None:
     assert (again.id, again.epoch) == (lost.id, lost.epoch + 1)
 
 
+@pytest.mark.dialects
 @pytest.mark.parametrize("measuring", [False, True])
 def test_a_heartbeat_that_comes_while_others_are_given_up_keeps_its_lease(
     store: Store, monkeypatch: pytest.MonkeyPatch, measuring: Any
@@ -323,6 +378,7 @@ def test_a_heartbeat_that_comes_while_others_are_given_up_keeps_its_lease(
     assert execution.heartbeat(store, [held]) == (held,)
 
 
+@pytest.mark.dialects
 @pytest.mark.parametrize("by_s", [3600.0, -3600.0])
 def test_a_clock_that_was_set_does_not_give_hardware_to_a_second_holder(store: Store, by_s: float) -> None:
     submission.submit_experiment(store, on_the_bench(repetitions=2))
@@ -359,6 +415,7 @@ def test_an_ended_lease_frees_its_hardware_once_its_holder_is_silent(store: Stor
         assert len(execution.claim(store, "you", 9)) == claimed
 
 
+@pytest.mark.dialects
 def test_the_database_itself_refuses_a_second_holder(store: Store) -> None:
     submission.submit_experiment(store, on_the_bench())
     execution.claim(store, "me", 9)
@@ -373,9 +430,7 @@ def test_the_baseline_that_evolves_in_reality_is_refused_on_hardware() -> None:
     assert resolve_experiment(small(strategy="direct")).iterations
 
 
-def test_a_hung_rollout_and_a_hung_step_are_told_but_hardware_takes_as_long_as_it_takes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_hung_rollout_and_a_hung_step_are_told_but_hardware_takes_as_long_as_it_takes() -> None:
     claim = SimpleNamespace(spec=resolve_experiment(small()), experiment_id="x", number=0)
     patience, hung = Patience(1.0, 1_000.0), Run(claim, None)  # type: ignore[arg-type]
 
@@ -415,10 +470,7 @@ def test_a_repetition_that_does_nothing_gives_signs_of_life(monkeypatch: pytest.
 
 
 @pytest.mark.parametrize("raises", [False, True])
-def test_a_measurement_that_is_cut_off_when_its_permit_runs_out_gives_no_answer(
-    monkeypatch: pytest.MonkeyPatch, raises: bool
-) -> None:
-    monkeypatch.setattr(permits, "POLL_S", 0.001)
+def test_a_measurement_that_is_cut_off_when_its_permit_runs_out_gives_no_answer(raises: bool) -> None:
     left, stopped, asked, ended = [0.0, 0.0], Event(), Event(), Event()
     events: list[str] = []
 
@@ -449,7 +501,7 @@ def test_a_measurement_that_is_cut_off_when_its_permit_runs_out_gives_no_answer(
             reality(np.zeros(1))
         events.append("answers")
 
-    reality = permits.PermittedReality(moving, stop, remaining, end)
+    reality = permits.PermittedReality(moving, stop, remaining, end, POLL_S)
     measuring = Thread(target=measure, daemon=True)
     measuring.start()
 
@@ -557,7 +609,7 @@ def steps_to_the_first_answer(claim: Claim) -> tuple[Any, ...]:
     return tuple(steps)
 
 
-def test_a_worker_asks_for_the_permit_of_its_step(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_asks_for_the_permit_of_its_step() -> None:
     asked: list[int] = []
 
     def left(step: int) -> float:
@@ -572,9 +624,8 @@ def test_a_worker_asks_for_the_permit_of_its_step(monkeypatch: pytest.MonkeyPatc
     assert asked == [place for place, step in enumerate(steps) if isinstance(step, Measured | Probed)]
 
 
-def test_an_answer_ends_its_permit_and_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_ends_its_permit_and_no_process() -> None:
     """The supervisor may withdraw the permit while the worker still asks for it."""
-    monkeypatch.setattr(permits, "POLL_S", 0.001)
     events: list[str] = []
     asks, answered = Event(), Event()
 
@@ -590,7 +641,9 @@ def test_an_answer_ends_its_permit_and_no_process(monkeypatch: pytest.MonkeyPatc
         assert asks.wait(60)
         return Outcome(1.0)
 
-    reality = permits.PermittedReality(moving, lambda: events.append("stops"), left, lambda: events.append("ends"))
+    reality = permits.PermittedReality(
+        moving, lambda: events.append("stops"), left, lambda: events.append("ends"), POLL_S
+    )
     reality(np.zeros(1))
     answered.set()
     for thread in enumerate_threads():
@@ -600,8 +653,7 @@ def test_an_answer_ends_its_permit_and_no_process(monkeypatch: pytest.MonkeyPatc
     assert events == ["permitted"]
 
 
-def test_a_permit_runs_out_although_nobody_answers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(permits, "POLL_S", 0.001)
+def test_a_permit_runs_out_although_nobody_answers() -> None:
     answers, ended = [0.05], Event()
 
     def silent(_: int) -> float:
@@ -609,14 +661,15 @@ def test_a_permit_runs_out_although_nobody_answers(monkeypatch: pytest.MonkeyPat
             return answers.pop()
         raise GetTimeoutError
 
-    reality = permits.PermittedReality(lambda _: Outcome(float(ended.wait(60))), lambda: None, silent, ended.set)
+    reality = permits.PermittedReality(
+        lambda _: Outcome(float(ended.wait(60))), lambda: None, silent, ended.set, POLL_S
+    )
     Thread(target=reality, args=(np.zeros(1),), daemon=True).start()
 
     assert ended.wait(60)
 
 
-def test_a_measurement_waits_for_permits_whose_process_has_died(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(permits, "POLL_S", 0.001)
+def test_a_measurement_waits_for_permits_whose_process_has_died() -> None:
     answers: list[Any] = [1e9, ActorUnavailableError("it starts again", None), ActorDiedError()]
 
     def answering(_: int) -> float:
@@ -625,7 +678,10 @@ def test_a_measurement_waits_for_permits_whose_process_has_died(monkeypatch: pyt
             raise answer
         return float(answer)
 
-    assert permits.PermittedReality(lambda _: Outcome(0.5), lambda: None, answering)(np.zeros(1)).fitness == 0.5
+    assert (
+        permits.PermittedReality(lambda _: Outcome(0.5), lambda: None, answering, poll_s=POLL_S)(np.zeros(1)).fitness
+        == 0.5
+    )
     assert answers == []
 
 

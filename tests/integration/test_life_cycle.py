@@ -65,6 +65,7 @@ def compute(store: Store, experiment: Any = None) -> Any:
     return stored(store, experiment) if experiment else None
 
 
+@pytest.mark.dialects
 def test_a_paused_repetition_finishes_its_step_and_keeps_its_place(store: Store) -> None:
     experiment = submitted(store)
     (claim,) = execution.claim(store, "me", 1)
@@ -265,6 +266,7 @@ def test_a_forbidden_verb_is_refused_and_changes_nothing(store: Store, here: Any
     assert after.model_copy(update={"progress": before.progress}) == before
 
 
+@pytest.mark.dialects
 def test_a_verb_of_a_study_goes_to_all_of_its_experiments_that_permit_it(store: Store) -> None:
     small = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "simulated_fit", "direct"]}
     study = submission.submit_study(store, StudySpec.model_validate(small))

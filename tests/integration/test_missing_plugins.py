@@ -16,6 +16,8 @@ from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 
 WHY = "'gone'; permitted: ", "the robot 'gone' with the hash"
+STORED = ("", "/curve", "/misfit", "/simulators", "/report", "/export")
+COMPUTED = ("/experiments/{}/predictions", "/figures/predictions?experiment={}", "/figures/toy?experiment={}")
 
 
 def experiment_without(store: Store, kind: str) -> str:
@@ -35,24 +37,24 @@ def experiment_without(store: Store, kind: str) -> str:
 
 
 @pytest.mark.parametrize("kind", ["robot", "file", "engine", "tunables", "optimizer"])
-@pytest.mark.parametrize("path", ["", "/curve", "/misfit", "/simulators", "/report", "/export"])
-def test_what_is_stored_is_shown(sqlite_store: Store, kind: str, path: str) -> None:
+def test_what_is_stored_is_shown(sqlite_store: Store, kind: str) -> None:
     id_ = experiment_without(sqlite_store, kind)
+    api = TestClient(create_app(sqlite_store))
 
-    assert TestClient(create_app(sqlite_store)).get(f"/experiments/{id_}{path}").status_code == 200
+    answers = {path: api.get(f"/experiments/{id_}{path}").status_code for path in STORED}
+
+    assert answers == dict.fromkeys(STORED, 200)
 
 
 @pytest.mark.parametrize("kind", ["robot", "file", "engine", "tunables"])
-@pytest.mark.parametrize(
-    "path", ["/experiments/{}/predictions", "/figures/predictions?experiment={}", "/figures/toy?experiment={}"]
-)
-def test_what_cannot_be_computed_any_more_says_why(sqlite_store: Store, kind: str, path: str) -> None:
+def test_what_cannot_be_computed_any_more_says_why(sqlite_store: Store, kind: str) -> None:
     id_ = experiment_without(sqlite_store, kind)
+    api = TestClient(create_app(sqlite_store))
 
-    answer = TestClient(create_app(sqlite_store)).get(path.format(id_))
+    answers = {path: api.get(path.format(id_)) for path in COMPUTED}
 
-    assert answer.status_code == 422
-    assert WHY[kind == "file"] in answer.text
+    assert {path: each.status_code for path, each in answers.items()} == dict.fromkeys(COMPUTED, 422)
+    assert [path for path, each in answers.items() if WHY[kind == "file"] not in each.text] == []
 
 
 @pytest.mark.parametrize("kind", ["robot", "file", "engine", "tunables", "optimizer", "strategy"])

@@ -59,6 +59,7 @@ def test_it_is_recorded_with_the_first_claim(store: Store) -> None:
     assert found.computed_with == f"analytic (of gaplab's own), {HERE.architecture}, spec {SPEC_VERSION}"
 
 
+@pytest.mark.dialects
 def test_of_two_that_begin_it_at_once_one_is_bound_and_the_other_leaves_it_alone(store: Store) -> None:
     id_ = submission.submit_experiment(store, toy(repetitions=2)).id
 
@@ -169,6 +170,7 @@ def test_what_it_leaves_alone_keeps_nothing_else_waiting(store: Store) -> None:
     assert [each.experiment_id for each in claims] == [later]
 
 
+@pytest.mark.dialects
 def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store: Store) -> None:
     id_ = begun(store)
     other = OTHERS["engine"]

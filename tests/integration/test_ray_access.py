@@ -13,6 +13,7 @@ from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.settings import Settings
 from gaplab.workers.__main__ import choose_authentication
 from gaplab.workers.cluster import cluster
+from tests.waiting import LONGEST_S
 
 OWN = """
 import os, subprocess, sys
@@ -68,6 +69,7 @@ with cluster(Settings(workers=1)):
 LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
 
 
+@pytest.mark.release
 def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_environment_says(tmp_path: Path) -> None:
     root = Path(__file__).parents[2]
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
@@ -77,7 +79,7 @@ def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_env
         env=inherited | {"PYTHONPATH": str(root), "RAY_AUTH_MODE": "disabled", "HOME": str(tmp_path)},
         capture_output=True,
         text=True,
-        timeout=180,
+        timeout=LONGEST_S,
         check=False,
     )
 
@@ -121,15 +123,10 @@ def test_a_ray_that_does_not_start_is_told_in_a_sentence(monkeypatch: pytest.Mon
         ("head:6379", "disabled", "disabled"),
     ],
 )
-def test_only_a_cluster_of_others_may_go_without_a_token(
-    monkeypatch: pytest.MonkeyPatch, address: str | None, before: str | None, after: str
-) -> None:
-    monkeypatch.setenv("RAY_AUTH_TOKEN", "theirs")  # Ray has read its own already; what is set here must not stay
-    monkeypatch.setenv("RAY_AUTH_MODE", before or "")
-    if before is None:
-        monkeypatch.delenv("RAY_AUTH_MODE")
+def test_only_a_cluster_of_others_may_go_without_a_token(address: str | None, before: str | None, after: str) -> None:
+    environment = {"RAY_AUTH_TOKEN": "theirs"} | ({"RAY_AUTH_MODE": before} if before else {})
 
-    choose_authentication(Settings(ray_address=address))
+    choose_authentication(Settings(ray_address=address), environment)
 
-    assert os.environ["RAY_AUTH_MODE"] == after
-    assert (os.environ["RAY_AUTH_TOKEN"] == "theirs") == (address is not None)
+    assert environment["RAY_AUTH_MODE"] == after
+    assert (environment["RAY_AUTH_TOKEN"] == "theirs") == (address is not None)

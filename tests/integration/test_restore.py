@@ -219,6 +219,7 @@ def programs() -> Path:
     return Path(wheel.origin).parents[1] / VERSION / "bin"
 
 
+@pytest.mark.release
 def test_the_line_that_restores_a_postgres_replaces_the_database_of_a_later_version(
     postgres: Postgres, tmp_path: Path
 ) -> None:

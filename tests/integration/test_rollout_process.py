@@ -22,8 +22,9 @@ from tests.waiting import wait_until
 DEADLINE_S = 120.0
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def rollouts() -> Iterator[Any]:
+    """Has a process already or not; most tests end it."""
     found = RolloutProcess()
     yield found
     found.close()
@@ -40,8 +41,6 @@ def gone(pid: Any) -> bool:
 
 
 def test_calls_are_executed_by_one_subprocess_of_lower_priority(rollouts: Any) -> None:
-    assert rollouts.pid is None
-
     first, second = rollouts.call(os.getpid), rollouts.call(os.getpid)
 
     assert first == second == rollouts.pid != os.getpid()
@@ -56,9 +55,10 @@ def test_a_process_that_was_killed_is_replaced(rollouts: Any) -> None:
     assert rollouts.call(os.getpid) not in {killed, os.getpid()}
 
 
-def test_a_process_that_could_not_be_started_is_started_by_the_next_call(
-    rollouts: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_process_that_could_not_be_started_is_started_by_the_next_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    rollouts = RolloutProcess()
+    assert rollouts.pid is None
+
     def out_of_memory(_: Any) -> None:
         raise OSError(12, "Cannot allocate memory")
 
@@ -68,6 +68,7 @@ def test_a_process_that_could_not_be_started_is_started_by_the_next_call(
             rollouts.call(os.getpid)
 
     assert rollouts.call(os.getpid) not in {None, os.getpid()}
+    rollouts.close()
 
 
 def test_physics_that_kills_its_process_is_an_error_of_that_call_alone(rollouts: Any) -> None:

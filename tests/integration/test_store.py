@@ -40,7 +40,7 @@ def log_of(store: Store) -> Any:
     return claim
 
 
-@pytest.mark.parametrize("steps", range(1, 6))
+@pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.dialects), 2, 3, 4, 5])
 def test_a_kill_between_any_two_statements_leaves_nothing_half_written(store: Store, steps: Any) -> None:
     submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
@@ -105,6 +105,7 @@ for count, step in enumerate(some_log(30), start=1):
 """
 
 
+@pytest.mark.release
 def test_what_was_acknowledged_survives_kill_9(sqlite_url: str, sqlite_store: Store) -> None:
     submission.submit_experiment(sqlite_store, toy(repetitions=1, iterations=30))
     root = Path(__file__).parents[2]
@@ -126,6 +127,7 @@ def test_on_sqlite_a_commit_returns_when_no_power_loss_can_undo_it(sqlite_store:
     assert synchronous == 2  # FULL
 
 
+@pytest.mark.dialects
 def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store: Store) -> None:
     submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
@@ -143,6 +145,7 @@ def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store: S
     assert same(log_of(store).log, (first,))
 
 
+@pytest.mark.dialects
 def test_writers_wait_for_each_other(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
 
@@ -210,11 +213,9 @@ def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store: Store)
 
 
 @pytest.mark.parametrize("use", [listing.list_studies, lambda store: execution.claim(store, "me", 1)])
-def test_to_have_no_connection_free_is_unavailability(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, use: Any
-) -> None:
+def test_to_have_no_connection_free_is_unavailability(sqlite_store: Store, use: Any) -> None:
     pool = sqlite_store._engine.pool
-    monkeypatch.setattr(pool, "_timeout", 0.01)
+    pool._timeout = 0.01  # type: ignore[attr-defined]
     taken = [sqlite_store._engine.connect() for _ in range(pool.size() + pool._max_overflow)]  # type: ignore[attr-defined]
 
     with pytest.raises(StoreUnavailable, match="all connections"):
@@ -249,7 +250,8 @@ def test_an_unreachable_server_is_unavailable_and_the_message_has_no_password(us
     assert "secret" not in str(caught.value)
 
 
-@pytest.mark.parametrize("use", [Store.check, listing.list_studies, lambda store: execution.claim(store, "me", 1)])
+@pytest.mark.dialects
+@pytest.mark.parametrize("use", [Store.check, lambda store: execution.claim(store, "me", 1)])
 def test_a_database_without_the_schema_is_unavailable(database_url: str, use: Any) -> None:
     store = Store(database_url)
 

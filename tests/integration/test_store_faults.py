@@ -25,8 +25,8 @@ from gaplab.services.store.lease import Failure, Pulse
 from gaplab.services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
-from gaplab.workers import repetitions, supervisor
 from gaplab.workers import sensitivity as checking
+from gaplab.workers import supervisor
 from gaplab.workers.task import delivered
 from tests.fakes import flat
 from tests.without_ray import OPEN, SPEC, Here, HereRepetitions, HereRun, Stop
@@ -163,17 +163,14 @@ def requeue_late(module: Any, requeue_lost: Any, store: Store, **_: Any) -> Any:
 
 def hurry(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let nothing wait for the clock, and no lease depend on it."""
-    for name, value in {"HEARTBEATS": 1e9, "RETRY_S": 0.0}.items():
-        monkeypatch.setattr(supervisor, name, value)
-    monkeypatch.setattr(repetitions, "WAIT_S", 0.0)
-    monkeypatch.setattr(repetitions, "LOOK_S", 0.0)
+    monkeypatch.setattr(supervisor, "RETRY_S", 0.0)
     monkeypatch.setattr(checking, "LOOK_S", 0.0)
     for module in MODULES.values():
         monkeypatch.setattr(module, "requeue_lost", partial(requeue_late, module, module.requeue_lost))
     ray = Ray()
     monkeypatch.setattr(checking, "ray", ray)
     monkeypatch.setattr(checking, "check", ray)
-    monkeypatch.setattr(Trying, "lost", False)
+    Trying.lost = False
 
 
 @pytest.fixture(autouse=True)

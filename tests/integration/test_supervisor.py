@@ -1,4 +1,4 @@
-"""The supervisor as a process: when it gives up, and when it takes what another has lost."""
+"""When a supervisor gives up, and when it takes what another has lost; for a release, as a process with its own Ray."""
 
 import os
 import shutil
@@ -10,24 +10,25 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Event
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from sqlalchemy import select
 
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
-from gaplab.services.core.errors import RayGone
+from gaplab.services.core.errors import RayGone, StoreChanged
 from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution
-from gaplab.services.settings import Settings
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
 from gaplab.workers import watch
-from gaplab.workers.cluster import cluster
 from gaplab.workers.ray_folder import PREFIX, ray_folder
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import toy
 from tests.waiting import wait_until
+from tests.without_ray import Here
 
 DEADLINE_S = 180
 
@@ -59,6 +60,7 @@ def supervisor(sqlite_url: str, log: Path) -> Iterator["subprocess.Popen[bytes]"
     process.wait()
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("part", ["raylet", "gcs_server"])
 def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(supervisor: Any, log: Path, part: str) -> None:
     os.kill(part_of(supervisor.pid, part), signal.SIGKILL)
@@ -67,21 +69,20 @@ def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(supervisor:
     assert f"Ray died on this machine: its {part} ended" in log.read_text()
 
 
-def test_a_ray_that_stands_still_is_told_from_one_that_works(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watch, "LOOK_S", 0.1)
-    with cluster(Settings(workers=1)) as joined:
-        gcs = part_of(os.getpid(), "gcs_server")
-        capacity = joined.capacity()
-        os.kill(gcs, signal.SIGSTOP)
-        try:
-            monkeypatch.setattr(watch, "SILENT_S", 1.0)
-            time.sleep(1.5)
-            with pytest.raises(RayGone, match="does not answer"):
-                joined.capacity()
-        finally:
-            os.kill(gcs, signal.SIGCONT)
+@pytest.mark.usefixtures("ray")
+def test_a_ray_that_answers_no_more_or_lost_a_part_is_told_from_one_that_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    watched = watch.RayWatch(own=True, clock=lambda: now[0])
+    watched.stop()
 
-    assert capacity == 2
+    assert watched.cores() == 2
+    now[0] += watch.SILENT_S + 1
+    with pytest.raises(RayGone, match="does not answer: it was last heard of 16 s ago"):
+        watched.cores()
+    dead = SimpleNamespace(dead_processes=lambda: [("log_monitor", None), ("raylet", None)])
+    monkeypatch.setattr(watch, "_node", lambda: dead)
+    with pytest.raises(RayGone, match="Ray died on this machine: its raylet ended"):
+        watched.cores()
 
 
 def test_ray_keeps_its_files_where_only_their_owner_looks_and_removes_them(tmp_path: Path) -> None:
@@ -93,57 +94,71 @@ def test_ray_keeps_its_files_where_only_their_owner_looks_and_removes_them(tmp_p
     assert not folder.exists()
 
 
-def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with TemporaryDirectory(prefix="g-", dir="/tmp") as parent:
-        monkeypatch.setenv("RAY_TMPDIR", parent)
-        left, starting = (Path(parent) / f"{PREFIX}{name}" for name in ("left", "starting"))
+def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start() -> None:
+    with TemporaryDirectory(prefix="g-", dir="/tmp") as made:
+        parent = Path(made)
+        left, starting = (parent / f"{PREFIX}{name}" for name in ("left", "starting"))
         for folder in (left, starting):
             folder.mkdir()
             (folder / "lock").touch()
         os.utime(left, (0, 0))
-        with ray_folder() as held:
+        with ray_folder(parent) as held:
             os.utime(held, (0, 0))
-            with ray_folder():
-                found = sorted(Path(parent).iterdir())
+            with ray_folder(parent):
+                found = sorted(parent.iterdir())
 
     assert left not in found
     assert {held, starting} <= set(found)
 
 
-def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RAY_TMPDIR", str(tmp_path / ("long" * 20)))
-
-    with ray_folder() as folder:
+def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path) -> None:
+    with ray_folder(tmp_path / ("long" * 20)) as folder:
         assert folder.parent == Path("/tmp")
 
 
 @pytest.mark.parametrize("how", ["migrated", "replaced", "restored in place"])
 def test_a_supervisor_whose_database_is_changed_under_it_writes_nothing_more_and_ends(
-    supervisor: Any, log: Path, sqlite_store: Store, sqlite_url: str, sqlite_template: Path, how: str
+    sqlite_url: str, sqlite_template: Path, how: str
 ) -> None:
     file = Path(sqlite_url.removeprefix("sqlite:///"))
-    wait_until(lambda: owners(sqlite_store), otherwise=log.read_text)
-    if how == "migrated":
-        with sqlite3.connect(file, timeout=60) as connection:
-            connection.execute("UPDATE alembic_version SET version_num = '9999'")
-        connection.close()
-    elif how == "replaced":
-        copy = shutil.copy(sqlite_template, file.with_suffix(".new"))
-        Path(copy).replace(file)
-    else:
-        shutil.copyfile(sqlite_template, file)
+    store = Store(sqlite_url, pinned=True)
+    here = Here(store)
+    here.step()
+    change(file, sqlite_template, how)
 
-    assert supervisor.wait(DEADLINE_S) == 1, log.read_text()
-    said = log.read_text().splitlines()[-1]
-    expected = {"migrated": "revision 9999", "replaced": "replaced by another file", "restored in place": "heartbeat"}
-    assert expected[how] in said
+    said = {"migrated": "revision 9999", "replaced": "replaced by another file", "restored in place": "heartbeat"}
+    with pytest.raises(StoreChanged, match=said[how]):
+        here.serve(Event())
+    store.dispose()
     with sqlite3.connect(file) as connection:
         assert connection.execute("SELECT count(*) FROM supervisor").fetchone() == (int(how == "migrated"),)
     connection.close()
 
 
+def change(file: Path, template: Path, how: str) -> None:
+    """Do to a database what people do beside a service that runs."""
+    if how == "migrated":
+        with sqlite3.connect(file, timeout=60) as connection:
+            connection.execute("UPDATE alembic_version SET version_num = '9999'")
+        connection.close()
+    elif how == "replaced":
+        Path(shutil.copy(template, file.with_suffix(".new"))).replace(file)
+    else:
+        shutil.copyfile(template, file)
+
+
+@pytest.mark.release
+def test_as_a_process_it_then_ends_with_a_sentence(
+    supervisor: Any, log: Path, sqlite_store: Store, sqlite_url: str, sqlite_template: Path
+) -> None:
+    wait_until(lambda: owners(sqlite_store), otherwise=log.read_text)
+    change(Path(sqlite_url.removeprefix("sqlite:///")), sqlite_template, "replaced")
+
+    assert supervisor.wait(DEADLINE_S) == 1, log.read_text()
+    assert "replaced by another file" in log.read_text().splitlines()[-1]
+
+
+@pytest.mark.release
 def test_a_supervisor_that_is_stopped_is_killed_and_another_goes_on(sqlite_url: str, tmp_path: Path) -> None:
     store = Store(sqlite_url)
     experiment = submission.submit_experiment(store, toy(repetitions=1)).id
@@ -170,16 +185,15 @@ def owners(store: Store) -> set[str]:
 
 
 def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_is_set_to(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submission.submit_experiment(store, toy(repetitions=1, strategy="direct"))  # without a sensitivity check
     (claim,) = execution.claim(store, "silent", 1)
-    patient, hasty = (Supervisor(store, lambda: 0, lease_s=lease_s) for lease_s in (60, 0.2))
+    patient, hasty = (Supervisor(store, lambda: 0, lease_s=lease_s) for lease_s in (600, 0.2))
     time.sleep(0.5)
 
-    with cluster(Settings(workers=1)):  # for the sensitivity check that came with it
-        patient.step()
-        still_held = execution.heartbeat(store, [claim])
-        time.sleep(0.5)
-        hasty.step()
+    patient.step()
+    still_held = execution.heartbeat(store, [claim])
+    time.sleep(0.5)
+    hasty.step()
 
     assert still_held == (claim,)
     assert execution.heartbeat(store, [claim]) == ()

@@ -21,13 +21,11 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.running import execution
-from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
-from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import cancel
 from tests.fakes import flat
@@ -38,10 +36,7 @@ from tests.waiting import wait_until
 DEADLINE_S = 180
 
 
-@pytest.fixture(scope="module", autouse=True)
-def ray_of_our_own() -> Iterator[None]:
-    with cluster(Settings(workers=2)):
-        yield
+pytestmark = pytest.mark.usefixtures("ray")
 
 
 def spec(repetitions: Any, controller_evaluations: Any = 200) -> Any:
@@ -129,6 +124,7 @@ def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite
     assert not all(begun)
 
 
+@pytest.mark.dialects
 def test_two_supervisors_on_one_database_do_nothing_twice(store: Store) -> None:
     ids = [submission.submit_experiment(store, spec(2)).id for _ in range(2)]
     stop = Event()
@@ -178,6 +174,7 @@ def other(store_url: str, tmp_path: Path) -> Iterator[Any]:
         process.kill()
 
 
+@pytest.mark.release
 def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(
     store: Store, other: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 from sqlalchemy import text
 
 from gaplab.schemas.schedule import ScheduleChange
@@ -20,6 +21,7 @@ def claimed(store: Store, limit: Any) -> Any:
     return [(each.experiment_id, each.number) for each in execution.claim(store, "me", limit)]
 
 
+@pytest.mark.dialects
 def test_experiments_take_turns_and_their_repetitions_come_in_order(store: Store) -> None:
     first, second = submitted(store), submitted(store, repetitions=2)
 
@@ -63,6 +65,7 @@ def test_the_higher_priority_comes_first_whatever_runs(store: Store) -> None:
     assert found == [(each, number) for each in (urgent, usual, idle) for number in range(3)]
 
 
+@pytest.mark.dialects
 def test_no_more_than_max_parallel_run_at_once(store: Store) -> None:
     narrow = submitted(store, max_parallel=2, repetitions=4)
     claims = execution.claim(store, "me", 9)
@@ -94,6 +97,7 @@ def test_two_experiments_that_differ_only_in_their_schedule_have_one_spec(store:
     assert reading.read_experiment(store, plain).spec == reading.read_experiment(store, hurried).spec
 
 
+@pytest.mark.dialects
 def test_what_waits_for_a_core_gives_way_to_who_has_less(store: Store) -> None:
     large = submitted(store, repetitions=9)
     running, *waiting = execution.claim(store, "me", 4)
@@ -117,6 +121,7 @@ def test_nobody_gives_way_for_what_would_be_no_fairer(store: Store) -> None:
     assert execution.give_way(store, waiting) == ()
 
 
+@pytest.mark.dialects
 def test_the_next_turn_is_found_by_an_index(store: Store) -> None:
     submitted(store)
     with store.reading() as session:

@@ -1,11 +1,13 @@
-"""The supervisor on a real Ray: the same numbers as in one process, whatever happens on the way."""
+"""The supervisor on a real Ray: the same numbers as in one process, whatever happens on the way.
+
+Faults of the database are in test_store_faults.py, and those of plug-ins and hardware in test_faults.py, without Ray.
+"""
 
 import ctypes
 import os
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -15,10 +17,10 @@ import pytest
 import ray
 from ray.exceptions import RayError
 
-from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.lifecycle import State
 from gaplab.schemas.sensitivity import SensitivitySpec, Verdict
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.core.errors import ClusterUnusable, StoreUnavailable
+from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
@@ -26,19 +28,18 @@ from gaplab.services.core.types import Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, reading, submission
-from gaplab.services.running import execution, sensitivity
-from gaplab.services.settings import Settings
+from gaplab.services.running import sensitivity
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
+from gaplab.workers import nodes, task
 from gaplab.workers import sensitivity as checking
-from gaplab.workers import task
 from gaplab.workers.checkpoints import recorded
-from gaplab.workers.cluster import cluster
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import Permits, PermittedReality, asking
+from gaplab.workers.run import Run
 from gaplab.workers.supervisor import Supervisor
 from tests.arithmetic import told
 from tests.experiments import cancel
@@ -46,11 +47,7 @@ from tests.fakes import flat, install
 from tests.processes import processes_of_ray
 from tests.waiting import wait_until
 
-
-@pytest.fixture(scope="module", autouse=True)
-def ray_of_our_own() -> Iterator[None]:
-    with cluster(Settings(workers=2)):
-        yield
+pytestmark = pytest.mark.usefixtures("ray")
 
 
 def test_the_processes_of_ray_run_the_same_code_of_numpy_as_this_one() -> None:
@@ -95,46 +92,33 @@ def stored(store: Store, experiment: Any) -> Any:
         return [[flat(step) for step in found[row.id]] for row in rows]
 
 
-@pytest.mark.parametrize("at_once", [1, 2, 4])
-def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store: Store, at_once: Any) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
-
-    run(Supervisor(store, lambda: at_once), store, experiment)
-
-    assert reading.read_experiment(store, experiment).state is State.COMPLETED
-    assert stored(store, experiment) == expected(toy())
+def given_to(supervisor: Supervisor, task: Any) -> Supervisor:
+    """The supervisor, which gives its repetitions to another task of Ray."""
+    supervisor._repetitions.launch = lambda claim: Run(claim, task.remote(claim))  # type: ignore[method-assign]
+    return supervisor
 
 
-def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store: Store) -> None:
-    experiment = submission.submit_experiment(sqlite_store, long_toy()).id
-    supervisor = Supervisor(sqlite_store, lambda: 1)
-    run(supervisor, sqlite_store, experiment, until=lambda: processes_of_ray("run"))
-    time.sleep(0.5)
+def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store: Store) -> None:
+    ids = []
+    for at_once in (1, 4):
+        ids.append(submission.submit_experiment(store, toy()).id)
+        run(Supervisor(store, lambda at_once=at_once: at_once), store, ids[-1])  # type: ignore[misc]
 
-    for pid in processes_of_ray("run"):
-        os.kill(pid, signal.SIGKILL)
-    run(supervisor, sqlite_store, experiment)
-
-    repetitions = reading.list_repetitions(sqlite_store, experiment)
-    assert [each.state for each in repetitions] == [State.COMPLETED] * 2
-    assert sum(each.attempts for each in repetitions) > 2
-    assert stored(sqlite_store, experiment) == expected(long_toy())
+    assert [reading.read_experiment(store, each).state for each in ids] == [State.COMPLETED] * 2
+    assert [stored(store, each) for each in ids] == [expected(toy())] * 2
 
 
-def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others_go_on(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others_go_on(sqlite_store: Store) -> None:
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def raising(claim: Any, *_: Any) -> Iterator[Any]:
+    def raising(claim: Any) -> Iterator[Any]:
         if claim.number == 1:
             msg = "the second one is broken"
             raise ZeroDivisionError(msg)
         yield from task.batches(recorded(setting(claim.spec, claim.number), claim.log, ()))
 
-    monkeypatch.setattr(task, "run", raising)
     experiment = submission.submit_experiment(sqlite_store, toy()).id
 
-    run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
+    run(given_to(Supervisor(sqlite_store, lambda: 4), raising), sqlite_store, experiment)
 
     read = reading.read_experiment(sqlite_store, experiment)
     states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
@@ -143,21 +127,18 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
     assert read.reasons == ("ZeroDivisionError: the second one is broken",)
 
 
-def test_a_worker_that_hangs_is_ended_with_the_reason_even_if_it_holds_the_interpreter(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_that_hangs_is_ended_with_the_reason_even_if_it_holds_the_interpreter(sqlite_store: Store) -> None:
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def hanging(claim: Any, *_: Any) -> Iterator[Any]:
+    def hanging(claim: Any) -> Iterator[Any]:
         yield ()
         if claim.number == 1:
             ctypes.PyDLL(None).sleep(3600)  # with Python's lock
         yield from task.delivered(lambda: setting(claim.spec, claim.number), claim, 10.0)
 
-    monkeypatch.setattr(task, "run", hanging)
     experiment = submission.submit_experiment(sqlite_store, toy()).id
-    patience = Patience(rollout_s=0.3)
+    supervisor = Supervisor(sqlite_store, lambda: 3, lease_s=3.0, patience=Patience(rollout_s=0.3))
 
-    run(Supervisor(sqlite_store, lambda: 3, lease_s=3.0, patience=patience), sqlite_store, experiment)
+    run(given_to(supervisor, hanging), sqlite_store, experiment)
 
     states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
     assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
@@ -197,6 +178,7 @@ def moving(told: Path) -> Any:
     return task_
 
 
+@pytest.mark.release
 def test_permits_whose_process_was_killed_permit_again_once_they_are_renewed() -> None:
     handle: Any = Permits.remote()  # type: ignore[attr-defined]  # Ray adds it
     ask = asking(handle, 1, 1)
@@ -217,7 +199,7 @@ def _answer(ask: Any) -> float:
         return 0.0
 
 
-@pytest.mark.parametrize("cancelled", [True, False])
+@pytest.mark.parametrize("cancelled", [True, pytest.param(False, marks=pytest.mark.release)])
 def test_hardware_stops_when_its_experiment_is_cancelled_or_its_supervisor_stands_still(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cancelled: bool
 ) -> None:
@@ -239,82 +221,6 @@ def test_hardware_stops_when_its_experiment_is_cancelled_or_its_supervisor_stand
     assert {each.state for each in waiting} == {State.QUEUED}
 
 
-def delivering(left_out: Any, attempts: Any) -> Any:
-    """A task whose repetition 1 leaves out some of what it has done in its first attempts."""
-
-    @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def task_(claim: Any, *_: Any) -> Iterator[Any]:
-        delivered = list(recorded(setting(claim.spec, claim.number), claim.log, ()))
-        if claim.number == 1 and claim.epoch <= attempts:
-            del delivered[left_out]
-        yield tuple(delivered)
-
-    return task_
-
-
-@pytest.mark.parametrize(
-    ("left_out", "reason"),
-    [
-        (slice(0, 1), "could not be stored: step 1 of repetition 1 cannot be recorded: the log has 0 steps"),
-        (slice(-2, None), "it ended too early: repetition 1"),
-    ],
-)
-def test_a_repetition_that_its_log_refuses_is_queued_again_alone(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, left_out: Any, reason: Any
-) -> None:
-    monkeypatch.setattr(task, "run", delivering(left_out, attempts=1))
-    experiment = submission.submit_experiment(sqlite_store, toy()).id
-
-    run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
-
-    first, second = reading.list_attempts(sqlite_store, experiment, 1)
-    assert (first.ending, second.ending) == (Ending.LOST, Ending.COMPLETED)
-    assert reason in first.reason
-    assert [each.attempts for each in reading.list_repetitions(sqlite_store, experiment)] == [1, 2, 1]
-    assert stored(sqlite_store, experiment) == expected(toy())
-
-
-def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(task, "run", delivering(slice(0, 1), attempts=99))
-    experiment = submission.submit_experiment(sqlite_store, toy()).id
-
-    run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
-
-    repetitions = reading.list_repetitions(sqlite_store, experiment)
-    assert [each.state for each in repetitions] == [State.COMPLETED, State.FAILED, State.COMPLETED]
-    assert "cannot be recorded" in repetitions[1].error
-
-
-def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_twice(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    record_all, calls = execution.record_all, []
-
-    def flaky(store: Store, deliveries: Any) -> Any:
-        calls.append(1)
-        if len(calls) % 3 == 1:
-            raise StoreUnavailable("before anything was written")
-        held = record_all(store, deliveries)
-        if len(calls) % 3 == 2:
-            raise StoreUnavailable("after everything was written")
-        return held
-
-    monkeypatch.setattr(execution, "record_all", flaky)
-    experiment = submission.submit_experiment(sqlite_store, toy()).id
-    supervisor = Supervisor(sqlite_store, lambda: 4)
-
-    def step() -> None:
-        with suppress(StoreUnavailable):
-            supervisor.step()
-
-    wait_until(lambda: reading.read_experiment(sqlite_store, experiment).state is State.COMPLETED, meanwhile=step)
-
-    assert len(calls) > 3
-    assert stored(sqlite_store, experiment) == expected(toy())
-
-
 def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 2)
@@ -332,19 +238,6 @@ def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store: Store
     assert reading.read_experiment(sqlite_store, experiment).progress.iterations_done
 
 
-def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_store: Store) -> None:
-    experiment = submission.submit_experiment(sqlite_store, toy()).id
-    first, stop = Supervisor(sqlite_store, lambda: 2), Event()
-    first.step()
-    stop.set()
-
-    first.serve(stop)
-    run(Supervisor(sqlite_store, lambda: 2), sqlite_store, experiment)
-
-    assert reading.read_experiment(sqlite_store, experiment).state is State.COMPLETED
-    assert stored(sqlite_store, experiment) == expected(toy())
-
-
 def long_steps() -> Any:
     """A step of some seconds, twice."""
     budget = {"controller_evaluations": 4_000, "selection_evaluations": 20, "simulator_evaluations": 20}
@@ -356,27 +249,20 @@ def parts_stored(store: Store) -> Any:
         return session.query(CheckpointRow).count()
 
 
-def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    claim, checkpoints = execution.claim, []  # type: ignore[var-annotated]
-
-    def watched(*given: Any) -> Any:
-        claims = claim(*given)
-        checkpoints.extend(len(each.checkpoints) for each in claims)
-        return claims
-
-    monkeypatch.setattr(execution, "claim", watched)
+def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_steps()).id
     supervisor = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05)
     run(supervisor, sqlite_store, experiment, until=lambda: parts_stored(sqlite_store) > 1)
 
     for pid in processes_of_ray("run"):
         os.kill(pid, signal.SIGKILL)
+    (lost,) = supervisor._repetitions.runs
+    run(supervisor, sqlite_store, experiment, until=lambda: supervisor._repetitions.runs not in ([lost], []))
+    (again,) = supervisor._repetitions.runs
     run(supervisor, sqlite_store, experiment)
 
-    assert checkpoints[0] == 0
-    assert checkpoints[1] > 1
+    assert len(again.claim.checkpoints) > 1
+    assert [each.attempts for each in reading.list_repetitions(sqlite_store, experiment)] == [2]
     assert stored(sqlite_store, experiment) == expected(long_steps())
     assert parts_stored(sqlite_store) == 0
 
@@ -439,6 +325,7 @@ def killed_once(spec: Any, mark: Any) -> Any:
     return check(subject(spec), SteadyState(), Effort(spec.points, spec.evaluations))
 
 
+@pytest.mark.release
 def test_a_sensitivity_check_whose_worker_is_killed_runs_again(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -452,9 +339,7 @@ def test_a_sensitivity_check_whose_worker_is_killed_runs_again(
     assert {each.verdict for each in found.tunables} == {Verdict.SMOOTH}
 
 
-def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(
-    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_store: Store) -> None:
     check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
     first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
@@ -489,3 +374,12 @@ def test_a_check_on_a_node_with_other_versions_is_not_stored(sqlite_store: Store
         checked(sqlite_store, check_id, supervisor)
 
     assert checks.read(sqlite_store, check_id).state is State.RUNNING
+
+
+def test_a_cluster_whose_nodes_have_other_versions_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours = nodes.versions()
+    nodes.check_nodes()
+    monkeypatch.setattr(nodes, "versions", lambda: ours | {"numpy": "1.26.4"})
+
+    with pytest.raises(ClusterUnusable, match=f"has numpy {ours['numpy']} where the supervisor has numpy 1.26.4"):
+        nodes.check_nodes()
