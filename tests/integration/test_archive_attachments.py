@@ -108,21 +108,6 @@ def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store, 
     assert import_archive(sqlite_store, BytesIO(archive)).study != study.id
 
 
-def test_an_archive_without_its_files_is_read_as_before(
-    sqlite_store: Store, postgres_store: Store, unpacked_here: None
-) -> None:
-    experiment, _ = measured(sqlite_store)
-    members = members_of(exported(export_experiment(sqlite_store, experiment)))
-    manifest = json.loads(members["manifest.json"])
-    old = {name: content for name, content in members.items() if not name.startswith("attachment")}
-    manifest["members"] = {name: member for name, member in manifest["members"].items() if name in old}
-
-    import_archive(postgres_store, BytesIO(packed(old | {"manifest.json": json.dumps(manifest).encode()})))
-
-    assert [each.id for each in list_experiments(postgres_store).items] == [experiment]
-    assert stored(postgres_store) == set()
-
-
 @pytest.fixture
 def good(sqlite_store: Store) -> dict[str, bytes]:
     """The members of an archive with files; the database has it no more."""

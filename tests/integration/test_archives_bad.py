@@ -191,6 +191,15 @@ def test_a_member_that_is_missing(sqlite_store: Store, good: Any, name: Any) -> 
     refused(sqlite_store, packed(left, honest=False), name)
 
 
+@pytest.mark.parametrize("name", ["robot.parquet", "spec.json"])
+def test_a_member_that_the_manifest_lacks_too(sqlite_store: Store, good: Any, name: Any) -> None:
+    manifest = json.loads(good["manifest.json"])
+    del manifest["members"][name]
+    left = {each: content for each, content in good.items() if each != name}
+
+    refused(sqlite_store, packed(left | {"manifest.json": json.dumps(manifest).encode()}), f"it has no {name}")
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -220,7 +229,7 @@ def in_spec(**changes: Any) -> Any:
 
 
 BOUNDED = {"name": "static_friction", "lower": 0.0, "upper": 1.0}
-PARTS = ("name", "iterations", "repetitions", "robot", "engine", "tunables", "optimizer", "budget", "seed")
+PARTS = ("name", "iterations", "repetitions", "robot", "engine", "tunables", "tuner", "optimizer", "budget", "seed")
 
 
 def without(part: Any) -> Any:
