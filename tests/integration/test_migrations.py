@@ -20,6 +20,8 @@ from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.models import REVISION, Base
 from gaplab.services.store.session import Store
 
+pytestmark = pytest.mark.dialects
+
 
 def tables(connection: Connection) -> set[str]:
     return set(inspect(connection).get_table_names()) - {"alembic_version"}
