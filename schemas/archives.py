@@ -7,7 +7,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen, Id
 
 FORMAT = 1
-"""Version of the archive format: exports write it, and imports read it and all before it."""
+"""Version of the archive format: exports write it, and imports refuse a later one."""
 
 MOST_BYTES_OF_IMPORT = 2**30
 """Size of an archive that an import reads."""

@@ -3,14 +3,24 @@
 The stored JSON is that of a submitted spec. A later change of a default therefore changes no stored experiment.
 """
 
-from collections.abc import Mapping
-from typing import Any
+from typing import Annotated
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from gaplab.schemas.base import Count, Label, Real, Seed
 from gaplab.schemas.plugin import PluginRef, TunableRef
-from gaplab.schemas.spec import BudgetName, BudgetSpec, ExperimentSpec, Probes, RealitySpec
+from gaplab.schemas.safety import Beyond, LimitsSpec
+from gaplab.schemas.spec import (
+    BudgetName,
+    BudgetSpec,
+    ExperimentSpec,
+    HeldOut,
+    KnownSamples,
+    Probes,
+    RealityKind,
+    RealitySpec,
+    Repeats,
+)
 
 SPEC_VERSION = 1
 """Version of newly stored specs."""
@@ -36,18 +46,24 @@ class ResolvedBudget(BudgetSpec):
     controller_evaluations: Count
     selection_evaluations: Count
     simulator_evaluations: Count
+    reuse_transfer: Annotated[bool, Field(strict=True)]
 
 
 class ResolvedReality(RealitySpec):
     """Reality with every field; a physical one has no engine and no parameters.
 
-    Some hidden parameters of an imported experiment may be unknown. A spec from before there were physical realities
-    has none of their fields.
+    Some hidden parameters of an imported experiment may be unknown.
     """
 
+    kind: RealityKind
     engine: PluginRef | None
     parameters: dict[str, Real]
-    probes: Probes = "each"
+    bench: Label | None
+    repeats: Repeats
+    samples: KnownSamples
+    probes: Probes
+    limits: LimitsSpec | None
+    beyond: Beyond
 
 
 class ResolvedSpec(ExperimentSpec):
@@ -60,19 +76,16 @@ class ResolvedSpec(ExperimentSpec):
     iterations: Count
     repetitions: Count
     robot: PluginRef
+    controller: PluginRef | None
+    task: PluginRef | None
     strategy: PluginRef
     optimizer: PluginRef
     controller_optimizer: PluginRef
     engine: PluginRef
     tunables: tuple[ResolvedTunable, ...]
+    discrepancy: PluginRef
+    tuner: PluginRef
+    held_out: HeldOut
     reality: ResolvedReality
     budget: ResolvedBudget
     seed: Seed
-
-    @model_validator(mode="before")
-    @classmethod
-    def _search_for_controllers_as_before(cls, value: Any) -> Any:  # noqa: ANN401 - JSON
-        """Give a spec from before there was an optimizer of controllers the one that it has."""
-        if isinstance(value, Mapping) and "optimizer" in value:
-            return {"controller_optimizer": value["optimizer"], **value}
-        return value

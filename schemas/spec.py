@@ -52,6 +52,9 @@ class BudgetSpec(Frozen):
 
 RealityKind = Literal["simulated", "physical"]
 Probes = Literal["each", "last", "never"]
+Repeats = Annotated[Count, Field(le=1_000)]
+KnownSamples = Annotated[tuple[KnownSample, ...], Field(max_length=10_000)]
+HeldOut = Annotated[float, Field(strict=True, ge=0, le=0.5)]
 
 
 class RealitySpec(Frozen):
@@ -71,13 +74,12 @@ class RealitySpec(Frozen):
         description="name of the physical robot; default: the robot's. The requests of one bench are taken one at a "
         "time, whatever experiment they are of",
     )
-    repeats: Annotated[Count, Field(le=1_000)] = Field(
+    repeats: Repeats = Field(
         default=1,
         description="values of each physical measurement; their mean is the fitness, and their spread is the noise",
     )
-    samples: tuple[KnownSample, ...] = Field(
+    samples: KnownSamples = Field(
         default=(),
-        max_length=10_000,
         description="controllers of the physical robot that were measured before; the first simulators are tuned on "
         "them",
     )
@@ -137,7 +139,7 @@ class SharedSettings(Frozen):
         default=PluginRef(name="squared_fitness"), description="what tuning minimises, summed over the samples"
     )
     tuner: PluginRef = Field(default=PluginRef(name="search"), description="how simulators are found")
-    held_out: Annotated[float, Field(strict=True, ge=0, le=0.5)] = Field(
+    held_out: HeldOut = Field(
         default=0.0,
         description="share of the samples that no tuning sees; the error of tuned simulators on them is reported. 0.2: "
         "each fifth sample",

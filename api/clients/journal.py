@@ -85,7 +85,7 @@ class Journal:
 def _lines(content: bytes) -> Iterator[dict[str, Any]]:
     for text in content.splitlines():
         try:
-            line = json.loads(text, parse_constant=lambda _: None)  # NaN, as older drivers wrote of failed sensors
+            line = json.loads(text)
         except ValueError:
             continue
         if isinstance(line, dict):

@@ -34,8 +34,7 @@ GREATEST, GREATEST_LARGE = 2**30, 2**48
 
 _ID = r"^[A-Za-z0-9]{1,64}$"
 _IDS = {"id", "study_id", "experiment_id", EXPERIMENT}
-_MAY_BE_NEGATIVE = {"precedence", "tuning_saved", "rollouts_saved"}
-"""An order by priority, and savings, since tuners could once exceed their budget."""
+_MAY_BE_NEGATIVE = {"precedence"}
 
 _Moment = Annotated[
     AwareDatetime,
@@ -63,23 +62,20 @@ def checked(table: str, file: Path, count: int) -> Iterator[Row]:
     Raises:
         InvalidArchive: a row or the number of rows is invalid; the message names the first invalid row and column.
     """
-    model, columns, number = _model(table), None, 0
+    model, number = _model(table), 0
     with file.open(encoding="ascii", errors="surrogateescape") as lines:
         for number, line in enumerate(_lines(lines, table), 1):
             if number > count:
                 _refuse(table, f"has more than the {count} rows that the manifest states")
             place = f"{table}, row {number}"
             row = _row(line, place)
-            columns = columns or list(row)
-            if list(row) != columns:
-                _refuse(place, "has other columns than the first row")
-            if unknown := sorted(set(columns) - set(model.model_fields)):
+            if unknown := sorted(set(row) - set(model.model_fields)):
                 _refuse(place, f"has columns that this version of gaplab does not know: {', '.join(unknown)[:200]}")
             try:
                 found = model.model_validate(row)
             except ValidationError as error:
                 _refuse(f"{place},", first_error(error))
-            yield {name: getattr(found, name) for name in columns}
+            yield dict(found)
     if number != count:
         _refuse(table, f"has {number} rows; the manifest states {count}")
 
@@ -115,10 +111,9 @@ def _refuse_constant(constant: str) -> NoReturn:
 
 @cache
 def _model(table: str) -> type[BaseModel]:
-    """Return the pydantic model of a row: columns without a default are required, others are not permitted."""
+    """Return the pydantic model of a row: every column is required, others are not permitted."""
     fields: dict[str, Any] = {
-        column.name: (_type(column) | None if column.nullable else _type(column), ... if column.required else None)
-        for column in columns_of(table)
+        column.name: (_type(column) | None if column.nullable else _type(column), ...) for column in columns_of(table)
     }
     return create_model(table, __config__=ConfigDict(extra="forbid", strict=True), **fields)
 

@@ -47,9 +47,6 @@ LEFT_OUT: Mapping[str, str] = {
 }
 """Tables that are left out, each with the reason."""
 
-ONLY_IF_USED = {"robot", "attachment"}
-"""Tables that an archive has only if its experiments use a row; earlier versions read the others."""
-
 COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
     "robot": {"created_at": "says when one service got the file"},
     "study": {

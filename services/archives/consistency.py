@@ -8,6 +8,7 @@ from gaplab.schemas.editing import Edit
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
+from gaplab.schemas.spec import Schedule
 from gaplab.services.archives.checking import Row
 from gaplab.services.archives.columns import EXPERIMENT, REPETITION
 from gaplab.services.archives.opening import OpenedArchive
@@ -16,7 +17,7 @@ from gaplab.services.core.errors import InvalidArchive, InvalidSpec
 from gaplab.services.core.robot_files import read_robot_file
 from gaplab.services.core.robot_library import IMPORTED, label_of
 from gaplab.services.core.robots import robots
-from gaplab.services.core.stored_specs import spec_as_stored
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.labels import plain_name
@@ -42,7 +43,7 @@ def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
         experiments[row["id"]] = row | {"spec": _checked_spec(row)}
     study = manifest.id if manifest.kind == "study" else None
     studies = [row["id"] for row in opened.rows("study")]
-    if studies != ([study] if study else []) or {row.get("study_id") for row in experiments.values()} - {study}:
+    if studies != ([study] if study else []) or {row["study_id"] for row in experiments.values()} - {study}:
         raise InvalidArchive(
             f"it has other studies or experiments than the {manifest.kind} {manifest.id!r} of its manifest"
         )
@@ -76,7 +77,7 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
     if table == "provenance":
         _check_provenance(row)
         return
-    if table == "answer" and not _is_list_of_texts(row.get("attachments")):
+    if table == "answer" and not _is_list_of_texts(row["attachments"]):
         raise InvalidArchive(f"the attachments of answer {row['id']!r} are no list of hashes")
     owner = experiments.get(row["id"] if table == "experiment" else row.get(EXPERIMENT) or row["experiment_id"])
     number = row.get(REPETITION, row["number"] if table == "repetition" else 0)
@@ -109,10 +110,10 @@ def check_attachments(session: Session, opened: OpenedArchive) -> None:
 
 def _check_tags(table: str, row: Row) -> None:
     try:
-        tags = Edit(tags=unpack_tags(row.get("tags"))).tags or ()
+        tags = Edit(tags=unpack_tags(row["tags"])).tags or ()
     except ValidationError as error:
         raise InvalidArchive(f"the tags of {table} {row['id']!r} are invalid") from error
-    if pack_tags(tags) != row.get("tags"):
+    if pack_tags(tags) != row["tags"]:
         raise InvalidArchive(f"the tags of {table} {row['id']!r} are not as this service stores them")
 
 
@@ -130,12 +131,12 @@ def _check_provenance(row: Row) -> None:
 
 
 def _checked_spec(row: Row) -> Row:
-    """Return the spec to store, with the archive's fields; unknown parameters of reality are null."""
+    """Return the spec to store; unknown parameters of reality are null."""
     place, given = f"the spec of experiment {row['id']!r}", row["spec"]
-    if row.get("spec_version", SPEC_VERSION) > SPEC_VERSION:
+    if row["spec_version"] > SPEC_VERSION:
         raise InvalidArchive(f"{place} has version {row['spec_version']}; this gaplab reads up to {SPEC_VERSION}")
     try:
-        spec = spec_as_stored(given)
+        spec = spec_of(given)
         truth = dict.fromkeys(given["reality"]["parameters"])
     except ValidationError as error:
         fields = sorted({"/".join(map(str, found["loc"])) for found in error.errors()})
@@ -154,19 +155,13 @@ def _checked_spec(row: Row) -> Row:
     if row["iterations"] not in _iterations(spec):
         msg = f"{place} does not fit its experiment, whose repetitions have {row['iterations']:,} iterations"
         raise InvalidArchive(msg)
-    stored = _fields_of(given, spec.model_dump(mode="json"))
-    reality = _fields_of(given["reality"], stored["reality"])
-    return stored | {"reality": reality | {"parameters": truth | reality["parameters"]}}
+    stored = spec.model_dump(mode="json", exclude=set(Schedule.model_fields))
+    return stored | {"reality": stored["reality"] | {"parameters": truth | stored["reality"]["parameters"]}}
 
 
 def _is_stored(robot: PluginRef) -> bool:
     """Return whether the file of a robot is in the archive or stored here, or it needs none."""
     return robot.name != IMPORTED or bool(robot_library.needed_by(robot))
-
-
-def _fields_of(given: Row, checked: Row) -> Row:
-    """Return the checked values of the fields that were given, so that an earlier spec does not get later fields."""
-    return {name: value for name, value in checked.items() if name in given}
 
 
 def _iterations(spec: ResolvedSpec) -> set[int]:

@@ -39,6 +39,7 @@ MOST_FILES = 10_000
 
 MOST_BYTES_OF_MANIFEST = 4_000_000
 MOST_BYTES_OF_DIRECTORY = 4 * 2**20
+_MEMBERS = {MANIFEST, CURVES, SPEC, *map(member_of, EXPORTED)}
 _UNPACKING = Path(__file__).with_name("unpacking.py")
 _CHUNK = 2**16
 
@@ -61,13 +62,12 @@ class OpenedArchive:
     attachments: Mapping[str, Path]
 
     def rows(self, table: str) -> Iterator[Row]:
-        """Yield the rows of a table, checked; none if the archive does not have it.
+        """Yield the rows of a table, checked.
 
         Raises:
             InvalidArchive: a row is invalid.
         """
-        if table in self.files:
-            yield from checked(table, self.files[table], self.manifest.members[member_of(table)].rows)
+        yield from checked(table, self.files[table], self.manifest.members[member_of(table)].rows)
 
 
 def open_archive(file: IO[bytes], folder: Path, most_rows: int, convert: ParquetConverter) -> OpenedArchive:
@@ -93,7 +93,7 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int, convert: Parquet
             if name != MANIFEST
         }
     convert({file: manifest.members[name].rows for name, file in files.items() if name.endswith(".parquet")})
-    tables = {table: lines_of(files[member_of(table)]) for table in EXPORTED if member_of(table) in files}
+    tables = {table: lines_of(files[member_of(table)]) for table in EXPORTED}
     return OpenedArchive(manifest, tables, {hash_: file for name, file in files.items() if (hash_ := digest_of(name))})
 
 
@@ -135,12 +135,11 @@ def readable_zip(file: IO[bytes] | Path) -> Iterator[ZipFile]:
 
 
 def _members(archive: ZipFile) -> dict[str, ZipInfo]:
-    known = {MANIFEST, CURVES, SPEC, *map(member_of, EXPORTED)}
     found: dict[str, ZipInfo] = {}
     for info in archive.infolist():
-        if info.filename not in known and digest_of(info.filename) is None:
+        if info.filename not in _MEMBERS and digest_of(info.filename) is None:
             raise InvalidArchive(
-                f"unknown member {info.filename[:64]!r}; permitted: {', '.join(sorted(known))}, attachments/SHA-256"
+                f"unknown member {info.filename[:64]!r}; permitted: {', '.join(sorted(_MEMBERS))}, attachments/SHA-256"
             )
         if info.filename in found:
             raise InvalidArchive(f"it has {info.filename} twice")
@@ -181,6 +180,8 @@ def _manifest(archive: ZipFile, members: dict[str, ZipInfo]) -> Manifest:
     if missing := set(manifest.members) ^ (set(members) - {MANIFEST}):
         msg = f"{', '.join(sorted(missing)[:5])!r} is in the manifest or in the archive, but not in both"
         raise InvalidArchive(msg)
+    if missing := _MEMBERS - members.keys():
+        raise InvalidArchive(f"it has no {', '.join(sorted(missing)[:5])}")
     return manifest
 
 

@@ -175,7 +175,7 @@ def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetim
     goes_on = table not in _OF_NO_EXPERIMENT and _is_physical(experiments[_owner(table, row)])
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:
         row |= {"state": _resting(State(row["state"]))} if goes_on else {"state": State.CANCELLED, "ended_at": now}
-    if table == "attempt" and row.get("ended_at") is None:
+    if table == "attempt" and row["ended_at"] is None:
         row |= {"ending": Ending.HANDED_BACK if goes_on else Ending.CANCELLED, "ended_at": now}
     if table == "request" and row["state"] == RequestState.TAKEN:
         row |= {"state": RequestState.OPEN}
@@ -195,7 +195,7 @@ def _owner(table: str, row: Row) -> str:
 
 
 def _is_physical(experiment: Row) -> bool:
-    return bool(experiment["spec"]["reality"].get("kind") == "physical")
+    return bool(experiment["spec"]["reality"]["kind"] == "physical")
 
 
 def _resting(state: State) -> State:

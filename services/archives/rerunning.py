@@ -179,7 +179,7 @@ def _computed(recorded: Recorded) -> Iterator[Step]:
 def _obstacle(recorded: Recorded) -> str | None:
     """Return why a repetition cannot be computed here; None if it can."""
     reality = recorded.spec["reality"]
-    if reality.get("kind") == "physical":
+    if reality["kind"] == "physical":
         return "reality is a robot on a bench, and a measurement cannot be repeated"
     if any(value is None for value in reality["parameters"].values()):
         return "the archive hides parameters of reality"

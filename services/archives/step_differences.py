@@ -10,15 +10,10 @@ from gaplab.services.core.types import Step
 
 
 def difference(stored: Step, computed: Step) -> str | None:
-    """Return the first number that differs, with both values; None if all numbers have the same bits.
-
-    A step from before readings were stored has none; the readings of today are then not compared.
-    """
+    """Return the first number that differs, with both values; None if all numbers have the same bits."""
     if type(stored) is not type(computed):
         return f"it is {type(computed).__name__} here, and {type(stored).__name__} in the archive"
     before, now = dict(_numbers(stored)), dict(_numbers(computed))
-    if not any(map(_is_reading, before)):
-        now = {place: value for place, value in now.items() if not _is_reading(place)}
     for place in before | now:
         if place not in before or place not in now or not _same_bits(before[place], now[place]):
             return f"{place} is {_shown(now, place)} here, and {_shown(before, place)} in the archive"
@@ -27,10 +22,6 @@ def difference(stored: Step, computed: Step) -> str | None:
 
 def _shown(numbers: Mapping[str, float], place: str) -> str:
     return repr(numbers[place]) if place in numbers else "absent"
-
-
-def _is_reading(place: str) -> bool:
-    return "readings[" in place
 
 
 def _numbers(value: object, place: str = "") -> Iterator[tuple[str, float]]:

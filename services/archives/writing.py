@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 
 from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.schemas.curves import Curve
-from gaplab.services.archives.columns import EXPORTED, ONLY_IF_USED, columns_of
+from gaplab.services.archives.columns import EXPORTED, columns_of
 from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, Row, file_member_of, member_of, write
 from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
@@ -77,8 +77,7 @@ def _export(
             for table in EXPORTED:
                 with TemporaryFile() as part:
                     count = write(table, _rows(session, table, study, ids, hidden), part)
-                    if count or table not in ONLY_IF_USED:
-                        members[member_of(table)] = _add(archive, member_of(table), part, count)
+                    members[member_of(table)] = _add(archive, member_of(table), part, count)
             members |= _add_files(session, archive, ids)
             points = TypeAdapter(tuple[Curve, ...]).dump_json(curves.curves_of(session, ids))
             members[CURVES] = _add(archive, CURVES, BytesIO(points), len(ids))

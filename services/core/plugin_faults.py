@@ -12,7 +12,7 @@ from gaplab.schemas.plugin import LONGEST_NAME
 from gaplab.services.core.plugin_options import option_violation
 from gaplab.services.core.unusable_plugins import quoted
 
-SETS_OF_OPTIONS = ("before", "published", "lean")
+SETS_OF_OPTIONS = ("published", "lean")
 """Attributes of a plug-in with values for some of its options."""
 
 

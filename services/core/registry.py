@@ -29,8 +29,6 @@ class Plugin:
         name: name in specs, and of the file.
         source: origin of its idea or its numbers.
         Options: frozen model whose fields all have defaults.
-        before: for options that were added later, the values that give what the plug-in did before; experiments that
-            were stored without these options keep them.
         published: options of the formula as its source prints it, which the preset `as_published` sets.
         lean: options that save rollouts, which the preset `lean` sets.
     """
@@ -38,7 +36,6 @@ class Plugin:
     name: ClassVar[str]
     source: ClassVar[str] = "gaplab"
     Options: ClassVar[type[Frozen]] = NoOptions
-    before: ClassVar[Mapping[str, Any]] = {}
     published: ClassVar[Mapping[str, Any]] = {}
     lean: ClassVar[Mapping[str, Any]] = {}
 

@@ -158,9 +158,8 @@ def id_of(spec: Checked, external: Mapping[str, str] | None = None) -> str:
     """
     versions = external_plugins() if external is None else external
     names = named_in(spec.model_dump(mode="json"))
-    own = {name for name in ("controller", "task") if getattr(spec, name) is None}  # as checks of before had them
     files = [versions[name] for name in names if name in versions]
-    text = json.dumps([VERSION, spec.model_dump(mode="json", exclude=own), *files], sort_keys=True)
+    text = json.dumps([VERSION, spec.model_dump(mode="json"), *files], sort_keys=True)
     return sha256(text.encode()).hexdigest()[:16]
 
 

@@ -11,7 +11,6 @@ from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
-from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.estimates import check_cost
 from gaplab.services.experiments.lifecycle import get_permitting, get_study_permitting
@@ -82,7 +81,7 @@ def _spec(experiment: ExperimentRow) -> ResolvedSpec:
     if None in experiment.spec["reality"]["parameters"].values():
         msg = f"experiment {experiment.id!r} was imported while its reality was hidden, so it cannot be extended"
         raise Conflict(msg)
-    return spec_to_run(experiment.spec)
+    return ResolvedSpec.model_validate(experiment.spec)
 
 
 def _enlarged(spec: ResolvedSpec, extension: ExtensionSpec) -> ResolvedSpec:

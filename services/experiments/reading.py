@@ -22,7 +22,7 @@ from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import attempts, results
 from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, repetitions_of
 from gaplab.services.store.session import Session, snapshot
-from gaplab.services.store.stored_specs import complete, without_truth
+from gaplab.services.store.stored_specs import without_truth
 
 
 @snapshot
@@ -68,7 +68,7 @@ def read_study_spec(session: Session, study_id: str, *, reveal: bool = False) ->
 
 def _shown_specs(session: Session, rows: Sequence[ExperimentRow], *, reveal: bool) -> list[dict[str, Any]]:
     secret = frozenset() if reveal else hidden(session, rows)
-    return [without_truth(spec) if row.id in secret else spec for row in rows for spec in [complete(row.spec)]]
+    return [without_truth(row.spec) if row.id in secret else row.spec for row in rows]
 
 
 @snapshot

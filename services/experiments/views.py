@@ -23,7 +23,7 @@ from gaplab.services.store.queries import attempts
 from gaplab.services.store.queries.experiments import experiments_of
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
 from gaplab.services.store.queries.results import best_recorded
-from gaplab.services.store.stored_specs import checked, complete, without_truth
+from gaplab.services.store.stored_specs import checked, without_truth
 from gaplab.services.store.texts import unpack_tags
 
 _MOVING = (State.RUNNING, State.PAUSING, State.STOPPING)
@@ -154,7 +154,7 @@ def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bo
         level=row.iterations == 1,  # a strategy with samples has at least one iteration after number 0
         state=row.state,
         caveat=caveat_of(row.state, work.tally),
-        spec=without_truth(complete(row.spec)) if secret else complete(row.spec),
+        spec=without_truth(row.spec) if secret else row.spec,
         priority=-row.precedence,
         max_parallel=row.max_parallel,
         progress=work.progress,

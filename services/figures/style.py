@@ -27,7 +27,7 @@ STRATEGIES = (
 )
 """The paper's strategies with a curve, in the order of the colours, so that each has its own."""
 
-LATER: dict[str, tuple[str, Dash, Marker]] = {
+OTHERS: dict[str, tuple[str, Dash, Marker]] = {
     "estimation_exploration": ("#D1477A", "long", "square"),
     "weighted": ("#8A8A2B", "dotted", "diamond"),
     "domain_randomization": ("#9C6B3F", "dashed", "triangle"),
@@ -70,8 +70,8 @@ def strategy_style(strategy: str) -> Style:
     """
     if strategy in STRATEGIES:
         return style_of(STRATEGIES.index(strategy))
-    if strategy in LATER:
-        return Style(*LATER[strategy])
+    if strategy in OTHERS:
+        return Style(*OTHERS[strategy])
     known, all_ = len(COLORS), len(COLORS) ** 2
     return style_of(known + crc32(strategy.encode()) % (all_ - known))
 

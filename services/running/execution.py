@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import ASKED, Ending, State
 from gaplab.schemas.provenance import Provenance
-from gaplab.services.core.stored_specs import spec_to_run
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.types import Step
 from gaplab.services.experiments.states import settle
 from gaplab.services.running import provenance
@@ -191,7 +191,7 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
         .where(row.id.in_(ids))
     ).all()
-    specs = {experiment: spec_to_run(spec) for _, _, experiment, _, spec, _ in rows}
+    specs = {experiment: ResolvedSpec.model_validate(spec) for _, _, experiment, _, spec, _ in rows}
     past, parts = logs(session, ids), checkpoints.stored(session, ids)
     claims = {
         id_: Claim(id_, epoch, experiment, number, specs[experiment], past[id_], parts[id_], owner=owner)

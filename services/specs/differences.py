@@ -77,7 +77,7 @@ def in_words(path: Path) -> str:
 
 
 def _settings(stored: Mapping[str, Any]) -> Iterator[tuple[Path, tuple[str, Any]]]:
-    """Yield the path, the pointer and the value of each setting; a field that an older spec lacks has its default."""
+    """Yield the path, the pointer and the value of each setting."""
     spec = spec_of(stored).model_dump(mode="json", exclude=NO_SETTINGS)
     spec["reality"]["parameters"] = stored["reality"]["parameters"]
     tunables = spec.pop("tunables")

@@ -24,9 +24,16 @@ def completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:
 
 def simulated_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine: type[Engine]) -> ResolvedReality:
     """Return a simulated reality with every field."""
-    truth = _truth(spec, robot, engine)
     return ResolvedReality(
-        engine=completed(engines, ref), parameters=truth, probes=spec.reality.probes or SIMULATED_PROBES
+        kind="simulated",
+        engine=completed(engines, ref),
+        parameters=_truth(spec, robot, engine),
+        bench=None,
+        repeats=1,
+        probes=spec.reality.probes or SIMULATED_PROBES,
+        samples=(),
+        limits=None,
+        beyond="warn",
     )
 
 

@@ -138,7 +138,7 @@ def _paths(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str |
 def _without_nulls(spec: Spec) -> Spec:
     """Return the spec without the fields of samples that are null."""
     reality = spec["reality"]
-    samples = [{name: item for name, item in each.items() if item is not None} for each in reality.get("samples", ())]
+    samples = [{name: item for name, item in each.items() if item is not None} for each in reality["samples"]]
     return {**spec, "reality": {**reality, "samples": samples}}
 
 

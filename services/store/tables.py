@@ -36,7 +36,6 @@ class Column:
 
     Attributes:
         nullable: null is permitted.
-        required: an insert must give a value, since there is no default.
         generated: the database itself numbers the rows.
         longest: most characters of a text; None if a longer one is cut when it is stored.
         large: a whole number of 64 bits, rather than 32.
@@ -46,7 +45,6 @@ class Column:
     name: str
     kind: Kind
     nullable: bool
-    required: bool
     generated: bool = False
     longest: int | None = None
     large: bool = False
@@ -65,7 +63,6 @@ def _column(column: TableColumn[Any]) -> Column:
         name=column.name,
         kind=_kind(column),
         nullable=bool(column.nullable),
-        required=not column.nullable and column.default is None and column.server_default is None,
         generated=column.table.autoincrement_column is column,
         longest=column.type.length or LONGEST_TEXT if isinstance(column.type, String) and not choices else None,
         large=isinstance(column.type, BigInteger),

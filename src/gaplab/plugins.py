@@ -40,7 +40,6 @@ from gaplab.services.core.shapes import Part as Part
 from gaplab.services.core.shapes import Sphere as Sphere
 from gaplab.services.core.space import Space as Space
 from gaplab.services.core.strategies.base import DiverseOptions as DiverseOptions
-from gaplab.services.core.strategies.base import EnsembleOptions as EnsembleOptions
 from gaplab.services.core.strategies.base import Search as Search
 from gaplab.services.core.strategies.base import Strategy as Strategy
 from gaplab.services.core.strategies.base import Untuned as Untuned

@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from alembic import command as alembic
 from fastapi.testclient import TestClient
 from sqlalchemy import select, update
 
-from gaplab import migrations
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError
@@ -290,20 +288,19 @@ def test_the_command_makes_lists_and_revokes_tokens_in_the_database_itself(
 
 
 def test_a_token_is_refused_where_it_would_migrate_a_database_that_a_service_may_use(
-    tmp_path: Path, gaplab: Gaplab
+    sqlite_url: str, gaplab: Gaplab
 ) -> None:
-    url = f"sqlite:///{tmp_path / 'old.db'}"
-    engine = open_engine(url, enforce_foreign_keys=False)
+    engine = open_engine(sqlite_url)
     with engine.execution_options(**{WRITES: True}).begin() as connection:
-        alembic.upgrade(migrations.configuration(connection), "0013")
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0000'")
 
-    code, secret, said = gaplab("token", "create", "--role", "admin", GAPLAB_DATABASE_URL=url)
+    code, secret, said = gaplab("token", "create", "--role", "admin", GAPLAB_DATABASE_URL=sqlite_url)
 
     with engine.connect() as connection:
         found = connection.exec_driver_sql("SELECT version_num FROM alembic_version").scalars().all()
     engine.dispose()
-    assert (code, secret, found) == (1, "", ["0013"])
-    assert "at revision 0013" in said
+    assert (code, secret, found) == (1, "", ["0000"])
+    assert "at revision 0000" in said
     assert "run `python -m migrations`" in said
 
 

@@ -105,19 +105,6 @@ def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store) 
     assert imported(sqlite_store, archive).study != study.id
 
 
-def test_an_archive_without_its_files_is_read_as_before(store: Store, other: Store) -> None:
-    experiment, _ = measured(store)
-    members = members_of(exported(export_experiment(store, experiment)))
-    manifest = json.loads(members["manifest.json"])
-    old = {name: content for name, content in members.items() if not name.startswith("attachment")}
-    manifest["members"] = {name: member for name, member in manifest["members"].items() if name in old}
-
-    imported(other, packed(old | {"manifest.json": json.dumps(manifest).encode()}))
-
-    assert [each.id for each in list_experiments(other).items] == [experiment]
-    assert stored(other) == set()
-
-
 @pytest.fixture
 def good(sqlite_store: Store) -> dict[str, bytes]:
     """The members of an archive with files; the database has it no more."""

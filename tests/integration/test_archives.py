@@ -24,7 +24,7 @@ from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_experiment, export_study, import_archive
 from gaplab.services.archives import reading as importing
-from gaplab.services.archives.columns import EXPORTED, ONLY_IF_USED
+from gaplab.services.archives.columns import EXPORTED
 from gaplab.services.archives.logs import check_logs
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
@@ -293,7 +293,7 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store: Store) -
     assert curve["points"][0]["n"] == 3
     assert row["spec"]["strategy"]["name"] == "simulated_fit"
     assert {"owner", "heartbeat_at"}.isdisjoint(row)
-    assert {name.partition(".")[0] for name in manifest["members"]} == {*EXPORTED, "curves", "spec"} - ONLY_IF_USED
+    assert {name.partition(".")[0] for name in manifest["members"]} == {*EXPORTED, "curves", "spec"}
 
 
 def test_attempts_go_with_it_and_none_goes_on(store: Store, other: Any) -> None:

@@ -209,6 +209,18 @@ MANIFESTS: list[tuple[dict[str, Any], str]] = [
 ]
 
 
+def test_a_member_that_the_manifest_lacks_too(sqlite_store: Store, good: Any) -> None:
+    manifest = json.loads(good["manifest.json"])
+    cases = []
+    for name in ("robot.parquet", "spec.json"):
+        members = {each: about for each, about in manifest["members"].items() if each != name}
+        left = {each: content for each, content in good.items() if each != name}
+        described = json.dumps(manifest | {"members": members}).encode()
+        cases.append((packed(left | {"manifest.json": described}), f"it has no {name}"))
+
+    all_refused(sqlite_store, cases)
+
+
 def test_a_manifest_that_is_none(sqlite_store: Store, good: Any) -> None:
     cases: list[tuple[bytes, str]] = [
         (json.dumps(json.loads(good["manifest.json"]) | change).encode(), said) for change, said in MANIFESTS
@@ -226,7 +238,7 @@ def in_spec(**changes: Any) -> Any:
 
 
 BOUNDED = {"name": "static_friction", "lower": 0.0, "upper": 1.0}
-PARTS = ("name", "iterations", "repetitions", "robot", "engine", "tunables", "optimizer", "budget", "seed")
+PARTS = ("name", "iterations", "repetitions", "robot", "engine", "tunables", "tuner", "optimizer", "budget", "seed")
 
 
 def without(part: Any) -> Any:

@@ -17,6 +17,7 @@ from gaplab.schemas.corrections import ConflictSpec, CorrectionSpec, VoidSpec
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, TakeSpec
 from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives import export_experiment
 from gaplab.services.archives.rerunning import verify
@@ -25,7 +26,6 @@ from gaplab.services.bench.branches import list_branches
 from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.core.errors import Conflict, InvalidSpec, KeyReused, NotFound
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.deletion import Deleter, delete_experiment
 from gaplab.services.experiments.limits import FREELY, Admission
@@ -467,7 +467,7 @@ def test_specs_that_make_no_sense_on_a_bench_are_refused() -> None:
 def test_a_resolved_physical_spec_resolves_to_itself() -> None:
     resolved = resolve_experiment(bench(reality={"repeats": 3}))
     again = resolve_experiment(ExperimentSpec.model_validate(resolved.model_dump(mode="json")))
-    assert again == resolved == spec_to_run(resolved.model_dump(mode="json"))
+    assert again == resolved == ResolvedSpec.model_validate(resolved.model_dump(mode="json"))
     assert replace(setting(resolved, 0)).reality is not None
 
 

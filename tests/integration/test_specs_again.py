@@ -253,20 +253,13 @@ def test_zeros_of_both_signs_differ_and_nan_is_nan() -> None:
     assert difference(Probed(1, float("nan"), 1.0), Probed(1, float("nan"), 1.0)) is None
 
 
-def test_readings_that_an_earlier_version_did_not_store_are_not_compared() -> None:
-    earlier, now = Probed(1, 0.5, 1.0), Probed(1, 0.5, 1.0, readings=frozen([16.0, -4.0]))
+def test_readings_and_repeats_are_compared_and_so_is_their_absence() -> None:
+    bare, sensed = Probed(1, 0.5, 1.0), Probed(1, 0.5, 1.0, readings=frozen([16.0, -4.0]))
     other = Probed(1, 0.5, 1.0, readings=frozen([16.0, -4.5]))
 
-    assert difference(earlier, now) is None
-    assert difference(now, other) == "readings[1] is -4.5 here, and -4.0 in the archive"
-    assert difference(now, earlier) == "readings[0] is absent here, and 16.0 in the archive"
-    assert difference(replace(earlier, repeats=frozen([0.5])), earlier) == (
+    assert difference(sensed, other) == "readings[1] is -4.5 here, and -4.0 in the archive"
+    assert difference(bare, sensed) == "readings[0] is 16.0 here, and absent in the archive"
+    assert difference(sensed, bare) == "readings[0] is absent here, and 16.0 in the archive"
+    assert difference(replace(bare, repeats=frozen([0.5])), bare) == (
         "repeats[0] is absent here, and 0.5 in the archive"
     )
-
-
-def test_an_archive_of_before_gives_its_spec_too() -> None:
-    with (FOLDER / "analytic.zip").open("rb") as source:
-        spec = submitted_spec(source)
-
-    assert len(stored(spec)) == len(spec["strategies"])

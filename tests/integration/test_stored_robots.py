@@ -9,6 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import export_experiment
 from gaplab.services.archives.rerunning import verify
@@ -18,7 +19,6 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.core.robot_files import RobotFile, read_robot_file
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.robots.robot_file import Imported
-from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments import stored_robots, submission
 from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.running import execution
@@ -179,7 +179,7 @@ def test_a_robot_from_a_file_has_the_numbers_of_the_plug_in_to_the_last_bit(stor
     stored_robots.add_robot(store, file_of().text)
     made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
     with store.reading() as session:
-        from_file = spec_to_run(session.get_one(ExperimentRow, made.id).spec)
+        from_file = ResolvedSpec.model_validate(session.get_one(ExperimentRow, made.id).spec)
     plug_in = resolve_experiment(ExperimentSpec.model_validate(SPEC | {"robot": Quadruped.name}))
 
     ours, theirs = (list(repetition(setting(spec, 0))) for spec in (from_file, plug_in))
@@ -191,7 +191,7 @@ def test_a_spec_whose_robot_is_gone_says_so(store: Store) -> None:
     made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC | {"robot": "lost"}))
     with store.transaction() as session:
         session.delete(session.get_one(RobotRow, made.spec["robot"]["options"]["sha256"]))
-        spec = spec_to_run(session.get_one(ExperimentRow, made.id).spec)
+        spec = ResolvedSpec.model_validate(session.get_one(ExperimentRow, made.id).spec)
     robot_library._known.clear()
 
     with pytest.raises(InvalidSpec, match="the robot 'lost' with the hash"):
@@ -210,7 +210,7 @@ def test_a_stored_robot_stays_usable_where_later_checks_would_refuse_it(
     assert {each["name"]: each["available"] for each in http.get("/catalogue").json()["robots"]}["walker"]
     assert http.get("/catalogue/robots/walker/picture").headers["content-type"] == "image/png"
     with store.reading() as session:
-        assert next(repetition(setting(spec_to_run(session.get_one(ExperimentRow, made.id).spec), 0)))
+        assert next(repetition(setting(ResolvedSpec.model_validate(session.get_one(ExperimentRow, made.id).spec), 0)))
     with pytest.raises(InvalidSpec, match="1 to 3 bodies"):
         stored_robots.add_robot(store, file_of("another").text)
 

@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives import export_study, import_archive
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.core.types import Measured, Probed, Selected, Transferred, Tuned
 from gaplab.services.experiments import reading
 from gaplab.services.results import curves
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_study
 from gaplab.services.store.session import Store
-from gaplab.services.store.stored_specs import complete
 from tests.numbers.kept_numbers import (
     FOLDER,
     ITERATION,
@@ -95,7 +94,7 @@ def cost(phase: Any, step: Any) -> Any:
 def test_the_pure_loop_computes_the_kept_numbers(name: Any) -> None:
     found = members(archive(name))
 
-    computed = computed_from(spec_to_run(each["spec"]) for each in found["experiment"])
+    computed = computed_from(ResolvedSpec.model_validate(each["spec"]) for each in found["experiment"])
 
     if computed != numbers(found) and (other := other_machine()):
         pytest.skip(f"the numbers differ, and so does the machine: {other}")
@@ -119,7 +118,7 @@ def test_explicit_old_options_give_the_kept_numbers(name: Any) -> None:
 
 def test_every_kept_spec_has_the_options_of_its_study() -> None:
     for name, study in STUDIES.items():
-        stored = [spec_to_run(each["spec"]) for each in members(archive(name))["experiment"]]
+        stored = [ResolvedSpec.model_validate(each["spec"]) for each in members(archive(name))["experiment"]]
         for old, new in zip(stored, resolve_study(study), strict=True):
             assert old.budget == new.budget
             assert old.strategy == new.strategy
@@ -157,7 +156,7 @@ def test_an_import_shows_and_exports_the_kept_numbers(kept: Any, store: Store) -
 def assert_shown(store: Store, found: Any) -> None:
     for experiment, curve in zip(found["experiment"], found["curves"], strict=True):
         id_ = experiment["id"]
-        assert reading.read_experiment(store, id_).spec == complete(experiment["spec"])
+        assert reading.read_experiment(store, id_).spec == experiment["spec"]
         assert pages(reading.list_samples, store, id_, SAMPLE) == kept_samples(found, id_)
         assert pages(reading.list_simulators, store, id_, SIMULATOR) == kept_simulators(found, experiment)
         shown = curves.curve(store, id_)

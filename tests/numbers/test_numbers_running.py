@@ -12,8 +12,8 @@ import pytest
 
 from gaplab import migrations
 from gaplab.schemas.lifecycle import State
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives import export_experiment
-from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Settings
@@ -35,7 +35,10 @@ def own_ray() -> Iterator[None]:
 
 def submit(store: Store, found: Any) -> Any:
     """Submit the kept specs; the ids of their experiments."""
-    return [submission.submit_experiment(store, spec_to_run(each["spec"])).id for each in found["experiment"]]
+    return [
+        submission.submit_experiment(store, ResolvedSpec.model_validate(each["spec"])).id
+        for each in found["experiment"]
+    ]
 
 
 def run(supervisor: Any, store: Store, ids: Any, until: Any = lambda: False) -> None:

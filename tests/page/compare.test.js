@@ -104,13 +104,11 @@ test("other settings are named, except those of the direct baseline", () => {
 });
 
 test("realities are the same whatever is measured of them, and a bench has its name", () => {
-  const reality = { engine: { name: "legs" }, parameters: { grip: 1 } };
-  const older = { spec: { reality } };
-  const newer = { spec: { reality: { ...reality, kind: "simulated", bench: null, repeats: 1, samples: [], probes: "last" } } };
-  assert.deepEqual(warnings(lettered(older, newer)), []);
-  assert.deepEqual(differentSettings(lettered(older, newer)), ["probes"]);
+  const legs = (probes) => ({ spec: { reality: { kind: "simulated", engine: { name: "legs" }, parameters: { grip: 1 }, bench: null, repeats: 1, probes } } });
+  assert.deepEqual(warnings(lettered(legs("each"), legs("last"))), []);
+  assert.deepEqual(differentSettings(lettered(legs("each"), legs("last"))), ["probes"]);
   const bench = (name, repeats) => ({ spec: { reality: { kind: "physical", engine: null, parameters: {}, bench: name, repeats, probes: "last" } } });
   assert.deepEqual(warnings(lettered(bench("leg", 1), bench("leg", 3))), []);
   assert.deepEqual(differentSettings(lettered(bench("leg", 1), bench("leg", 3))), ["repeats of a measurement"]);
-  assert.match(warnings(lettered(older, bench("leg", 1)))[0], /A: legs, grip 1; B: the robot on the bench “leg”\./);
+  assert.match(warnings(lettered(legs("each"), bench("leg", 1)))[0], /A: legs, grip 1; B: the robot on the bench “leg”\./);
 });

@@ -72,7 +72,7 @@ test("a physical reality goes through the form unchanged, and one that becomes s
   assert.deepEqual(specOf(draft).reality, { kind: "physical", repeats: "three" });
 });
 
-test("a resolved reality from before there were benches is simulated", () => {
+test("a resolved reality without a bench is simulated", () => {
   const resolved = { kind: "simulated", engine: { name: "slow", options: {} }, parameters: {}, bench: null, repeats: 1, samples: [], probes: "each", limits: null, beyond: "warn" };
   assert.deepEqual(specOf(draftOf({ reality: resolved }, CATALOGUE)).reality, { engine: "slow", probes: "each" });
 });

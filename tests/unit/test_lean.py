@@ -9,7 +9,6 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.cma_es import CmaEs, CmaEsOptions
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Diverse
 from gaplab.services.core.tuners import tuners
@@ -17,8 +16,7 @@ from gaplab.services.core.tuners.search import SearchOptions, SearchTuner
 from gaplab.services.specs.presets import PRESETS
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from gaplab.services.specs.rollouts import expected_rollouts
-from gaplab.services.specs.shortening import experiment_spec, study_spec
-from gaplab.services.store.stored_specs import complete
+from gaplab.services.specs.shortening import experiment_spec
 from tests.fakes import flat, small_setting
 
 DIVERSE = sorted(name for name, each in strategies.items() if issubclass(each, Diverse))
@@ -118,37 +116,6 @@ class TestPreset:
         weighed = fit + (19 + 9 * 9) * 1_350  # the first selection is in 20 simulators, nine are in 10
         assert lean == 40 * (2 * fit + 2 * weighed + 2 * (fit - 10 * 1_350)) + 100 * 1_350 == 21_456_360
         assert lean / paper < 0.1
-
-
-class TestStoredSpecs:
-    """Specs from before there were these parts mean what they meant."""
-
-    @staticmethod
-    def older(spec: ResolvedSpec) -> dict[str, Any]:
-        stored = spec.model_dump(mode="json")
-        del stored["controller_optimizer"]
-        del stored["strategy"]["options"]["weightiest"]
-        return stored | {"tuner": {"name": "search", "options": {}}}
-
-    @pytest.mark.parametrize("optimizer", ["steady_state", "cma_es"])
-    def test_they_resolve_as_before(self, optimizer: str) -> None:
-        spec = resolved(optimizer=optimizer)
-
-        assert spec_of(self.older(spec)) == spec
-        assert complete(self.older(spec))["controller_optimizer"] == spec.optimizer.model_dump(mode="json")
-
-    def test_they_give_the_same_spec_again(self) -> None:
-        specs = [resolved(), resolved(strategy="weighted")]
-
-        short = study_spec("old", [self.older(spec) for spec in specs]).spec
-
-        assert short is not None
-        assert resolve_study(StudySpec.model_validate(short)) == tuple(specs)
-
-    def test_an_option_that_its_tuner_refuses_leaves_it_as_it_is(self) -> None:
-        stored = resolved().model_dump(mode="json") | {"tuner": {"name": "gone", "options": {"deep": 3}}}
-
-        assert spec_of(stored).tuner == PluginRef(name="gone", options={"deep": 3})
 
 
 class TestAllParts:

@@ -159,8 +159,8 @@ def test_what_imports_a_broken_file_is_unavailable_as_well(put: Put) -> None:
 
 
 def test_a_plug_in_that_cannot_be_created_is_a_violation_of_its_spec(put: Put) -> None:
-    text = CAREFUL.replace("searches = False", "Options = EnsembleOptions")
-    text = text.replace("import Strategy", "import EnsembleOptions, Strategy")
+    text = CAREFUL.replace("searches = False", "Options = DiverseOptions")
+    text = text.replace("import Strategy", "import DiverseOptions, Strategy")
     refusal = "if options and options.simulators == 9: raise KeyError('oops')"
     put(careful=f"{text}\n    def __init__(self, options=None):\n        {refusal}\n")
 
@@ -275,7 +275,7 @@ print("careful" in [each.name for each in catalogue().strategies])
 print(sorted(found.plugins) == ["careful.py", "glide.py"])
 spec = {
     "engine": {"name": "glide"},
-    "reality": {},
+    "reality": {"engine": None},
     "robot": {"name": "toy_function"},
     "optimizer": {"name": "steady_state"},
     "tunables": [],

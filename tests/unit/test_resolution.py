@@ -1,19 +1,22 @@
 """From what a user wrote to what is run."""
 
+from copy import deepcopy
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, Schedule, StudySpec
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.stored_specs import spec_as_stored, spec_of, spec_to_run
 from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
 from gaplab.services.specs.presets import PRESETS
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from gaplab.services.specs.rollouts import expected_rollouts
-from gaplab.services.specs.shortening import experiment_spec
 
 EMBODIED = [name for name, engine in engines.items() if engine.runs(Quadruped().world)]
 
@@ -81,10 +84,9 @@ def test_an_option_given_beats_the_published_one() -> None:
     assert resolved.strategy.options == {"simulators": 5, "least_share": 0.03, "least_error": 0.1, "weightiest": None}
 
 
-@pytest.mark.parametrize("attribute", ["published", "before"])
 @pytest.mark.parametrize("name", sorted(strategies))
-def test_published_and_former_options_are_options(name: str, attribute: str) -> None:
-    strategies[name].Options.model_validate(getattr(strategies[name], attribute))
+def test_published_options_are_options(name: str) -> None:
+    strategies[name].Options.model_validate(strategies[name].published)
 
 
 @pytest.mark.parametrize(("tuner", "least"), [("search", 20), ("gauss_newton", 2), ("abc_smc", 2)])
@@ -100,29 +102,16 @@ def test_a_tuner_states_its_least_budget(tuner: str, least: int) -> None:
     assert (violation.pointer, violation.permitted) == ("/budget/simulator_evaluations", f"at least {least}")
 
 
-def test_a_stored_tuner_without_a_later_option_has_its_value_of_before() -> None:
-    stored = resolve_experiment(experiment(tuner="abc_smc")).model_dump(mode="json")
-    assert stored["tuner"]["options"] == {"rounds": 4, "kept": 0.2, "moves": "redraw"}
+def test_a_stored_spec_lacks_no_field() -> None:
+    stored = resolve_experiment(experiment()).model_dump(mode="json", exclude=set(Schedule.model_fields))
+    parts: list[list[str]] = [[], ["reality"], ["budget"]]
 
-    older = stored | {"tuner": {"name": "abc_smc", "options": {"rounds": 4, "kept": 0.2}}}
-
-    assert spec_to_run(older).tuner.options == {"rounds": 4, "kept": 0.2, "moves": "retry"}
-    assert spec_to_run(stored).tuner.options == stored["tuner"]["options"]
-
-
-def test_a_stored_spec_without_a_later_option_has_its_value_of_before() -> None:
-    stored = resolve_experiment(experiment(strategy="simulated_fit_and_unique")).model_dump(mode="json")
-    assert stored["strategy"]["options"] == {"distances": "scaled"}
-
-    older = stored | {"strategy": {"name": "simulated_fit_and_unique", "options": {}}}
-
-    for read in (spec_of, spec_to_run):
-        assert read(older).strategy.options == {"distances": "plain"}
-        assert read(stored).strategy.options == {"distances": "scaled"}
-    assert spec_as_stored(older).strategy.options == {}
-    again = experiment_spec(older).spec
-    assert again is not None
-    assert resolve_experiment(ExperimentSpec.model_validate(again)).strategy.options == {"distances": "plain"}
+    for path in parts:
+        for field in reduce(getitem, path, stored):
+            lacking = deepcopy(stored)
+            del reduce(getitem, path, lacking)[field]
+            with pytest.raises(ValidationError, match=field):
+                ResolvedSpec.model_validate(lacking)
 
 
 @pytest.mark.parametrize("preset", sorted(PRESETS))

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from gaplab.schemas.replays import Shape
 from gaplab.services.core.kinematics import about
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Sphere
@@ -183,9 +182,3 @@ def test_a_portrait_depends_on_the_robot_and_on_the_theme_alone() -> None:
     assert light[:4] == dark[:4] == b"\x89PNG"
     assert light == portrait(world, False, 160)
     assert len({light, dark, portrait(chain(1), False, 160)}) == 3
-
-
-def test_a_shape_of_an_older_service_has_no_faces() -> None:
-    stored = {"kind": "box", "size_m": [1, 1, 1], "role": "trunk", "body": 0}
-
-    assert Shape.model_validate(stored).faces == ()

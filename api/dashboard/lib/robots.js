@@ -22,11 +22,11 @@ export function unitsOf({ robots }) {
 export const isFunction = ({ robots }, { spec }) => robots.some(({ name, details }) => name === spec.robot.name && details.function === true);
 
 /**
- * Return whether reality is a robot on a bench; a spec from before there were any does not say.
+ * Return whether reality is a robot on a bench.
  *
  * @param {{ spec: Record<string, any> }} experiment
  */
-export const isPhysical = ({ spec }) => spec.reality?.kind === "physical";
+export const isPhysical = ({ spec }) => spec.reality.kind === "physical";
 
 /**
  * Return the engine of the simulators, and what reality is if it is something else.
@@ -34,8 +34,6 @@ export const isPhysical = ({ spec }) => spec.reality?.kind === "physical";
  * @param {Record<string, any>} spec resolved
  */
 export function worldsText({ engine, reality }) {
-  const name = engine?.name ?? "";
-  if (reality?.kind === "physical") return `${name}, reality on the bench “${reality.bench}”`;
-  const real = reality?.engine?.name;
-  return name && real && real !== name ? `${name}, reality in ${real}` : name;
+  if (reality.kind === "physical") return `${engine.name}, reality on the bench “${reality.bench}”`;
+  return reality.engine.name === engine.name ? engine.name : `${engine.name}, reality in ${reality.engine.name}`;
 }

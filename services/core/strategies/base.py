@@ -234,13 +234,3 @@ class Diverse(Strategy):
     def later_selection_simulators(self, tunables: int) -> int:  # noqa: ARG002 - the port's signature
         """Return the number of simulators that count once they differ in weight."""
         return self.options.counted
-
-
-class EnsembleOptions(Frozen):
-    """Options of strategies of your own that square `least_error` themselves; `DiverseOptions` has no units."""
-
-    simulators: EnsembleSize = Field(default=20, description="size of the diverse ensemble; the paper: 20")
-    least_error: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
-        default=0.03,
-        description="simulators with a smaller error have equal weight (a floor under Σe²), in the unit of fitness",
-    )

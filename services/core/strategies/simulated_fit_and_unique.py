@@ -32,7 +32,6 @@ class SimulatedFitAndUnique(Strategy):
     name = "simulated_fit_and_unique"
     source = "Paper, section 2, Simulated Fit and Unique; scaled distances are gaplab's"
     published: ClassVar[Mapping[str, Any]] = {"distances": "plain"}
-    before: ClassVar[Mapping[str, Any]] = {"distances": "plain"}
     Options = SimulatedFitAndUniqueOptions
     options: SimulatedFitAndUniqueOptions
 

@@ -1,8 +1,7 @@
 """A tuner that returns a posterior: simulators as probable as the samples make them."""
 
-from collections.abc import Mapping
 from contextlib import suppress
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.random import Generator
@@ -54,7 +53,6 @@ class AbcSmc(Tuner):
     name = "abc_smc"
     source = "Toni et al. 2009, Beaumont et al. 2009; numbers of rounds and particles are gaplab's"
     intervals = True
-    before: ClassVar[Mapping[str, Any]] = {"moves": "retry"}
     Options = AbcSmcOptions
     options: AbcSmcOptions
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from sqlalchemy import ColumnElement, and_, case, func, not_, or_, select
+from sqlalchemy import ColumnElement, and_, case, not_, or_, select
 
 from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.services.core.robot_library import IMPORTED
@@ -12,7 +12,6 @@ from gaplab.services.experiments.query.parsing import Every, Not, Some, Term, Tr
 from gaplab.services.store.cursor import Column
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.fitness import best_of_all, points_of_all
-from gaplab.services.store.stored_specs import LATER
 from gaplab.services.store.texts import storable
 
 Fields = Mapping[str, Field]
@@ -74,15 +73,9 @@ def _either(first: Field, second: Field) -> Field:
     return Field(first.meaning, first.operators, lambda *asked: or_(first.meets(*asked), second.meets(*asked)))
 
 
-def _named(kind: str) -> ColumnElement[str]:
-    """SQL: the name of the plug-in of a kind that specs did not have from the beginning."""
-    return func.coalesce(_E.spec[kind]["name"].as_string(), LATER[kind]["name"])
-
-
-def _of_controllers() -> ColumnElement[str]:
-    """SQL: the name of the optimizer of controllers; in specs from before there was one, that of the optimizer."""
-    later, earlier = (_E.spec[field]["name"].as_string() for field in ("controller_optimizer", "optimizer"))
-    return func.coalesce(later, earlier)
+def _name(field: str) -> ColumnElement[str]:
+    """SQL: the name of a plug-in of the spec; NULL for none."""
+    return _E.spec[field]["name"].as_string()
 
 
 def _of_robots() -> ColumnElement[str]:
@@ -99,14 +92,14 @@ EXPERIMENT_FIELDS: Fields = {
     "study": fields.text(_E.study_id, "id of its study; `none` without one"),
     "strategy": fields.text(_E.strategy, "name of the strategy"),
     "robot": fields.text(_of_robots(), "name of the robot"),
-    "controller": fields.text(_E.spec["controller"]["name"].as_string(), "controller; `none`: the robot's own"),
-    "task": fields.text(_E.spec["task"]["name"].as_string(), "task; `none`: the robot's own"),
-    "engine": fields.text(_E.spec["engine"]["name"].as_string(), "engine of the simulators"),
+    "controller": fields.text(_name("controller"), "controller; `none`: the robot's own"),
+    "task": fields.text(_name("task"), "task; `none`: the robot's own"),
+    "engine": fields.text(_name("engine"), "engine of the simulators"),
     "reality": fields.text(_E.spec["reality"]["engine"]["name"].as_string(), "engine that is its reality"),
-    "optimizer": fields.text(_E.spec["optimizer"]["name"].as_string(), "name of the optimizer"),
-    "controller_optimizer": fields.text(_of_controllers(), "name of the optimizer of controllers"),
-    "tuner": fields.text(_named("tuner"), "name of the tuner"),
-    "discrepancy": fields.text(_named("discrepancy"), "name of the discrepancy that tuning minimises"),
+    "optimizer": fields.text(_name("optimizer"), "name of the optimizer"),
+    "controller_optimizer": fields.text(_name("controller_optimizer"), "name of the optimizer of controllers"),
+    "tuner": fields.text(_name("tuner"), "name of the tuner"),
+    "discrepancy": fields.text(_name("discrepancy"), "name of the discrepancy that tuning minimises"),
     "state": fields.state(lambda state: _E.state == state, "state"),
     "fitness": fields.fitness(_E.id, *points_of_all(), "fitness after the last common number of evaluations"),
     "best_fitness": fields.fitness(_E.id, *best_of_all(), "best recorded fitness, averaged over repetitions"),

@@ -13,7 +13,7 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.clock import UtcDateTime
 from gaplab.services.store.texts import brief, storable
 
-REVISION = "0016"
+REVISION = "0001"
 """The revision with these tables; a database at any other revision is refused."""
 
 
@@ -41,7 +41,7 @@ class Number(TypeDecorator[float]):
 
 
 class Reason(TypeDecorator[str]):
-    """Why something failed, often in the words of a plug-in: stored and read without what exceeds a few lines."""
+    """Why something failed, often in the words of a plug-in: stored without what exceeds a few lines."""
 
     impl = Text
     cache_ok = True
@@ -49,10 +49,6 @@ class Reason(TypeDecorator[str]):
     def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:  # noqa: ARG002
         """Return the text as it is stored."""
         return None if value is None else brief(storable(value))
-
-    def process_result_value(self, value: str | None, dialect: Dialect) -> str | None:  # noqa: ARG002
-        """Return the text as it is read: an earlier version may have stored a longer one."""
-        return None if value is None else brief(value)
 
 
 class Base(DeclarativeBase):

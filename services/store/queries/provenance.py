@@ -13,10 +13,8 @@ from gaplab.services.store.statements import insert_new
 
 
 def id_of(provenance: Provenance) -> str:
-    """Return the id of a provenance; without external plug-ins it is the id that earlier versions computed."""
-    absent = {name for name in ("plugins", "outside") if not getattr(provenance, name)}
-    facts = provenance.model_dump(mode="json", exclude=absent)
-    return sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+    """Return the id of a provenance: a hash of its facts."""
+    return sha256(json.dumps(provenance.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()[:16]
 
 
 def insert_unless_there(session: Session, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -73,7 +73,7 @@ class MeasuredIterations:
 
 def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
     """Return the iterations whose sample has a fitness."""
-    row, share = MeasurementRow, experiment.spec.get("held_out", 0.0)
+    row, share = MeasurementRow, experiment.spec["held_out"]
     query = of_experiments(row, [experiment.id], RepetitionRow.number, row.iteration)
     tuned_on, held_out = dict[int, list[int]](), dict[int, list[int]]()
     for repetition, iteration in session.execute(
@@ -81,7 +81,7 @@ def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
     ):
         (held_out if is_held_out(iteration, share) else tuned_on).setdefault(repetition, []).append(iteration)
     tunes = experiment.iterations > 1  # a strategy without samples has iteration 0 only, and tunes nothing
-    known = len(experiment.spec["reality"].get("samples", ())) if tunes else 0
+    known = len(experiment.spec["reality"]["samples"]) if tunes else 0
     return MeasuredIterations(tuned_on, held_out, known)
 
 

@@ -11,7 +11,7 @@ const SENT_KEPT = 10;  // the latest answers can be undone
  * @property {string} key idempotency key
  * @property {string} request id
  * @property {string} words which measurement it is
- * @property {number} [repeats] that the request asks for; answers of an earlier version of the page lack it
+ * @property {number} repeats that the request asks for
  * @property {Record<string, any>} body
  * @property {number} made when it was given, in milliseconds
  * @property {"waiting" | "sent" | "refused"} state

@@ -74,8 +74,7 @@ function row(entry, view) {
         forget();
         view.refresh();
       };
-      const repeats = entry.repeats ?? stored.values?.length ?? 1;
-      const undo = stored.state === "counted" ? undoButtons({ answer: stored, repeats, unit, words }, view.signal, done) : null;
+      const undo = stored.state === "counted" ? undoButtons({ answer: stored, repeats: entry.repeats, unit, words }, view.signal, done) : null;
       return [h("span", {}, `✓ ${STORED[stored.state]}`), undo];
     },
   };

@@ -7,8 +7,8 @@ import { letter } from "./ranges.js";
 /** @type {Record<string, string>} */
 const SETTINGS = { engine: "engine", tunables: "tunables", budget: "budget", optimizer: "optimizer", controller_optimizer: "optimizer of controllers", discrepancy: "discrepancy", tuner: "tuner", iterations: "number of iterations" };
 
-/** How reality is measured, which does not make it another one; with the defaults, which an older spec leaves out. @type {[key: string, words: string, otherwise: unknown][]} */
-const MEASURING = [["probes", "probes", "each"], ["repeats", "repeats of a measurement", 1], ["samples", "samples from before", []]];
+/** How reality is measured, which does not make it another one. @type {[key: string, words: string][]} */
+const MEASURING = [["probes", "probes"], ["repeats", "repeats of a measurement"], ["samples", "samples from before"]];
 
 /** @typedef {{ id: string, study: string | null, direct: boolean, level: boolean, spec: Record<string, any> }} Experiment */
 /** @typedef {[letter: string, experiment: Experiment]} Lettered */
@@ -69,7 +69,7 @@ export function warnings(experiments) {
 export function differentSettings(experiments) {
   const counts = (/** @type {string} */ setting, /** @type {Experiment} */ { direct, level }) => !direct && !(level && setting === "iterations");
   const differ = (/** @type {string} */ setting) => groups(experiments.filter(([, experiment]) => counts(setting, experiment)), ({ spec }) => canonicalText(spec[setting])).length > 1;
-  const measuring = MEASURING.filter(([key, , otherwise]) => groups(experiments, ({ spec }) => canonicalText(spec.reality?.[key] ?? otherwise)).length > 1);
+  const measuring = MEASURING.filter(([key]) => groups(experiments, ({ spec }) => canonicalText(spec.reality[key])).length > 1);
   return [...Object.keys(SETTINGS).filter(differ).map((setting) => SETTINGS[setting]), ...measuring.map(([, words]) => words)];
 }
 
@@ -105,7 +105,7 @@ function realityKeys(experiments) {
 }
 
 /** @param {Record<string, any>} reality */
-const realityKey = ({ kind = "simulated", engine, parameters, bench = null }) => canonicalText({ kind, engine, parameters, bench });
+const realityKey = ({ kind, engine, parameters, bench }) => canonicalText({ kind, engine, parameters, bench });
 
 /** @param {Experiment} experiment */
 const isHidden = ({ spec }) => !spec.reality.parameters || Object.values(spec.reality.parameters).includes(null);

@@ -67,9 +67,9 @@ export function head(page) {
  */
 function summary({ strategy, direct, level, spec }) {
   const engines = worldsText(spec);
-  const tunables = (/** @type {{ name: string }[]} */ (spec.tunables ?? [])).map(({ name }) => name.replaceAll("_", " ")).join(", ");
+  const tunables = (/** @type {{ name: string }[]} */ (spec.tunables)).map(({ name }) => name.replaceAll("_", " ")).join(", ");
   const tunes = tunables && !direct ? `${level ? "varies" : "tunes"} ${tunables}` : null;
-  return [readableName(strategy), spec.robot?.name.replaceAll("_", " "), engines, tunes].filter(Boolean).join(" · ");
+  return [readableName(strategy), spec.robot.name.replaceAll("_", " "), engines, tunes].filter(Boolean).join(" · ");
 }
 
 /** @param {Page.ExperimentPage} page */
