@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-SHARED = ("ray", "browser", "mujoco")
-"""What starts slowly: a mark, a fixture, and an engine that compiles its law. Their groups come first."""
+SHARED = ("shared_ray", "browser", "mujoco")
+"""What starts slowly: two fixtures, and an engine that compiles its law. Their groups come first."""
 
 STORES = ("store_url", "database_url")
 """Fixtures that have a parameter for each database."""
@@ -36,8 +36,8 @@ def pytest_configure(config: pytest.Config) -> None:
     for mark in (
         "release: only in `make test-all`",
         "dialects: SQLite and Postgres may differ here, so `make test` has both",
-        "ray: starts or uses Ray in its process",
         "apart: the tests of this file may run in several processes",
+        "xdist_group: tests of one process",  # of xdist, which may be off
     ):
         config.addinivalue_line("markers", mark)
 
@@ -65,8 +65,8 @@ def _is_for_a_release(item: pytest.Item) -> bool:
 
 
 def _shared(item: pytest.Item) -> str | None:
-    used = {*getattr(item, "fixturenames", ()), *(mark.name for mark in item.iter_markers())}
-    return next((name for name in SHARED if name in used), "mujoco" if "mujoco" in item.nodeid else None)
+    used = getattr(item, "fixturenames", ())
+    return next((name for name in SHARED if name in used or name in item.nodeid), None)
 
 
 def _group(item: pytest.Item) -> str | None:

@@ -28,7 +28,7 @@ from gaplab.workers.supervisor import Supervisor
 from tests.arithmetic import told
 from tests.integration.test_workers import expected, run, stored, toy
 
-pytestmark = [pytest.mark.release, pytest.mark.ray]
+pytestmark = pytest.mark.release
 
 ROOT = Path(__file__).parents[2]
 NODE = {"num_cpus": 1, "object_store_memory": 100 * 2**20}

@@ -4,7 +4,6 @@ import lzma
 import os
 import signal
 import sqlite3
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,21 +15,15 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives import export_experiment
 from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.running import execution
-from gaplab.services.settings import Settings
 from gaplab.services.store.models import CheckpointRow
 from gaplab.services.store.session import Store
-from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
 from tests.numbers.keep import CHECKPOINTS
 from tests.numbers.kept_numbers import HALF_WAY, archive, members, numbers, other_machine
 from tests.processes import processes_of_ray
 from tests.waiting import wait_until
 
-
-@pytest.fixture(scope="module", autouse=True)
-def own_ray() -> Iterator[None]:
-    with cluster(Settings(workers=2)):
-        yield
+pytestmark = pytest.mark.usefixtures("ray")
 
 
 def submit(store: Store, found: Any) -> Any:
