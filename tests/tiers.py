@@ -4,18 +4,24 @@
 `release`, and Postgres for every test of a store. In `make test`, a test of a store runs on SQLite; one marked
 `dialects`, because the databases may differ there, runs on both.
 
-Tests that share something that is slow to start run in one process. Other tests stay together by file, except those of
-a file marked `apart`.
+Tests that share what starts slowly run in one process, and come first: Ray, a browser, the law that MuJoCo compiles.
+The others stay together by file.
 """
 
+import re
 import resource
 from collections import defaultdict
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
-SHARED = ("shared_ray", "browser", "mujoco")
-"""What starts slowly: two fixtures, and an engine that compiles its law. Their groups come first."""
+ROOT = Path(__file__).parents[1]
+
+SHARED = {"ray": r"\bshared_ray\b|usefixtures\(\"ray\"\)", "browser": r"\bvisit\b"}
+"""What the tests of a file share, and how its text says so. They come first, then the tests with MuJoCo."""
 
 STORES = ("store_url", "database_url")
 """Fixtures that have a parameter for each database."""
@@ -36,24 +42,19 @@ def pytest_configure(config: pytest.Config) -> None:
     for mark in (
         "release: only in `make test-all`",
         "dialects: SQLite and Postgres may differ here, so `make test` has both",
-        "apart: the tests of this file may run in several processes",
-        "xdist_group: tests of one process",  # of xdist, which may be off
     ):
         config.addinivalue_line("markers", mark)
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what is for a release, and group the rest by what it shares; shared groups come first."""
+    """Leave out what is for a release, and put first what shares a process."""
     if not config.getoption("all"):
         left = [item for item in items if _is_for_a_release(item)]
         if left:
             config.hook.pytest_deselected(items=left)
             items[:] = [item for item in items if not _is_for_a_release(item)]
-    for item in items:
-        if name := _group(item):
-            item.add_marker(pytest.mark.xdist_group(name))
-    items.sort(key=lambda item: SHARED.index(name) if (name := _shared(item)) else len(SHARED))
+    order = [*SHARED, "mujoco"]
+    items.sort(key=lambda item: order.index(name) if (name := group(item.nodeid)) in order else len(order))
 
 
 def _is_for_a_release(item: pytest.Item) -> bool:
@@ -64,15 +65,29 @@ def _is_for_a_release(item: pytest.Item) -> bool:
     return on_postgres and not item.get_closest_marker("dialects")
 
 
-def _shared(item: pytest.Item) -> str | None:
-    used = getattr(item, "fixturenames", ())
-    return next((name for name in SHARED if name in used or name in item.nodeid), None)
+@cache
+def _shared(file: str) -> str | None:
+    text = (ROOT / file).read_text()
+    return next((name for name, said in SHARED.items() if re.search(said, text)), None)
 
 
-def _group(item: pytest.Item) -> str | None:
-    if name := _shared(item):
-        return name
-    return None if item.get_closest_marker("apart") else item.nodeid.partition("::")[0]
+def group(nodeid: str) -> str:
+    """Return what the tests of one process have in common: something shared, or their file."""
+    file = nodeid.partition("::")[0]
+    return _shared(file) or ("mujoco" if "mujoco" in nodeid else file)
+
+
+class _Together(LoadScopeScheduling):
+    """Gives each group of tests to one process."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return group(nodeid)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
+    """Distribute the tests by what they share."""
+    return _Together(config, log)
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
