@@ -43,8 +43,9 @@ FEW = {"a1", "franka_panda", "ant"}
 
 def for_each(names: Iterable[str]) -> Any:
     """Parametrize a test by the names of robots."""
-    marks = {True: (), False: pytest.mark.release}
-    return pytest.mark.parametrize("name", [pytest.param(each, marks=marks[each in FEW]) for each in names])
+    return pytest.mark.parametrize(
+        "name", [each if each in FEW else pytest.param(each, marks=pytest.mark.release) for each in names]
+    )
 
 
 def imported(name: str) -> ImportedFile:

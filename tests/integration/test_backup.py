@@ -2,14 +2,12 @@
 
 import sqlite3
 import subprocess
-import sys
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
 import pytest
 
-from gaplab.api.commands.cli import main
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import StoreUnavailable, Unsupported
 from gaplab.services.core.loop import repetition
@@ -20,6 +18,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.store import backup as backing_up
 from gaplab.services.store.backup import backup
 from gaplab.services.store.session import Store
+from tests.commands import Gaplab
 from tests.experiments import toy
 
 
@@ -165,24 +164,15 @@ def test_the_line_that_copies_a_postgres_has_a_url_that_its_tool_knows(
 
 @pytest.mark.parametrize(("existing", "code"), [(False, 0), (True, 7)])
 def test_the_command_copies_the_database_of_the_environment(
-    sqlite_url: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    existing: Any,
-    code: Any,
+    sqlite_url: str, tmp_path: Path, gaplab: Gaplab, existing: Any, code: Any
 ) -> None:
     file = tmp_path / "copy.db"
     if existing:
         file.touch()
-    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
-    monkeypatch.setattr(sys, "argv", ["gaplab", "backup", str(file)])
 
-    with pytest.raises(SystemExit) as end:
-        main()
+    said = gaplab("backup", str(file), GAPLAB_DATABASE_URL=sqlite_url)
 
-    assert end.value.code == code
-    said = capsys.readouterr()
+    assert said.code == code
     assert str(file) in (said.out if code == 0 else said.err)
 
 

@@ -230,6 +230,7 @@ def test_a_robot_of_large_models_keeps_few_of_them(engine: MuJoCo, monkeypatch: 
     assert [each.world for each in models[worlds]] == worlds
 
 
+@pytest.mark.release
 def test_warnings_are_neither_printed_nor_written_to_a_file(tmp_path: Path) -> None:
     script = (
         "from dataclasses import replace; from gaplab.services.core.robots.quadruped import Quadruped;"

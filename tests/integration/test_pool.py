@@ -54,7 +54,7 @@ def spreads(monkeypatch: pytest.MonkeyPatch) -> Any:
     return spread
 
 
-@pytest.mark.parametrize(("genomes", "simulators"), [(1, 1), (3, 5)])
+@pytest.mark.parametrize(("genomes", "simulators"), [pytest.param(1, 1, marks=pytest.mark.release), (3, 5)])
 def test_what_is_spread_over_cores_is_what_one_core_computes(
     alone: Any, pool: Any, genomes: Any, simulators: Any
 ) -> None:
@@ -63,6 +63,7 @@ def test_what_is_spread_over_cores_is_what_one_core_computes(
     np.testing.assert_array_equal(pool(*question), alone.simulate(*question))
 
 
+@pytest.mark.release
 def test_rollouts_are_spread_if_there_are_several(alone: Any, pool: Any, spreads: Any) -> None:
     pool(*asked(alone, 1, 1))
     assert not spreads
@@ -81,6 +82,7 @@ def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone: An
     until(pool, alone, 3)  # this process, and two idle cores
 
 
+@pytest.mark.release
 def test_a_long_call_gets_help_that_came_after_it_began(alone: Any, spreads: Any) -> None:
     question = asked(alone, 10, 20)
 
@@ -94,7 +96,7 @@ def test_a_long_call_gets_help_that_came_after_it_began(alone: Any, spreads: Any
     assert spreads
 
 
-@pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize("signum", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.release)])
 def test_a_helper_that_dies_or_dawdles_costs_time_and_no_result(
     alone: Any, pool: Any, spreads: Any, signum: Any
 ) -> None:
@@ -110,6 +112,7 @@ def test_a_helper_that_dies_or_dawdles_costs_time_and_no_result(
     assert pool.batch_size() == 1  # it is not asked again
 
 
+@pytest.mark.release
 def test_one_of_several_helpers_that_dies_is_asked_no_more(alone: Any, pool: Any) -> None:
     question = asked(alone, 1, 2)
     until(pool, alone, 3)

@@ -338,18 +338,18 @@ def test_replays_and_predictions_follow_an_edit_of_a_plug_in(
     monkeypatch.setenv(VARIABLE, str(home))
     experiment, log, _ = walked(sqlite_store, robot="walker")
 
-    def computed() -> tuple[float, float]:
+    def computed(api: TestClient) -> tuple[float, float]:
         replay = api.get(f"/experiments/{experiment}/replay?iteration=1").json()
         prediction = predicted(api, experiment)["items"][0]
         return replay["simulation"]["fitness"], prediction["simulated_after"]
 
     with running(sqlite_store) as app:
         api = TestClient(app)
-        before = computed()
+        before = computed(api)
         (home / "walker.py").write_text(WALKER.replace("1 *", "2 *"))
 
         assert before == (log[6].fitness,) * 2
-        wait_until(lambda: computed() == (2 * log[6].fitness,) * 2)
+        wait_until(lambda: computed(api) == (2 * log[6].fitness,) * 2)
 
 
 def test_without_an_iteration_the_last_measured_controller_is_replayed(sqlite_store: Store, api: Any) -> None:

@@ -5,7 +5,6 @@ import shutil
 import sqlite3
 import stat
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -16,7 +15,6 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from gaplab.api.commands.cli import main
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.experiments import listing, submission
 from gaplab.services.store.backup import PG_DUMP, backup
@@ -24,6 +22,7 @@ from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.restore import restore
 from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import in_use
+from tests.commands import Gaplab
 from tests.conftest import Postgres
 from tests.experiments import toy
 from tests.postgres import VERSION
@@ -321,23 +320,16 @@ def test_a_backup_without_a_revision_is_not_called_later(url: str, copied: Path)
         restore(url, copied)
 
 
-def test_the_command_says_what_it_did(
-    url: str, copied: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("GAPLAB_DATABASE_URL", url)
+def test_the_command_says_what_it_did(url: str, copied: Path, gaplab: Gaplab) -> None:
+    told, listed, refused = (
+        gaplab("restore", *arguments, GAPLAB_DATABASE_URL=url)
+        for arguments in ([str(copied)], [str(copied), "--json"], ["gone.db"])
+    )
 
-    codes = []
-    for arguments in (["restore", str(copied)], ["restore", str(copied), "--json"], ["restore", "gone.db"]):
-        monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
-        with pytest.raises(SystemExit) as end:
-            main()
-        codes.append(end.value.code)
-
-    said = capsys.readouterr()
-    assert codes == [0, 0, 7]
-    assert "gaplab.db.replaced-" in said.out
-    assert '"revision"' in said.out
-    assert "gone.db" in said.err
+    assert [each.code for each in (told, listed, refused)] == [0, 0, 7]
+    assert "gaplab.db.replaced-" in told.out
+    assert '"revision"' in listed.out
+    assert "gone.db" in refused.err
 
 
 def test_a_damaged_copy_is_named_damaged(url: str, copied: Path) -> None:

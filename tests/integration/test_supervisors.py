@@ -94,6 +94,7 @@ def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numb
     assert Ending.PAUSED in {each.ending for each in attempts(store, experiment, 3)}
 
 
+@pytest.mark.release
 def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, spec(3)).id
     supervisor = Supervisor(sqlite_store, lambda: 3)
@@ -110,6 +111,7 @@ def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sq
     wait_until(lambda: not (supervisor.busy or processes_of_ray("run")), meanwhile=supervisor.step)
 
 
+@pytest.mark.release
 def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite_store: Store) -> None:
     large = submission.submit_experiment(sqlite_store, spec(8)).id
     supervisor = Supervisor(sqlite_store, lambda: 4)
@@ -124,7 +126,6 @@ def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite
     assert not all(begun)
 
 
-@pytest.mark.dialects
 def test_two_supervisors_on_one_database_do_nothing_twice(store: Store) -> None:
     ids = [submission.submit_experiment(store, spec(2)).id for _ in range(2)]
     stop = Event()

@@ -127,6 +127,7 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
     assert read.reasons == ("ZeroDivisionError: the second one is broken",)
 
 
+@pytest.mark.release
 def test_a_worker_that_hangs_is_ended_with_the_reason_even_if_it_holds_the_interpreter(sqlite_store: Store) -> None:
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
     def hanging(claim: Any) -> Iterator[Any]:
@@ -267,6 +268,7 @@ def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
     assert parts_stored(sqlite_store) == 0
 
 
+@pytest.mark.release
 def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_steps()).id
     first, stop = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05), Event()
@@ -298,6 +300,7 @@ def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_on
     assert stored(store, experiment.id) == expected(toy())
 
 
+@pytest.mark.release
 def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     @ray.remote(num_cpus=0, max_retries=0)
     def raising(spec: Any, expected: Any) -> None:

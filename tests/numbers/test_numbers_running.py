@@ -55,6 +55,7 @@ def assert_kept(computed: Any, kept: Any) -> None:
     assert computed == kept
 
 
+@pytest.mark.release
 def test_any_number_of_workers_computes_the_kept_numbers(store: Store, store_url: str) -> None:
     at_once = 2 if store_url.startswith("sqlite") else 1
     studies = [members(archive(name)) for name in ("analytic", "cma_es", "options")]
@@ -67,6 +68,7 @@ def test_any_number_of_workers_computes_the_kept_numbers(store: Store, store_url
         assert_kept(stored(store, own), numbers(found))
 
 
+@pytest.mark.release
 def test_a_robot_among_idle_workers_has_the_kept_numbers(sqlite_store: Store) -> None:
     found = members(archive("elsewhere"))
     ids = submit(sqlite_store, found)
@@ -96,6 +98,7 @@ def in_the_middle(store: Store) -> Any:
         return session.query(CheckpointRow).count()
 
 
+@pytest.mark.release
 def test_a_database_of_a_killed_supervisor_ends_with_the_kept_numbers(tmp_path: Path) -> None:
     file = tmp_path / "half-way.db"
     file.write_bytes(lzma.decompress(HALF_WAY.read_bytes()))
