@@ -97,6 +97,7 @@ def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(
     expect(simulators).to_contain_text("Reality is shown once")
 
 
+@pytest.mark.release
 def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)

@@ -388,6 +388,7 @@ def test_others_write_while_an_archive_is_checked(store: Store, other: Any, monk
     assert {each.name for each in listing.list_experiments(other).items} == {"meanwhile", "simulated_fit"}
 
 
+@pytest.mark.release
 def test_memory_does_not_grow_with_what_is_exported(sqlite_store: Store) -> None:
     """Rows are never all there at once."""
     submitted = finished(sqlite_store, repetitions=1)

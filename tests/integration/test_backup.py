@@ -31,6 +31,7 @@ def work(store: Store) -> None:
             assert execution.complete(store, claim)
 
 
+@pytest.mark.release
 def test_copies_made_while_a_supervisor_writes_go_on_to_the_same_end(sqlite_url: str, tmp_path: Path) -> None:
     store = Store(sqlite_url)
     submitted = submission.submit_experiment(store, toy(repetitions=2)).id

@@ -90,6 +90,7 @@ def ask(gaplab: Gaplab, said: dict[str, Any]) -> Iterator[Callable[..., Any]]:
     external_plugins.set_folders(before)
 
 
+@pytest.mark.release
 def test_every_command_prints_one_document_and_nothing_else(
     ask: Callable[..., Any],
     said: dict[str, Any],

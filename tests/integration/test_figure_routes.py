@@ -84,6 +84,7 @@ def test_every_kind_is_served_in_every_format(api: TestClient, experiment: str, 
     assert found["caption"].split(".")[0] in answers["html"].text
 
 
+@pytest.mark.release
 def test_while_many_files_are_drawn_others_are_served(
     url: str, experiment: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -154,6 +155,7 @@ def test_reality_is_in_the_figure_of_simulators_once_all_of_the_study_have_ended
     assert "once its experiments have ended" in running.json()["caption"]
 
 
+@pytest.mark.release
 def test_predictions_are_drawn_as_they_are_computed(sqlite_store: Store, api: TestClient) -> None:
     spec = STUDY | {"strategy": "simulated_fit", "repetitions": 1}
     spec = {name: value for name, value in spec.items() if name != "strategies"}

@@ -115,6 +115,7 @@ def text_of(answer: Response) -> str:
     )
 
 
+@pytest.mark.release
 def test_nothing_that_a_reader_can_see_tells_reality_while_the_experiment_runs(
     store: Store, running: dict[str, str], log: pytest.LogCaptureFixture
 ) -> None:

@@ -114,6 +114,7 @@ def test_figures_of_tuned_simulators_say_why_they_are_empty(sqlite_store: Store,
             assert (found["empty"], found["alt"]) == (True, f"Nothing: {why} tunes no simulators.")
 
 
+@pytest.mark.release
 def test_a_level_is_exported_and_imported_and_its_study_submitted_again(sqlite_store: Store, study: Any) -> None:
     stored = [each.spec for each in study.experiments]
     again = study_spec(study.name, stored)

@@ -78,6 +78,7 @@ def until(pool: Any, alone: Any, batch: Any) -> None:
     wait_until(lambda: pool.batch_size() == batch)
 
 
+@pytest.mark.release
 def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone: Any, pool: Any) -> None:
     until(pool, alone, 3)  # this process, and two idle cores
 

@@ -89,6 +89,7 @@ def test_heights_and_speeds_are_those_of_the_observed_body_that_slides(sqlite_st
     assert any("Mean height of head" in row[0] for row in figure["table"]["rows"])
 
 
+@pytest.mark.release
 def test_its_video_shows_each_colour(sqlite_store: Store, api: TestClient) -> None:
     experiment = strode(sqlite_store)
 

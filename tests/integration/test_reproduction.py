@@ -19,6 +19,8 @@ from gaplab.services.store.session import Store
 from tests.commands import module
 from tests.made_studies import STEP_S, Made, Study, archive, values
 
+pytestmark = pytest.mark.release
+
 ROOT = Path(__file__).parents[2]
 STORED = ROOT / "docs" / "studies"
 CLAIMS = ["C1", "C2a", "C2b", "C3", "C4a", "C4b", "C4c", "C5a", "C5b", "C5c", "C6", "C7", "C8a", "C8b", "C8c"]

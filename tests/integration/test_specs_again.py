@@ -158,6 +158,7 @@ def test_hidden_parameters_are_in_no_spec_until_the_experiment_has_ended(sqlite_
         submitted_spec(archive)
 
 
+@pytest.mark.release
 def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
     gaplab: Gaplab, sqlite_store: Store, tmp_path: Path
 ) -> None:
@@ -234,6 +235,7 @@ def test_an_error_of_one_repetition_is_its_reason_and_ends_no_other(
     assert str(found.reason).startswith(f"{error}: ")
 
 
+@pytest.mark.release
 def test_a_process_that_dies_is_the_reason_of_its_repetition_and_ends_no_other(
     put: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

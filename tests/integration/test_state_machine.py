@@ -343,11 +343,11 @@ def drive(store: Store, examples: Any, steps: Any) -> None:
     run_state_machine_as_test(machine, settings=chosen)
 
 
-@pytest.mark.parametrize("examples", [10, pytest.param(40, marks=pytest.mark.release)])
+@pytest.mark.parametrize("examples", [5, pytest.param(40, marks=pytest.mark.release)])
 def test_any_order_of_events_on_sqlite(sqlite_store: Store, examples: int) -> None:
     drive(sqlite_store, examples, steps=40)
 
 
-@pytest.mark.parametrize("examples", [2, pytest.param(8, marks=pytest.mark.release)])
+@pytest.mark.parametrize("examples", [1, pytest.param(8, marks=pytest.mark.release)])
 def test_any_order_of_events_on_postgres(postgres_store: Store, examples: int) -> None:
     drive(postgres_store, examples, steps=30)

@@ -204,7 +204,7 @@ def times_out_at_first(claims: Any, answer: Any) -> Any:
     return answer
 
 
-@pytest.mark.parametrize("when", ["before", "after"])
+@pytest.mark.parametrize("when", [pytest.param("before", marks=pytest.mark.release), "after"])
 @pytest.mark.parametrize(("module", "name"), asked_by_the_supervisor())
 def test_a_fault_of_the_store_loses_nothing_and_does_nothing_twice(
     store: Store, undisturbed: Any, monkeypatch: pytest.MonkeyPatch, module: Any, name: Any, when: Any

@@ -175,6 +175,7 @@ def test_a_robot_from_a_file_takes_no_options(store: Store) -> None:
         )
 
 
+@pytest.mark.release
 def test_a_robot_from_a_file_has_the_numbers_of_the_plug_in_to_the_last_bit(store: Store) -> None:
     stored_robots.add_robot(store, file_of().text)
     made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
@@ -198,6 +199,7 @@ def test_a_spec_whose_robot_is_gone_says_so(store: Store) -> None:
         setting(spec, 0)
 
 
+@pytest.mark.release
 def test_a_stored_robot_stays_usable_where_later_checks_would_refuse_it(
     store: Store, http: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -251,6 +253,7 @@ def test_an_archive_has_its_robots_and_brings_them(store: Store, other: Store) -
     assert read_robot_file(stored_robots.robot_text(other, "walker")).sha256 == file.sha256
 
 
+@pytest.mark.release
 def test_an_archive_of_a_robot_from_a_file_is_verified_in_processes_that_do_not_know_it(store: Store) -> None:
     stored_robots.add_robot(store, file_of().text)
     made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))

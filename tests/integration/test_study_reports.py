@@ -216,6 +216,7 @@ def test_a_name_cannot_become_markup(sqlite_store: Store, api: TestClient) -> No
     assert EVIL in Page(text).words
 
 
+@pytest.mark.release
 def test_the_same_report_is_the_same_pdf(published: Store, study: str) -> None:
     report, at = study_report(published, study), datetime(2026, 1, 1, tzinfo=UTC)
 
@@ -226,6 +227,7 @@ def test_the_same_report_is_the_same_pdf(published: Store, study: str) -> None:
     assert len(re.findall(rb"/Type /Page\b", first)) > 3
 
 
+@pytest.mark.release
 def test_the_pdf_is_served(sqlite_store: Store, api: TestClient) -> None:
     made = submission.submit_experiment(sqlite_store, toy()).id
 

@@ -90,6 +90,7 @@ def readyz(app: FastAPI) -> Any:
     return TestClient(app).get("/readyz")
 
 
+@pytest.mark.release
 def test_a_supervisor_that_stands_still_is_killed_and_its_work_goes_to_another(
     keep: Callable[..., SupervisorProcess], notes: Path, app: FastAPI, sqlite_store: Store
 ) -> None:
@@ -121,6 +122,7 @@ def test_one_that_dies_again_and_again_is_told_with_its_reason(
     wait_until(lambda: readyz(app).status_code == 503)
 
 
+@pytest.mark.release
 def test_after_a_long_life_the_trouble_is_forgotten(
     keep: Callable[..., SupervisorProcess], notes: Path, app: FastAPI
 ) -> None:

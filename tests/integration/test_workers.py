@@ -250,6 +250,7 @@ def parts_stored(store: Store) -> Any:
         return session.query(CheckpointRow).count()
 
 
+@pytest.mark.release
 def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_steps()).id
     supervisor = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05)

@@ -106,6 +106,7 @@ def computed_from(specs: Any) -> Any:
 
 
 @pytest.mark.parametrize("name", ["analytic", "cma_es", "options"])
+@pytest.mark.release
 def test_explicit_old_options_give_the_kept_numbers(name: Any) -> None:
     kept = numbers(members(archive(name)))
 

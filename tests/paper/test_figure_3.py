@@ -48,12 +48,14 @@ def distances(strategy: Any) -> Any:
     )
 
 
+@pytest.mark.release
 def test_as_samples_are_added_the_simulations_become_more_accurate() -> None:
     means = distances("simulated_fit").mean(axis=0)
 
     assert means[-1] < means[0] / 2
 
 
+@pytest.mark.release
 def test_the_fitness_of_the_transferred_controller_rises_until_it_is_near_the_maximum_of_reality() -> None:
     means = recorded("simulated_fit").mean(axis=0)
     best = recorded("direct").mean()
@@ -63,10 +65,12 @@ def test_the_fitness_of_the_transferred_controller_rises_until_it_is_near_the_ma
 
 
 @pytest.mark.parametrize("strategy", ["informative", "simulated_fit_and_informative"])
+@pytest.mark.release
 def test_strategies_that_weigh_simulators_close_the_gap_too(strategy: Any) -> None:
     assert recorded(strategy)[:, -1].mean() > 0.98 * recorded("direct").mean()
 
 
+@pytest.mark.release
 def test_fit_and_informative_is_ahead_of_random_when_samples_are_few() -> None:
     assert recorded("simulated_fit_and_informative")[:, 1:4].mean() > recorded("random")[:, 1:4].mean()
 
