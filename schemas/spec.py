@@ -197,7 +197,7 @@ class StudySpec(SharedSettings, Schedule):
 
     EXAMPLES: ClassVar[Examples] = {
         "Fig. 4": {
-            "summary": "The paper's whole Fig. 4: six strategies and the direct baseline; 1 500 core-hours",
+            "summary": "The paper's whole Fig. 4: 1,200 core-hours, so it needs `?confirm_cost=true`",
             "value": {"name": "Fig. 4", "direct_repetitions": 100},
         },
         "quick": {

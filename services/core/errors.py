@@ -2,6 +2,7 @@
 
     GaplabError
     ├── InvalidSpec          a spec or request is invalid; has every violation with its place
+    │   ├── CostUnconfirmed      the request takes long, and does not say that this is meant
     │   └── InvalidRobotFile     a robot file cannot be stored
     ├── NotFound             no such study, experiment or plug-in
     ├── Conflict             the current state forbids the request

@@ -352,7 +352,7 @@ def test_a_port_that_is_no_number_in_the_environment_is_a_sentence(gaplab: Gapla
 
 def test_every_example_is_accepted_and_says_its_name(gaplab: Gaplab) -> None:
     for example in EXAMPLES.glob("*.json"):
-        said = gaplab("submit", str(example))
+        said = gaplab("submit", str(example), "--yes")
 
         assert said.code == 0, said.err
         assert json.loads(example.read_text())["name"]

@@ -166,7 +166,8 @@ def assert_shown(store: Store, found: Any) -> None:
 
 
 def assert_exported(exported: Any, found: Any) -> None:
-    for table in set(found) - {"manifest"}:
+    assert exported["spec"] == found["spec"]
+    for table in set(found) - {"manifest", "spec"}:
         pairs = zip(exported[table], found[table], strict=True)
         assert [chosen(row, old) for row, old in pairs] == exact(found[table])
 
