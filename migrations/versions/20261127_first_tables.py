@@ -4,6 +4,7 @@ Revision: 0001, after nothing.
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import sqlalchemy as sa
 from alembic import op
@@ -15,10 +16,11 @@ down_revision = None
 branch_labels = None
 depends_on = None
 
-Columns = Mapping[str, TypeEngine]  # the type of each column, whose names spaces divide
+Columns = Mapping[str, TypeEngine[Any]]  # the type of each column, whose names spaces divide
 
 ID, NAME, TEXT = sa.String(32), sa.String(200), sa.Text()
-WHOLE, LARGE, REAL, TRUTH = sa.Integer(), sa.BigInteger(), sa.Double(), sa.Boolean()
+WHOLE, LARGE, TRUTH = sa.Integer(), sa.BigInteger(), sa.Boolean()
+REAL: TypeEngine[Any] = sa.Double()
 MOMENT, JSON, BINARY = sa.DateTime(timezone=True), sa.JSON(), sa.LargeBinary()
 NUMBER = LARGE.with_variant(WHOLE, "sqlite")
 
@@ -27,7 +29,7 @@ ENDINGS = ("completed", "paused", "stopped", "cancelled", "handed back", "lost",
 REQUEST_STATES = ("open", "taken", "measured", "failed", "withdrawn", "stuck")
 ANSWER_STATES = ("counted", "conflict", "replaced", "void", "dismissed")
 
-DEFAULTS = dict.fromkeys(("edits", "precedence", "running", "checkpoints"), "0")
+DEFAULTS: dict[str, Any] = dict.fromkeys(("edits", "precedence", "running", "checkpoints"), "0")
 DEFAULTS |= dict.fromkeys(("claimable", "left_out"), sa.false())
 
 TABLES = (

@@ -64,13 +64,13 @@ class Chromium:
 
     def visit(self, url: Any, *, dark: Any = False, width: Any = 1280, height: Any = 900) -> Any:
         """A tab at the address, in light or dark, as wide as a screen or a phone."""
-        page = self._window.new_page()
+        page: Any = self._window.new_page()
         page.emulate_media(color_scheme="dark" if dark else "light", reduced_motion="reduce")
         page.set_viewport_size({"width": width, "height": height})
-        page.on("console", lambda said: said.type == "error" and self._note(f"console: {said.text}"))  # type: ignore[func-returns-value]
+        page.on("console", lambda said: said.type == "error" and self._note(f"console: {said.text}"))
         page.on("pageerror", lambda error: self._note(f"error: {error}"))
         page.on("requestfailed", self._failed)
-        page.on("response", lambda answer: answer.status >= 400 and self._note(f"{answer.status} {answer.url}"))  # type: ignore[func-returns-value]
+        page.on("response", lambda answer: answer.status >= 400 and self._note(f"{answer.status} {answer.url}"))
         page.goto(url)
         return page
 

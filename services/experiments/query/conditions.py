@@ -75,7 +75,8 @@ def _either(first: Field, second: Field) -> Field:
 
 def _name(field: str) -> ColumnElement[str]:
     """SQL: the name of a plug-in of the spec; NULL for none."""
-    return _E.spec[field]["name"].as_string()
+    name: ColumnElement[str] = _E.spec[field]["name"].as_string()
+    return name
 
 
 def _of_robots() -> ColumnElement[str]:
