@@ -10,7 +10,7 @@ has a database of its own: a copy of one that was migrated once. All test proces
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, chdir, contextmanager
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -215,3 +215,10 @@ def put(tmp_path: Path) -> Iterator[Any]:
 
     yield write
     external_plugins.set_folders(())
+
+
+@pytest.fixture
+def here(tmp_path: Path) -> Iterator[Path]:
+    """An empty folder, where the process is."""
+    with chdir(tmp_path):
+        yield tmp_path

@@ -30,9 +30,6 @@ from gaplab.services.store.statements import insert_new, storable
 NONE: Mapping[str, str] = {}
 """No plug-in is refused."""
 
-_IMPORTED = re.compile(r", \S+\.py [0-9a-f]{12}(?=[,)])")
-"""A file that a plug-in imports; experiments that began before these were recorded do without."""
-
 
 @snapshot
 def read(session: Session, experiment_id: str) -> ProvenanceRead:
@@ -206,7 +203,7 @@ def _holds(text: str, under: Provenance) -> bool:
     """Return whether this provenance has each version in a `decisive` text."""
     true = [*(_engine(under, name) for name in under.engines), *_machine(under)]
     true += [_external(under, plugin) for plugin in under.outside]
-    part = "|".join(map(re.escape, [*true, *(_IMPORTED.sub("", text) for text in true)]))
+    part = "|".join(map(re.escape, true))
     return re.fullmatch(rf"(?:{part})(?:, (?:{part}))*", text) is not None
 
 

@@ -123,13 +123,9 @@ def test_an_archive_that_is_being_written_has_not_its_name_yet(
     assert [each.name for each in tmp_path.iterdir()] == ["archive.zip"]
 
 
-def test_what_is_no_id_is_no_place_for_an_archive(
-    gaplab: Gaplab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-
+def test_what_is_no_id_is_no_place_for_an_archive(gaplab: Gaplab, here: Path) -> None:
     assert gaplab("export", "../x").code == 4
-    assert list(tmp_path.iterdir()) == []
+    assert list(here.iterdir()) == []
 
 
 def test_the_command_says_what_is_wrong_with_an_archive(gaplab: Gaplab, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """A copy of a database that is in use: it is whole, it is of one moment, and it goes on computing."""
 
+import os
 import sqlite3
 import subprocess
 from pathlib import Path
@@ -150,17 +151,15 @@ def test_of_postgres_it_says_what_copies_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["postgresql", "postgresql+psycopg"])
-def test_the_line_that_copies_a_postgres_has_a_url_that_its_tool_knows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: Any
-) -> None:
-    monkeypatch.setenv("GAPLAB_DATABASE_URL", f"{scheme}://me:a:b@127.0.0.1/gaplab")
+def test_the_line_that_copies_a_postgres_has_a_url_that_its_tool_knows(tmp_path: Path, scheme: Any) -> None:
+    environment = os.environ | {"GAPLAB_DATABASE_URL": f"{scheme}://me:a:b@127.0.0.1/gaplab"}
     with pytest.raises(Unsupported) as refusal:
         backup("postgresql+psycopg://me:secret@127.0.0.1/gaplab", tmp_path / "my copy")
 
     line = str(refusal.value)[str(refusal.value).index("pg_dump") :].replace("pg_dump", "printf '%s\\n'", 1)
-    said = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=True).stdout.splitlines()
+    done = subprocess.run(["sh", "-c", line], env=environment, capture_output=True, text=True, check=True)
 
-    assert said[1:] == [f"--file={tmp_path / 'my copy'}", "postgresql://me:a:b@127.0.0.1/gaplab"]
+    assert done.stdout.splitlines()[1:] == [f"--file={tmp_path / 'my copy'}", "postgresql://me:a:b@127.0.0.1/gaplab"]
 
 
 @pytest.mark.parametrize(("existing", "code"), [(False, 0), (True, 7)])

@@ -22,7 +22,6 @@ from gaplab.services.running import execution, provenance, sensitivity, versions
 from gaplab.services.specs import blame
 from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from gaplab.workers import nodes
 from gaplab.workers.plugins import FIRST_S, LONGEST_S, Plugins
@@ -189,17 +188,6 @@ def test_an_edit_of_what_a_plug_in_imports_counts_as_its_own(store: Store, put: 
 
     assert claimed(store) == []
     (home / "_middle.py").write_text("X = 1")
-    assert claimed(store) == [named]
-
-
-def test_experiments_from_before_imports_were_recorded_go_on(store: Store, put: Any) -> None:
-    put(_middle="X = 1", careful=f"from ._middle import X\n{CAREFUL}")
-    named = begin(store)
-    with store.transaction() as session:
-        row = session.get_one(ExperimentRow, named)
-        before, row.computed_with = row.computed_with, provenance._IMPORTED.sub("", row.computed_with)
-        assert row.computed_with != before
-
     assert claimed(store) == [named]
 
 

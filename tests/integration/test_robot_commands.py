@@ -47,10 +47,8 @@ def test_an_import_writes_a_robot_file_and_says_what_is_lost(gaplab: Gaplab, tmp
     assert [joint.start for joint in robot.world.joints][:3] == [0.0, 0.9, -1.8]
 
 
-def test_an_import_takes_all_options_and_prints_json(
-    gaplab: Gaplab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_an_import_takes_all_options_and_prints_json(gaplab: Gaplab) -> None:
     Path("m.xml").write_text(MJCF.format(""))
     options = (
         "--motor",

@@ -1,6 +1,6 @@
 """Experiments whose numbers are kept: every strategy on every engine, both optimizers, other options than the defaults.
 
-They state the options of before comparisons were fair, because their numbers were kept then.
+They state the options with which their numbers were kept; the defaults are others.
 
 The budgets are tiny, so that all of it together is computed in seconds. A change here takes effect with the next
 `python -m tests.numbers.keep`; the tests read what the archives hold.

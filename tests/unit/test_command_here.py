@@ -1,5 +1,7 @@
 """What the demo prints can be typed where it was started."""
 
+from collections.abc import Iterator
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -8,13 +10,13 @@ from gaplab.api.commands.demo import command_here
 
 
 @pytest.fixture
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def installed(tmp_path: Path) -> Iterator[Path]:
     """The `gaplab` of an installation in a folder with a space in its name, where the shell is."""
     command = tmp_path / "a clone" / ".venv" / "bin" / "gaplab"
     command.parent.mkdir(parents=True)
     command.touch(mode=0o755)
-    monkeypatch.chdir(tmp_path / "a clone")
-    return command
+    with chdir(tmp_path / "a clone"):
+        yield command
 
 
 def here(installed: Path, path: Path) -> str:
@@ -25,15 +27,15 @@ def test_it_is_called_by_its_name_if_the_path_finds_it(installed: Path) -> None:
     assert here(installed, installed.parent) == "gaplab"
 
 
-def test_else_it_is_called_by_its_place(installed: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_else_it_is_called_by_its_place(installed: Path, tmp_path: Path) -> None:
     assert here(installed, tmp_path) == ".venv/bin/gaplab"
 
-    monkeypatch.chdir(tmp_path / "a clone" / ".venv")
-    assert here(installed, tmp_path) == "bin/gaplab"
+    with chdir(tmp_path / "a clone" / ".venv"):
+        assert here(installed, tmp_path) == "bin/gaplab"
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    monkeypatch.chdir(elsewhere)
-    assert here(installed, tmp_path) == f"'{installed}'"
+    with chdir(elsewhere):
+        assert here(installed, tmp_path) == f"'{installed}'"
 
 
 def test_another_one_that_the_path_finds_is_not_this_one(installed: Path, tmp_path: Path) -> None:

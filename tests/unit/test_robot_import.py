@@ -597,19 +597,16 @@ def test_a_name_without_a_letter_is_refused(tmp_path: Path) -> None:
         import_robot(tmp_path / "m.xml", ImportOptions(name="日本"))
 
 
-def test_equal_limits_are_none_and_said_without_a_log(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    two_links(tmp_path)
-    file = tmp_path / "two" / "urdf" / "two.urdf"
+def test_equal_limits_are_none_and_said_without_a_log(here: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    two_links(here)
+    file = here / "two" / "urdf" / "two.urdf"
     file.write_text(file.read_text().replace('lower="-1" upper="2"', 'lower="0" upper="0"'))
 
     robot = import_robot(file, ImportOptions()).robot
 
     assert robot.world.joints[0].limits is None
     assert "joints whose limits are equal have none: hinge" in robot.lost
-    assert [each.name for each in tmp_path.iterdir()] == ["two"]
+    assert [each.name for each in here.iterdir()] == ["two"]
     assert capfd.readouterr() == ("", "")
 
 
