@@ -322,7 +322,7 @@ def test_a_backup_without_a_revision_is_not_called_later(url: str, copied: Path)
 
 def test_the_command_says_what_it_did(url: str, copied: Path, gaplab: Gaplab) -> None:
     told, listed, refused = (
-        gaplab("restore", *arguments, GAPLAB_DATABASE_URL=url)
+        gaplab("restore", *arguments, GAPLAB_DATABASE_URL=url, GAPLAB_URL="http://127.0.0.1:8000")
         for arguments in ([str(copied)], [str(copied), "--json"], ["gone.db"])
     )
 

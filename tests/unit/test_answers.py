@@ -69,7 +69,7 @@ def resumed(setting: Any, history: Any, answers: Any) -> Any:
     return next_step(setting, history, Answers(simulate, setting.batch_size, answers)), simulate.rollouts
 
 
-@pytest.mark.parametrize(("before", "after"), [(1, 1), (1, 8), (8, 1)])
+@pytest.mark.parametrize(("before", "after"), [pytest.param(1, 1, marks=pytest.mark.release), (1, 8), (8, 1)])
 @pytest.mark.parametrize("optimizer", sorted(optimizers))
 @pytest.mark.parametrize("strategy", sorted(strategies))
 def test_a_step_interrupted_anywhere_equals_one_that_was_not(
