@@ -9,7 +9,7 @@ has a database of its own: a copy of one that was migrated once. All test proces
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, chdir, contextmanager
 from itertools import count
 from pathlib import Path
@@ -18,14 +18,20 @@ from typing import Any
 
 import psycopg
 import pytest
+from hypothesis import settings
 
 from gaplab import migrations
 from gaplab.services.core import external_plugins
 from gaplab.services.plugins import folders
 from gaplab.services.store.session import Store
 from tests import postgres as servers
+from tests import statements
 
 pytest_plugins = ["tests.tiers"]
+
+statements.share()
+settings.register_profile("any machine", deadline=None)
+settings.load_profile("any machine")
 
 STARTS = 8
 """Most starts of a Ray, each of which has half a minute."""
@@ -116,6 +122,16 @@ def sqlite_template(folder: Path) -> Path:
     """A SQLite file at head, migrated once for all tests."""
     file = folder / "template.db"
     migrations.upgrade(f"sqlite:///{file}")
+    return file
+
+
+def filled(template: Path, fill: Callable[[Store], object]) -> Path:
+    """A copy of a SQLite file with more in it; a module that has it as `sqlite_template` computes it once."""
+    file = template.with_name(f"filled_{next(_numbers)}.db")
+    shutil.copy(template, file)
+    store = Store(f"sqlite:///{file}")
+    fill(store)
+    store.dispose()
     return file
 
 

@@ -4,6 +4,8 @@ import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
+from ssl import SSLContext
 from typing import TypedDict, TypeVar, Unpack
 from urllib.parse import quote
 from uuid import uuid4
@@ -48,6 +50,12 @@ class Request(TypedDict, total=False):
     timeout: float
 
 
+@cache
+def _certificates() -> SSLContext:
+    """Return whom https trusts: read once, which takes as long as many a request."""
+    return httpx2.create_ssl_context()
+
+
 class Connection:
     """A connection to a service.
 
@@ -81,6 +89,7 @@ class Connection:
                 base_url=url,
                 headers={"Authorization": f"Bearer {token}"} if token else {},
                 timeout=timeout_s,
+                verify=_certificates(),
                 transport=transport,
                 trust_env=httpx2.URL(url).host not in LOOPBACK,
             )

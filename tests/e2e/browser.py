@@ -28,6 +28,8 @@ FLAGS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",  # WebGL without a graphics card
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
+    "--disable-gpu-rasterization",
 ]
 
 AXE = Path(axe_playwright_python.__file__).with_name("axe.min.js")

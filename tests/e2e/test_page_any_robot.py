@@ -31,6 +31,7 @@ def replay(visit: Any, api: Any, known: Any, **how: Any) -> Any:
     return page
 
 
+@pytest.mark.release
 def test_every_part_is_drawn_in_the_colour_of_its_role_in_the_middle_of_the_picture(
     visit: Any, api: Any, known: Any
 ) -> None:
@@ -80,6 +81,7 @@ def test_a_replay_is_played_seen_from_elsewhere_and_changed(visit: Any, api: Any
     assert page.url.endswith("repetition=0&iteration=1&kind=sample&simulator=0")
 
 
+@pytest.mark.release
 def test_without_webgl_the_ground_rises_in_the_picture_too(visit: Any, api: Any, known: Any) -> None:
     page = visit(f"{api.url}/#/toy")
     page.add_init_script(FLAT)
@@ -96,6 +98,7 @@ def test_without_webgl_the_ground_rises_in_the_picture_too(visit: Any, api: Any,
     assert rise == pytest.approx(np.tan(0.12 * np.sin(1.0)), rel=0.1)  # seen from 1 rad off the direction of x
 
 
+@pytest.mark.release
 def test_the_form_shows_the_chosen_robot_and_tunes_what_is_usual_for_it_until_the_reader_chooses(
     visit: Any, api: Any
 ) -> None:

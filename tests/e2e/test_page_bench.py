@@ -197,6 +197,7 @@ def test_a_take_whose_answer_is_lost_is_this_browsers_all_the_same(visit: Any, a
     assert (request.state, request.takes) == ("taken", 1)
 
 
+@pytest.mark.release
 def test_what_was_sent_is_corrected_and_voided_after_what_follows_is_said(visit: Any, api: Any, written: Store) -> None:
     experiment, request = asked(written, "bay")
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
@@ -232,6 +233,7 @@ def test_what_was_sent_is_corrected_and_voided_after_what_follows_is_said(visit:
     assert waiting(written, experiment)[0].id == sample.id
 
 
+@pytest.mark.release
 def test_conflicts_are_decided_stuck_requests_opened_and_refusals_shown(visit: Any, api: Any, written: Store) -> None:
     visit.forgive("422", "409")
     experiment, request = asked(written, "yard", reality={"repeats": 1})
@@ -326,9 +328,8 @@ def test_an_experiment_shows_repeats_history_and_closed_branches(visit: Any, api
     expect(page.locator(".event-list li").first).to_contain_text("was corrected: a slip of the keyboard")
 
 
-@pytest.mark.parametrize(
-    "mode", ["light", *(pytest.param(mode, marks=pytest.mark.release) for mode in ("dark", "phone"))]
-)
+@pytest.mark.release
+@pytest.mark.parametrize("mode", ["light", "dark", "phone"])
 def test_the_form_takes_a_bench_with_samples_from_a_table(visit: Any, api: Any, written: Store, mode: str) -> None:
     visit.forgive("422")
     page = visit(f"{api.url}/#/new", **MODES[mode])

@@ -44,6 +44,7 @@ def lines(page: Any) -> Any:
     return page.locator(".large .scatterlayer .trace:has(.point)")
 
 
+@pytest.mark.release
 def test_a_study_is_found_as_one_types_and_added_by_keyboard(api: Any, known: Any, visit: Any) -> None:
     page = visit(f"{api.url}/#/compare")
     expect(page.get_by_text("Choose experiments above")).to_be_visible()
@@ -70,6 +71,7 @@ def test_a_study_is_found_as_one_types_and_added_by_keyboard(api: Any, known: An
     expect(page.get_by_role("option", name="No name or id contains this.")).to_be_visible()
 
 
+@pytest.mark.release
 def test_the_address_holds_everything(api: Any, known: Any, visit: Any) -> None:
     page = visit(address(api, *known.ids))
     expect(lines(page)).to_have_count(2)

@@ -157,6 +157,7 @@ def test_predictions_are_drawn_once_all_are_computed(archive: Any, ended: Any, v
     assert [url.split("?")[0].endswith("/figures/predictions") for url in asked][:2] == [False, True]
 
 
+@pytest.mark.release
 def test_details_are_reached_by_keyboard_and_are_in_the_address(api: Any, known: Any, visit: Any) -> None:
     page = visit(address(api, known.ids[0], tab="samples"))
     panel = page.get_by_role("tabpanel")
@@ -194,6 +195,8 @@ def test_its_files_are_saved(api: Any, known: Any, visit: Any) -> None:
     with page.expect_download() as saved:
         page.locator(".figure-curves").get_by_role("link", name="CSV").click()
     assert saved.value.path().read_text().startswith("experiment,name,strategy,repetition")
+    for figure in page.locator(".figures > section").all():
+        figure.scroll_into_view_if_needed()
     links = page.locator(".figures .files a, .figure-curves .files a")
     expect(links).to_have_count(4 * 3 + 4)
     drawn = httpx2.get(f"{api.url}/{links.first.get_attribute('href')}", timeout=120)

@@ -128,6 +128,7 @@ def test_a_view_that_sorts_downwards_keeps_its_order(visit: Any, api: Any, writt
         assert api.http.delete(f"/views/{name} downwards").is_success
 
 
+@pytest.mark.release
 def test_what_has_ended_is_archived_and_deleted_by_its_name_and_what_runs_is_not(
     visit: Any, api: Any, written: Any
 ) -> None:

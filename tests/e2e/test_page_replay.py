@@ -242,6 +242,7 @@ def test_without_webgl_it_is_seen_from_the_side(visit: Any, archive: Any, walker
     assert len(np.unique(picture(page.locator(".stage-canvas").first).reshape(-1, 3), axis=0)) > 5
 
 
+@pytest.mark.release
 def test_the_toy_is_stepped_through(visit: Any, api: Any, known: Any) -> None:
     page = visit(f"{api.url}/#/toy?experiment={known.ids[0]}")
     page.wait_for_selector(".toy .main-svg")

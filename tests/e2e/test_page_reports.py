@@ -98,6 +98,7 @@ def test_in_the_dark_the_lines_of_the_coordinates_have_the_colours_of_their_bar(
     screenshot(page, "coordinates-dark")
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("of", ["experiments", pytest.param("studies", marks=pytest.mark.release)])
 def test_a_report_is_saved_with_the_verdict_that_the_service_gives(api: Any, known: Any, visit: Any, of: str) -> None:
     id_ = known.study if of == "studies" else known.ids[0]

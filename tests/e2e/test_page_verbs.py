@@ -51,6 +51,7 @@ def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api: Any, written
     expect(verbs.get_by_role("button", name="Pause")).to_have_attribute("aria-disabled", "true")
 
 
+@pytest.mark.release
 def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
@@ -79,6 +80,7 @@ def test_the_direct_baseline_is_extended_by_repetitions_alone(api: Any, written:
     expect(page.locator(".facts")).to_contain_text("1 of 2")
 
 
+@pytest.mark.release
 def test_a_study_is_extended(api: Any, written: Store, visit: Any) -> None:
     spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "direct"]}
     study = submission.submit_study(written, StudySpec.model_validate(spec | {"iterations": 2, "repetitions": 1}))

@@ -27,6 +27,7 @@ from tests.e2e.reading import (
     script,
     service_with,
 )
+from tests.parameters import few
 
 LEAVES = {
     "tutorial": ["curves.svg", "curves.pdf", "curves.html", "study.zip"],
@@ -56,8 +57,7 @@ SMALL_TOY = {
 
 def one_of(paths: list[Path], name: str) -> list[Any]:
     """Parameters of a test, of which only one is for every change."""
-    marks = {path: () if path.stem == name else pytest.mark.release for path in paths}
-    return [pytest.param(path, marks=marks[path], id=path.stem) for path in paths]
+    return few(paths, lambda path: path.stem == name, lambda path: path.stem)
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ TOY = {
     "strategies": ["simulated_fit_and_informative", "known_fit", "direct"],
     "iterations": 2,
     "repetitions": 2,
-    "budget": {"controller_evaluations": 500, "selection_evaluations": 100},
+    "budget": {"controller_evaluations": 200, "selection_evaluations": 60, "simulator_evaluations": 200},
     "seed": 5,
 }
 LONG_STEPS = {

@@ -41,7 +41,7 @@ from gaplab.services.store.session import Store
 from tests.archiving import exported, imported
 from tests.experiments import AWKWARD, cancel, run, some_log, toy
 
-EVERY = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
+EVERY = settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 FITNESS = FINITE | st.just(nan)

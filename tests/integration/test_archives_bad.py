@@ -419,7 +419,7 @@ def test_a_small_file_of_parquet_that_becomes_a_large_row(sqlite_store: Store, g
     refused(sqlite_store, packed(bomb), "measurement", "more than 8,388,608 characters")
 
 
-@settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_whichever_bytes_are_damaged(sqlite_store: Store, good: Any, data: Any) -> None:
     archive = bytearray(packed(good))

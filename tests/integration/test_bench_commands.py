@@ -189,6 +189,7 @@ def test_a_request_that_is_not_stuck_cannot_be_offered_again(sqlite_store: Store
     assert "open" in said.err
 
 
+@pytest.mark.release
 def test_traces_are_computed_and_stored_as_an_answer(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> None:
     pytest.importorskip("pybullet")
     robot = {"robot": "quadruped", "engine": "pybullet", "budget": "smoke", "iterations": 1}

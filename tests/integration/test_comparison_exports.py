@@ -4,6 +4,7 @@ import csv
 import io
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,23 +14,36 @@ from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.comparisons import Comparison, Equivalence, Estimate, Summary, Test, Trusted
-from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import submission
+from gaplab.services.experiments.listing import list_experiments
 from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex, escaped
 from gaplab.services.results.comparisons import compare
 from gaplab.services.store.session import Store
+from tests import experiments
 from tests.commands import Gaplab
+from tests.conftest import filled
 from tests.experiments import toy
+
+NAMES = ("half & half_100%", "=1+1", "plain")
+"""Of three experiments; two have signs that tables treat as their own."""
+
+
+def fill(store: Store) -> None:
+    for name in NAMES:
+        submission.submit_experiment(store, toy(name=name, repetitions=4))
+    experiments.finish(store)
+
+
+@pytest.fixture(scope="module")
+def sqlite_template(sqlite_template: Path) -> Path:
+    """A database with the experiments and their results."""
+    return filled(sqlite_template, fill)
 
 
 @pytest.fixture
-def ids(sqlite_store: Store, finish: Callable[[], None]) -> list[str]:
-    """Three experiments with results; a name has signs that tables treat as their own."""
-    names = ("half & half_100%", "=1+1", "plain")
-    specs: list[ExperimentSpec] = [toy(name=name, repetitions=4) for name in names]
-    made = [submission.submit_experiment(sqlite_store, spec).id for spec in specs]
-    finish()
-    return made
+def ids(sqlite_store: Store) -> list[str]:
+    found = {each.name: each.id for each in list_experiments(sqlite_store).items}
+    return [found[name] for name in NAMES]
 
 
 def test_csv_has_every_number_of_the_json(ids: list[str], sqlite_store: Store) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from io import BytesIO
 from itertools import islice
+from pathlib import Path
 
 import httpx2
 import matplotlib.image
@@ -15,14 +16,17 @@ from plotly.graph_objects import Figure
 from gaplab.api.app import create_app
 from gaplab.api.http import figures
 from gaplab.api.http.figures import MEDIA_TYPES
+from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import submission
+from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.figures.matplotlib import files
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.session import Store
 from gaplab.services.waiting_line import LENGTH, WaitingLine
+from tests.conftest import filled
 from tests.experiments import run
 
 STUDY = {
@@ -46,15 +50,26 @@ def api(sqlite_store: Store) -> Iterator[TestClient]:
     app.state.rollout_process.close()
 
 
+def fill(store: Store) -> None:
+    """A study of which only the first experiment has ended."""
+    spec = STUDY | {"reality": {"parameters": {"static_friction": HIDDEN, "dynamic_friction": 0.3}}}
+    first = submission.submit_study(store, StudySpec.model_validate(spec)).experiments[0].id
+    for claim in execution.claim(store, "test", limit=20):
+        if claim.experiment_id == first:
+            run(store, claim)
+
+
+@pytest.fixture(scope="module")
+def sqlite_template(sqlite_template: Path) -> Path:
+    """A database with the study."""
+    return filled(sqlite_template, fill)
+
+
 @pytest.fixture
 def experiment(sqlite_store: Store) -> str:
-    """The first of a study of which only it has ended."""
-    spec = STUDY | {"reality": {"parameters": {"static_friction": HIDDEN, "dynamic_friction": 0.3}}}
-    made = submission.submit_study(sqlite_store, StudySpec.model_validate(spec)).experiments[0].id
-    for claim in execution.claim(sqlite_store, "test", limit=20):
-        if claim.experiment_id == made:
-            run(sqlite_store, claim)
-    return made
+    """The one that has ended."""
+    (found,) = list_experiments(sqlite_store, ListFilter(state=State.COMPLETED)).items
+    return found.id
 
 
 @pytest.mark.parametrize(

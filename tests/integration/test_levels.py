@@ -1,6 +1,7 @@
 """Strategies without samples: levels across the figure, which are not the direct baseline."""
 
 from io import BytesIO, StringIO
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,7 +16,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_study, import_archive
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import estimates, extension, reading, submission
+from gaplab.services.experiments import estimates, extension, listing, reading, submission
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.marks import Level
 from gaplab.services.reports.content import study_facts
@@ -28,6 +29,7 @@ from gaplab.services.specs.resolution import resolve_study
 from gaplab.services.specs.shortening import study_spec
 from gaplab.services.store.lease import TimedStep
 from gaplab.services.store.session import Store
+from tests.conftest import filled
 
 SPEC = StudySpec.model_validate({
     "strategies": [
@@ -38,19 +40,29 @@ SPEC = StudySpec.model_validate({
 })  # fmt: skip
 
 
-@pytest.fixture
-def study(sqlite_store: Store) -> Any:
-    made = submission.submit_study(sqlite_store, SPEC)
-    compute(sqlite_store)
-    return reading.read_study(sqlite_store, made.id)
-
-
 def compute(store: Store) -> None:
     while claims := execution.claim(store, "me", 20):
         for each in claims:
             steps = repetition(setting(each.spec, each.number), each.log)
             execution.record_all(store, [(each, [TimedStep(step, 0.1) for step in steps])])
         execution.complete(store, *claims)
+
+
+def fill(store: Store) -> None:
+    submission.submit_study(store, SPEC)
+    compute(store)
+
+
+@pytest.fixture(scope="module")
+def sqlite_template(sqlite_template: Path) -> Path:
+    """A database with the study."""
+    return filled(sqlite_template, fill)
+
+
+@pytest.fixture
+def study(sqlite_store: Store) -> Any:
+    (found,) = listing.list_studies(sqlite_store).items
+    return reading.read_study(sqlite_store, found.id)
 
 
 def test_a_level_is_not_direct_and_has_a_single_point(sqlite_store: Store, study: Any) -> None:

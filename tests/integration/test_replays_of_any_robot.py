@@ -135,6 +135,7 @@ def test_velocities_are_not_written_as_the_positions_of_a_trajectory() -> None:
     assert motions.forms_of(robot, robot.known) == ("csv", "json")
 
 
+@pytest.mark.release
 def test_each_robot_with_a_body_has_a_picture_in_both_themes(api: TestClient) -> None:
     bodies = {each["name"]: each["details"]["bodies"] for each in api.get("/catalogue").json()["robots"]}
     assert bodies["strider"] == 7

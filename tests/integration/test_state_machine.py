@@ -336,7 +336,6 @@ def drive(store: Store, examples: Any, steps: Any) -> None:
     chosen = settings(
         max_examples=examples,
         stateful_step_count=steps,
-        deadline=None,
         suppress_health_check=list(HealthCheck),
         derandomize=True,
     )

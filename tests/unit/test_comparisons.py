@@ -184,7 +184,7 @@ def test_too_few_values_that_vary_leave_equivalence_undecided_and_intervals_unkn
 
 
 @given(st.integers(0, 99), st.integers(2, 12), st.integers(2, 12), st.floats(0.001, 3))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_equivalence_agrees_with_the_interval_of_the_difference(seed: int, n: int, m: int, margin: float) -> None:
     random = default_rng(seed)
     first, second = random.normal(0, 1, n), random.normal(0.2, 2, m)
@@ -249,7 +249,7 @@ VARIES = np.array([[0.5], [0.25]])
 @given(values_, values_, st.booleans(), st.sampled_from([0.1, 1e14]))
 @example(VARIES, np.array([[1.125e14], [1.125e14]]), False, 0.1)
 @example(VARIES, np.array([[1.125e14], [1.126e14]]), False, 1e14)
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_any_values_have_a_comparison_of_finite_numbers(first: Any, second: Any, shared: bool, margin: float) -> None:
     experiments = [compared("a", first), compared("b", second, strategy="a" if shared else "b")]
 

@@ -18,6 +18,7 @@ from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from gaplab.services.specs.rollouts import expected_rollouts
 from gaplab.services.specs.shortening import experiment_spec
 from tests.fakes import flat, small_setting
+from tests.parameters import few
 
 DIVERSE = sorted(name for name, each in strategies.items() if issubclass(each, Diverse))
 TUNER = SearchTuner(SearchOptions(equal_rollouts=True))
@@ -119,7 +120,7 @@ class TestPreset:
 
 
 class TestAllParts:
-    @pytest.mark.parametrize("strategy", sorted(strategies))
+    @pytest.mark.parametrize("strategy", few(sorted(strategies), {"simulated_fit", "weighted"}.__contains__))
     def test_a_resumed_repetition_equals_an_uninterrupted_one_wherever_it_stopped(self, strategy: Any) -> None:
         steps = list(repetition(lean_setting(strategy)))
 

@@ -47,7 +47,7 @@ def brute_force(members: Any) -> Any:
     return min(nearest, key=lambda index: (members.fitness[index], index))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(0, 10**6), st.integers(2, 12), st.sampled_from([SPACE, PHASE]))
 def test_the_less_fit_of_the_most_similar_pair_leaves_as_in_a_brute_force(seed: Any, size: Any, space: Any) -> None:
     members = population(seed, size, space)

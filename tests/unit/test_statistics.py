@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -148,7 +148,6 @@ numbers = st.lists(st.floats(-1e9, 1e9) | st.just(np.nan) | st.just(0.5), max_si
 
 
 @given(numbers, numbers)
-@settings(deadline=None)
 def test_every_test_of_any_values_is_a_probability_or_undefined(first: Any, second: Any) -> None:
     first, second = first.astype(float), second.astype(float)
 
