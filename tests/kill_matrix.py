@@ -29,7 +29,7 @@ from gaplab.services.store.queries import checkpoints, steps
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import StepRecorder
 from gaplab.workers.repetitions import Repetitions
-from tests.kept_databases import Databases
+from tests.equal_databases import Databases
 from tests.postgres import running
 from tests.without_ray import SPEC, work
 
