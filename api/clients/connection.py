@@ -5,7 +5,6 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
-from ssl import SSLContext
 from typing import TypedDict, TypeVar, Unpack
 from urllib.parse import quote
 from uuid import uuid4
@@ -50,10 +49,8 @@ class Request(TypedDict, total=False):
     timeout: float
 
 
-@cache
-def _certificates() -> SSLContext:
-    """Return whom https trusts: read once, which takes as long as many a request."""
-    return httpx2.create_ssl_context()
+_certificates = cache(httpx2.create_ssl_context)
+"""The certificates that https trusts, read once for a process: reading them takes longer than most requests."""
 
 
 class Connection:
