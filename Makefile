@@ -18,7 +18,7 @@ serve: .venv/installed  ## start the service on http://127.0.0.1:8000, with its 
 test: .venv/prepared  ## run the tests that every change must pass: ten minutes on two quiet cores
 	$(PYTEST)
 
-test-all: .venv/prepared  ## run all tests, as before a release: also on Postgres, the documents as written, and the bare machine
+test-all: .venv/prepared  ## run all tests, as before a release: also on Postgres, and the documents as written
 	$(PYTEST) --all
 
 lint: .venv/installed-dev  ## check style, types, dependencies and the imports between layers

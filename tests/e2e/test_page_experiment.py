@@ -14,6 +14,7 @@ from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
+from tests.waiting import wait_until
 
 SLOW_MS = 120_000
 expect.set_options(timeout=SLOW_MS)
@@ -145,6 +146,8 @@ def test_there_is_nothing_yet_or_no_such_experiment(api: Any, written: Store, vi
 
 @pytest.mark.release
 def test_predictions_are_drawn_once_all_are_computed(archive: Any, ended: Any, visit: Any) -> None:
+    computed = f"/experiments/{ended['id']}/predictions"
+    wait_until(lambda: archive.http.get(computed).is_success)  # a busy machine starts physics slowly
     page = visit(address(archive, ended["id"]))
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url) if "/predictions" in request.url else None)

@@ -66,7 +66,7 @@ def test_every_view_can_be_used_in_light_in_dark_and_on_a_phone(
 
 def test_studies_are_found_opened_ticked_and_compared(visit: Any, api: Any, known: Any) -> None:
     page = visit(api.url)
-    page.locator("tr.study").nth(9).wait_for()
+    page.locator(".list tbody tr").nth(9).wait_for()
 
     page.get_by_label("Search by words or a query").press_sequentially("a study")
     assert page.url.endswith("#/?q=a+study")  # at once
@@ -102,7 +102,7 @@ def test_experiments_are_filtered_sorted_and_shown_page_by_page(visit: Any, api:
     page.get_by_text("Nothing fits these filters").wait_for()
     page.get_by_role("link", name="Show everything").click()
 
-    page.locator("tr.study").nth(5).wait_for()
+    page.locator(".list tbody tr").nth(5).wait_for()
 
 
 def test_what_is_submitted_and_cancelled_elsewhere_is_seen_also_without_a_study(
