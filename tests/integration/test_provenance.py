@@ -193,6 +193,21 @@ def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store: Store) ->
     assert execution.claim(store, "me", 9) == ()  # it is bound to the others now
 
 
+def test_a_refused_plug_in_unbinds_an_experiment_unless_it_has_steps_of_its_own(store: Store) -> None:
+    kept = begun(store)
+    (claim,) = execution.claim(store, "me", 1)
+    assert claim.experiment_id == kept
+    loose = submission.submit_experiment(store, toy(repetitions=1)).id
+    (other,) = (each for each in execution.claim(store, "me", 2) if each.experiment_id == loose)
+    for each in (claim, other):
+        execution.hand_back(store, each)
+
+    for id_ in (kept, loose):
+        provenance.tell_refused(store, id_, HERE, {})
+
+    assert [bool(provenance.read(store, id_).computed_with) for id_ in (kept, loose)] == [True, False]
+
+
 def test_there_is_nothing_to_accept_before_it_has_begun_or_after_it_has_ended(store: Store) -> None:
     id_ = submission.submit_experiment(store, toy(repetitions=1)).id
 

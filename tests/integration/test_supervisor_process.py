@@ -4,19 +4,21 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
-from sqlalchemy import text
+from sqlalchemy import select, text, update
 
 from gaplab.api.app import create_app
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.schemas.lifecycle import Ending
 from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution, supervisors
+from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
 from tests.experiments import toy
 from tests.waiting import wait_until
@@ -194,6 +196,18 @@ def test_a_clock_that_was_set_back_by_an_hour_stalls_nothing(store: Store) -> No
     assert execution.heartbeat(store, [claim]) == ()
     told = readyz(create_app(store)).json()["warnings"][0]
     assert "no supervisor has been heard of" in told
+
+def test_supervisors_of_long_ago_and_of_a_clock_far_ahead_are_forgotten(sqlite_store: Store) -> None:
+    for name, days in {"old": -2, "ahead": 2}.items():
+        present = supervisors.heartbeat(sqlite_store, name)
+        moved = update(SupervisorRow).where(SupervisorRow.owner == name)
+        moved = moved.values(heartbeat_at=present + timedelta(days=days))
+        sqlite_store.write(lambda session, statement: session.execute(statement), moved)
+
+    supervisors.heartbeat(sqlite_store, "new")
+
+    with sqlite_store.reading() as session:
+        assert session.scalars(select(SupervisorRow.owner)).all() == ["new"]
 
 
 def test_a_clock_that_goes_back_a_little_loses_no_lease(store: Store) -> None:
