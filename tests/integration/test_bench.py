@@ -234,6 +234,20 @@ def test_the_same_answer_twice_counts_once_and_another_is_a_conflict(store: Stor
     assert undecided(store) == ()
 
 
+def test_an_answer_that_comes_to_count_when_nobody_wants_it_any_more_is_refused(store: Store) -> None:
+    experiment = submit_experiment(store, bench())
+    compute(store)
+    (request,) = pending(store)
+    taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
+    other = measure(store, request, 0.3)
+    lifecycle.ask_experiment(store, experiment.id, Verb.CANCEL)
+
+    with pytest.raises(Conflict, match="wanted no more"):
+        corrections.decide(store, other.id, ConflictSpec(counts="this", reason="Bo is right"), FREELY)
+
+    assert taking.read_request(store, request.id).answers[0].state == "conflict"
+
+
 def test_bad_values_are_refused_with_their_place(store: Store) -> None:
     submit_experiment(store, bench(reality={"repeats": 3}))
     compute(store)
@@ -307,7 +321,13 @@ def test_a_void_measurement_is_asked_for_again(store: Store) -> None:
     (before,) = log_of(store, experiment)
     sample = next(each for each in asked if each.kind == "sample")
     answer = taking.read_request(store, sample.id).answers[0]
-    corrections.void(store, answer.id, VoidSpec(reason="the floor was wet"), FREELY)
+    wet = VoidSpec(reason="the floor was wet")
+    told = corrections.void(store, answer.id, wet, FREELY, dry_run=True).answer
+    assert read_experiment(store, experiment.id).state is State.COMPLETED
+    done = corrections.void(store, answer.id, wet, FREELY).answer
+    assert (told.steps, told.words) == (done.steps, done.words)
+    assert told.steps > 0
+    assert "stopped" not in told.words
     assert read_experiment(store, experiment.id).state is State.WAITING
     (again,) = pending(store)
     assert again.id == sample.id
@@ -364,6 +384,8 @@ def test_a_correction_of_a_sample_says_that_a_stopped_experiment_goes_on(store: 
     told = corrections.correct(store, sample.answers[0].id, slip, FREELY, dry_run=True).answer
     corrections.correct(store, sample.answers[0].id, slip, FREELY)
 
+    steps = "1 stored step" if told.steps == 1 else f"{told.steps} stored steps"
+    assert told.words.startswith(f"{steps} after it will be computed again")
     assert told.words.endswith("; the repetition, which was stopped, goes on to its last iteration")
     assert read_experiment(store, experiment.id).state is State.QUEUED
 
@@ -428,6 +450,8 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
     assert lifecycle.ask_experiment(store, three.id, Verb.CANCEL).state is State.CANCELLED
     with pytest.raises(Conflict, match="wanted no more"):
         measure(store, requests[three.id], 0.4)
+    waiting_for = [RequestFilter(experiment=id_) for id_ in (one.id, three.id)]
+    assert [taking.none_will_follow(store, each) for each in (*waiting_for, RequestFilter())] == [False, True, False]
 
 
 def test_known_samples_tune_the_first_simulators(store: Store) -> None:

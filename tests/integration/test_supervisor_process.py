@@ -197,6 +197,7 @@ def test_a_clock_that_was_set_back_by_an_hour_stalls_nothing(store: Store) -> No
     told = readyz(create_app(store)).json()["warnings"][0]
     assert "no supervisor has been heard of" in told
 
+
 def test_supervisors_of_long_ago_and_of_a_clock_far_ahead_are_forgotten(sqlite_store: Store) -> None:
     for name, days in {"old": -2, "ahead": 2}.items():
         present = supervisors.heartbeat(sqlite_store, name)
