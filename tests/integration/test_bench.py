@@ -130,7 +130,7 @@ def test_a_repetition_that_waits_holds_nothing_and_its_experiment_says_so(store:
     assert compute(store) == 1
 
     (request,) = pending(store)
-    assert (request.state, request.iteration, request.kind) == ("open", 0, "probe")
+    assert (request.state, request.iteration, request.kind, request.ended_at) == ("open", 0, "probe", None)
     assert read_experiment(store, experiment.id).state is State.WAITING
     assert compute(store) == 0
     assert execution.requeue_lost(store, stale_after_s=0.0) == 0
@@ -285,6 +285,7 @@ def test_a_correction_closes_what_followed_and_measurements_are_reused(store: St
     back = CorrectionSpec(values=answer.values, reason="it was right after all")
     corrections.correct(store, done.answer, back, FREELY)
     assert finish(store, lambda _: pytest.fail("a measurement was asked for twice")) == []
+    assert all(each.ended_at for each in taking.list_requests(store, RequestFilter(pending=False)).items)
     (after,) = log_of(store, experiment)
     assert all(map(same, after, before))
     assert read_experiment(store, experiment.id).state is State.COMPLETED
