@@ -35,7 +35,7 @@ from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.lease import Pulse
-from gaplab.services.store.models import AttachmentRow, IterationRow, RepetitionRow
+from gaplab.services.store.models import AttachmentRow, IterationRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries.costs import work_of
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
@@ -185,12 +185,6 @@ def test_a_take_has_one_holder_and_a_bench_one_take(store: Store) -> None:
 @pytest.mark.parametrize("by_s", [-3600, 3600])
 def test_a_take_ends_with_its_lease_also_if_the_clock_was_set(store: Store, by_s: float) -> None:
     """`taken_until` in the past is over; so is one that no heartbeat could have set."""
-    from datetime import timedelta
-
-    from sqlalchemy import update
-
-    from gaplab.services.store.models import RequestRow
-
     submit_experiment(store, bench())
     compute(store)
     (request,) = pending(store)
@@ -204,6 +198,19 @@ def test_a_take_ends_with_its_lease_also_if_the_clock_was_set(store: Store, by_s
     with pytest.raises(Conflict, match="5 times in a row"):
         taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
     assert taking.reopen(store, request.id).state == "open"
+
+
+def test_no_take_ends_while_its_request_is_answered(postgres_store: Store) -> None:
+    """As it would if a supervisor ended takes between the moment a request is read and the moment it is written."""
+    submit_experiment(postgres_store, bench())
+    compute(postgres_store)
+    (request,) = pending(postgres_store)
+    seen = select(RequestRow.id).with_for_update(skip_locked=True)
+    with postgres_store.transaction() as session, postgres_store.transaction() as another:
+        taking.locked(session, request.id)
+        assert another.scalars(seen).all() == []
+    with postgres_store.transaction() as session:
+        assert session.scalars(seen).all() == [request.id]
 
 
 @pytest.mark.dialects
@@ -331,7 +338,7 @@ def test_a_void_measurement_is_asked_for_again(store: Store) -> None:
     assert "stopped" not in told.words
     assert read_experiment(store, experiment.id).state is State.WAITING
     (again,) = pending(store)
-    assert again.id == sample.id
+    assert (again.id, again.unanswered) == (sample.id, 0)
     with pytest.raises(Conflict, match="it is void"):
         corrections.void(store, answer.id, VoidSpec(reason="once more"), FREELY)
     measure(store, again, truth(spec)(again.genome))

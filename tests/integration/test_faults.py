@@ -271,6 +271,15 @@ def test_an_error_that_may_pass_is_tried_again_by_itself(sqlite_store: Store) ->
     assert stored(sqlite_store, experiment) == computed(on_the_bench(repetitions=1))
 
 
+def test_an_error_that_does_not_pass_pauses_after_three_tries(sqlite_store: Store) -> None:
+    Bench.errors[:] = [TryAgain("dropped")] * 9
+    experiment = submission.submit_experiment(sqlite_store, on_the_bench(repetitions=1)).id
+
+    work(sqlite_store)
+
+    assert (reading.read_experiment(sqlite_store, experiment).state, Bench.asked) == (State.PAUSED, 4)
+
+
 def test_what_failed_is_retried_from_its_stored_steps(store: Store) -> None:
     spec = small(strategy="liar")
     answers = iter([np.array([0.25]), None])
