@@ -119,7 +119,7 @@ class Limits(_Environment):
         body_bytes: bytes of one request.
         iterations: iterations of one experiment.
         repetitions: repetitions of one submission, over all experiments of a study.
-        unconfirmed_core_hours: expected hours of one core for a submission that does not confirm its cost.
+        unconfirmed_core_hours: expected core-hours of a submission or an extension that does not confirm its cost.
         experiments_per_token: experiments of one token that have not ended.
         experiments: experiments of all tokens that have not ended.
         rollouts_per_token: remaining rollouts of one token, in experiments that have not ended.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gaplab.schemas.archives import ImportRead
 from gaplab.services.archives import Archive, import_archive
-from gaplab.services.archives.opening import lines_of
+from gaplab.services.archives.opening import json_lines_beside
 from gaplab.services.archives.unpacking import convert
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.store.session import Store
@@ -20,7 +20,7 @@ def exported(archive: Archive) -> bytes:
 def convert_here(files: Mapping[Path, int]) -> None:
     """Read Parquet as the subprocess does, without its limits."""
     for file, rows in files.items():
-        if not convert(str(file), str(lines_of(file)), rows):
+        if not convert(str(file), str(json_lines_beside(file)), rows):
             raise InvalidArchive(f"{file.name} is not readable")
 
 

@@ -41,7 +41,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Describe the marks, and collect no garbage until all tests are collected: there is none."""
-    gc.disable()
+    if config.getoption("numprocesses", None) is None:  # with processes of its own, pytest collects nothing here
+        gc.disable()
     os.environ["RAY_worker_niceness"] = "0"  # noqa: SIM112  # with Ray's 15, its workers wait for all others
     for mark in (
         "release: only in `make test-all`",

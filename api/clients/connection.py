@@ -82,13 +82,14 @@ class Connection:
             msg = "the token has characters that no token of this service has; check GAPLAB_TOKEN for line breaks"
             raise ServiceUnreachable(msg)
         try:
+            here = httpx2.URL(url).host in LOOPBACK
             self._http = httpx2.Client(
                 base_url=url,
                 headers={"Authorization": f"Bearer {token}"} if token else {},
                 timeout=timeout_s,
-                verify=_certificates(),
+                verify=_certificates() if not here or url.startswith("https:") else False,
                 transport=transport,
-                trust_env=httpx2.URL(url).host not in LOOPBACK,
+                trust_env=not here,
             )
         except (httpx2.InvalidURL, UnicodeEncodeError) as error:
             raise ServiceUnreachable(f"{url!r} is not the address of a service: {error}") from error

@@ -8,6 +8,7 @@ from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
 from gaplab.schemas.events import EventPage, EventRead
 
 RETRY_S = 1.0
+"""Pause before a broken stream is opened again."""
 
 SILENCE_S = 45.0
 """Longest silence of a stream that works: the service sends a comment every 15 s."""

@@ -66,7 +66,7 @@ def delete(
     with connect(url) as client:
         record = client.find(id)
         if not yes:
-            demand_yes(f"delete {_size(record)}", "deleted")
+            demand_yes(_size(record))
         deleted = client.delete(id)
     print_result(deleted, f"{deleted.name} ({deleted.id}) is deleted.", as_json=as_json)
 

@@ -28,18 +28,18 @@ def keyboard() -> Iterator[Ask | None]:
         yield ask
 
 
-def demand_yes(to_do: str, done: str) -> None:
-    """Ask whether to do what cannot be undone.
-
-    Args:
-        to_do: words for it, as in "delete it".
-        done: its participle, as in "deleted".
+def demand_yes(what: str) -> None:
+    """Ask whether to delete it for good.
 
     Raises:
         CommandError: the answer is not yes, or there is no terminal.
     """
     with keyboard() as ask:
         if ask is None:
-            raise CommandError(f"to {to_do} for good without a terminal, add --yes", Exit.USAGE)
-        if not is_yes(ask(f"{to_do[0].upper()}{to_do[1:]} for good? [y/N] ")):
-            raise CommandError(f"nothing was {done}", Exit.INTERRUPTED)
+            raise CommandError(f"to delete {what} for good without a terminal, add --yes", Exit.USAGE)
+        try:
+            answer = ask(f"Delete {what} for good? [y/N] ")
+        except (KeyboardInterrupt, EOFError):
+            answer = ""
+        if not is_yes(answer):
+            raise CommandError("nothing was deleted", Exit.INTERRUPTED)

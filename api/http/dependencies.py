@@ -117,11 +117,11 @@ class Paging(Parameters):
 
 
 class Confirmation(Parameters):
-    """Whether a submission takes long on purpose."""
+    """Confirmation of a high cost."""
 
     confirm_cost: bool = Field(
         default=False,
-        description="submit it even if it takes more core-hours than `GAPLAB_MAX_UNCONFIRMED_CORE_HOURS`, else refused",
+        description="confirm a cost above `GAPLAB_MAX_UNCONFIRMED_CORE_HOURS`; without it, such a request is refused",
     )
 
     def given(self, admitted: Admission) -> Admission:

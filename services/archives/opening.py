@@ -93,7 +93,7 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int, convert: Parquet
             if name != MANIFEST
         }
     convert({file: manifest.members[name].rows for name, file in files.items() if name.endswith(".parquet")})
-    tables = {table: lines_of(files[member_of(table)]) for table in EXPORTED}
+    tables = {table: json_lines_beside(files[member_of(table)]) for table in EXPORTED}
     return OpenedArchive(manifest, tables, {hash_: file for name, file in files.items() if (hash_ := digest_of(name))})
 
 
@@ -216,7 +216,7 @@ def convert_apart(files: Mapping[Path, int], program: Path = _UNPACKING) -> None
     Raises:
         InvalidArchive: a file is not readable, or has other rows.
     """
-    arguments = [str(each) for file, rows in files.items() for each in (file, lines_of(file), rows)]
+    arguments = [str(each) for file, rows in files.items() for each in (file, json_lines_beside(file), rows)]
     command = [sys.executable, "-I", str(program), *arguments]
     ended = subprocess.run(command, stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, check=False)  # noqa: S603 - ours
     if ended.returncode != 0:
@@ -225,6 +225,6 @@ def convert_apart(files: Mapping[Path, int], program: Path = _UNPACKING) -> None
         raise InvalidArchive(msg)
 
 
-def lines_of(file: Path) -> Path:
-    """Return the file beside it that receives the rows of a Parquet file."""
+def json_lines_beside(file: Path) -> Path:
+    """Return the file that receives the rows of a Parquet file, in its folder."""
     return file.with_suffix(".jsonl")

@@ -25,7 +25,7 @@ SILENT_S = 60.0
 """Age of the last heartbeat after which a supervisor does not count as working."""
 
 SLOWEST_ROLLOUT_S = 60.0
-"""Longest usual time of a rollout: what is cheap even then needs no look at earlier experiments."""
+"""Upper bound of a usual rollout: a submission below the limit at this pace needs no look at earlier experiments."""
 
 Key = tuple[str, str]
 """Robot and engine, with their options."""
@@ -61,7 +61,7 @@ def estimate(
 
 
 def check_cost(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
-    """Refuse what takes long, unless the request confirms it.
+    """Refuse a cost above the limit, unless the request confirms it.
 
     Args:
         session: session of the transaction that stores it.
@@ -81,8 +81,8 @@ def check_cost(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
     measured = _measured(costs.latest(session, LATEST))
     seconds = sum(_experiment(each, _cost(each, measured)).core_seconds for each in specs)
     if (hours := seconds / 3_600 * (1 - done / rollouts)) > limit:
-        least = f"above {limit:,} ({variable_of('unconfirmed_core_hours')}), confirm_cost=true or --yes confirms it"
-        message = f"this takes about {hours:,.0f} core-hours; {least}"
+        above = f"more than {limit:,} ({variable_of('unconfirmed_core_hours')}) must be confirmed"
+        message = f"this takes about {hours:,.0f} core-hours; {above}: confirm_cost=true, --yes, or yes=True in Python"
         raise CostUnconfirmed([Violation("confirm_cost", False, message, "true")])
 
 

@@ -39,7 +39,7 @@ def extend_experiment(
         Conflict: it is not COMPLETED, the totals add nothing, or its reality is unknown here.
         InvalidSpec: a total is smaller than the present one or above a limit, or a strategy without samples gets
             iterations.
-        CostUnconfirmed: it takes long, and the request does not say that this is meant.
+        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
         LimitReached: too much work is in progress.
     """
     experiment = get_permitting(session, experiment_id, Verb.EXTEND)
@@ -65,7 +65,7 @@ def extend_study(session: Session, study_id: str, extension: ExtensionSpec, admi
         Conflict: none of its experiments is COMPLETED, the totals add nothing to these, or their reality is unknown
             here.
         InvalidSpec: no total is given, or one is above a limit.
-        CostUnconfirmed: it takes long, and the request does not say that this is meant.
+        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
         LimitReached: too much work is in progress.
     """
     study, experiments = get_study_permitting(session, study_id, Verb.EXTEND)

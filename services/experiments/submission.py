@@ -39,7 +39,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
-        CostUnconfirmed: it takes long, and the request does not say that this is meant.
+        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's experiment was deleted.
@@ -71,7 +71,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
-        CostUnconfirmed: it takes long, and the request does not say that this is meant.
+        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's study was deleted.

@@ -57,7 +57,10 @@ def deliver(message: Notification, channel: Channel, webhook: str | None, notify
 
 
 def post(url: str, message: Notification, secret: str | None = None, *, within_s: float = WEBHOOK_S) -> Attempt:
-    """POST the message as JSON. Redirects are not followed, and the body of the answer is not read."""
+    """POST the message as JSON, and wait `within_s` for an answer.
+
+    Redirects are not followed, and the body of the answer is not read.
+    """
     body = message.model_dump_json().encode()
     headers = {"Content-Type": "application/json", "User-Agent": "gaplab", "Gaplab-Notification": message.id}
     if secret:

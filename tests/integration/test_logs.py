@@ -141,13 +141,13 @@ def test_what_is_no_secret_is_left_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("word", ["a", "token", "password-"])
-def test_a_very_long_word_is_looked_through_in_no_time(word: str) -> None:
+def test_the_time_for_a_very_long_word_grows_with_its_length_alone(word: str) -> None:
     said = f"GET /{word * (60_000 // len(word))} 404, GAPLAB_TOKEN={SECRET}"
-    began = time.perf_counter()
+    began = time.process_time()
 
     found = logs.without_secrets(said)
 
-    assert time.perf_counter() - began < 1.0
+    assert time.process_time() - began < 10  # as the square of its length it would be minutes
     assert SECRET not in found
 
 

@@ -52,7 +52,7 @@ def test_thousands_of_core_hours_need_a_yes_without_a_terminal_too(gaplab: Gapla
     refused = gaplab("submit", "-", stdin="{}")
 
     assert refused.code == Exit.INVALID
-    assert "core-hours; above 1,000 (GAPLAB_MAX_UNCONFIRMED_CORE_HOURS), confirm_cost=true or --yes" in refused.err
+    assert "core-hours; more than 1,000 (GAPLAB_MAX_UNCONFIRMED_CORE_HOURS) must be confirmed: confirm" in refused.err
     assert listing.list_studies(sqlite_store).items == ()
     assert gaplab("submit", "-", "--yes", stdin="{}").code == Exit.OK
 

@@ -1,9 +1,9 @@
-import "./fakes.js";
+import { FakeNode } from "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { isFunction, isPhysical, unitsOf, worldsText } from "../../api/dashboard/lib/robots.js";
 
-const { refusal } = await import("../../api/dashboard/views/experiment/actions.js");
+const { actions, refusal } = await import("../../api/dashboard/views/experiment/actions.js");
 const { pastEvents } = await import("../../api/dashboard/views/experiment/event_list.js");
 const { eventText } = await import("../../api/dashboard/views/experiment/event_words.js");
 const { stepText } = await import("../../api/dashboard/views/experiment/branches.js");
@@ -17,6 +17,33 @@ test("an action that a state forbids says what would permit it", () => {
   assert.equal(refusal("extend", { state: "FAILED", progress: { failed: 1 } }), "An experiment that is failed cannot be extended, only one that is completed.");
   assert.equal(refusal("retry", { state: "FAILED", progress: { failed: 1 } }), "");
   assert.equal(refusal("retry", { state: "COMPLETED", progress: { failed: 0 } }), "None of its repetitions has failed, so none can be retried.");
+});
+
+test("an extension whose cost is not confirmed changes nothing, and keeps its dialog", async () => {
+  const dialogs = [];
+  document.body = { append: (dialog) => { dialogs.push(dialog); } };
+  FakeNode.prototype.showModal = () => {};
+  FakeNode.prototype.close = function close() { this.dispatchEvent(new Event("close")); };
+  globalThis.FormData = class { [Symbol.iterator] = () => [["repetitions", "9000"]][Symbol.iterator](); };
+  const refused = { title: "", status: 422, errors: [{ pointer: "confirm_cost", message: "this takes about 1,229 core-hours" }] };
+  globalThis.fetch = () => Promise.resolve(new Response(JSON.stringify(refused), { status: 422 }));
+  const experiment = { state: "COMPLETED", progress: { failed: 0 }, level: false, spec: { iterations: 9, repetitions: 1 } };
+  let loads = 0, closed = 0;
+  const page = { id: "e1", experiment, signal: new AbortController().signal, reload: () => { loads += 1; } };
+  const shown = async (count) => {
+    while (dialogs.length < count) await new Promise((resume) => { setTimeout(resume); });
+    return dialogs.at(-1);
+  };
+
+  actions(page).element.querySelectorAll("button").find(({ textContent }) => textContent.startsWith("Extend")).click();
+  const extension = await shown(1);
+  extension.addEventListener("close", () => { closed += 1; });
+  extension.querySelector("form").dispatchEvent(new Event("submit"));
+  (await shown(2)).close();
+  await new Promise((resume) => { setTimeout(resume); });
+
+  assert.match(extension.textContent, /Nothing was changed/);
+  assert.deepEqual([loads, closed], [0, 0]);
 });
 
 test("events are sentences, and a kind that is newer than the page has its name", () => {

@@ -110,7 +110,7 @@ def test_a_group_of_unequal_parts_leaves_reality_as_the_robot_is() -> None:
     ).reality.parameters
 
 
-def test_a_plain_spec_is_stored_as_before() -> None:
+def test_plain_tunables_are_stored_with_their_names_and_bounds_alone() -> None:
     stored = resolved().model_dump(mode="json")
 
     assert stored["tunables"] == [

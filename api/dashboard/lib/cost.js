@@ -19,7 +19,7 @@ export async function confirmingCost(send, signal) {
     if (!refused) throw error;
     return new Promise((resolve) => {
       const dialog = openDialog({
-        title: "That much?", text: `${refused.message}.`, action: "Compute it all the same",
+        title: "That much?", text: `The service says: ${refused.message}.`, action: "Compute it all the same",
         act: async () => { resolve(await send("?confirm_cost=true")); },
       }, signal);
       dialog.addEventListener("close", () => { resolve(null); });  // after an answer, this does nothing

@@ -36,9 +36,9 @@ export function openDialog({ title, text = "", fields = [], action, danger = fal
     }
     agree.disabled = false;
   };
-  const form = h("form", { onsubmit: submit }, h("h2", { id: "asked" }, title), text ? h("p", {}, text) : null,
+  const form = h("form", { onsubmit: submit }, h("h2", {}, title), text ? h("p", {}, text) : null,
     ...fields.map(labelledField), errors, h("p", { class: "choices" }, agree, back));
-  const dialog = h("dialog", { "aria-labelledby": "asked", onclose: () => { dialog.remove(); } }, form);
+  const dialog = h("dialog", { "aria-label": title, onclose: () => { dialog.remove(); } }, form);
   signal.addEventListener("abort", () => dialog.close());
   document.body.append(dialog);
   dialog.showModal();

@@ -58,7 +58,7 @@ class Readings(Discrepancy):
         return np.asarray(np.where(compared, simulated[..., 1 + early] - real, 0.0) / np.sqrt(count))
 
     def noise(self, measured: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG002 - as many in each sample
-        """Return that of a reading, which is in units of its noise, divided by the number of readings that count."""
+        """Return the variance of one reading, 1 in units of its noise, divided by the number of readings that count."""
         return 1.0 / len(self._early(times_s))
 
     def least_error(self, fitness_error: float) -> float:  # noqa: ARG002 - readings are in units of their noise

@@ -108,7 +108,7 @@ function realityKeys(experiments) {
 const realityKey = ({ kind, engine, parameters, bench }) => canonicalText({ kind, engine, parameters, bench });
 
 /** @param {Experiment} experiment */
-const isHidden = ({ spec }) => !spec.reality.parameters || Object.values(spec.reality.parameters).includes(null);
+const isHidden = ({ spec }) => Object.values(spec.reality.parameters).includes(null);
 
 /**
  * @param {Experiment} experiment

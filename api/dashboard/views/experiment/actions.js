@@ -41,7 +41,8 @@ export const actions = (page) => actionButtons("Actions on this experiment", (ac
  * @param {unknown} [body]
  */
 async function send(page, action, body = undefined) {
-  await confirmingCost((query) => post(`/experiments/${page.id}/${action}${query}`, body), page.signal);
+  const done = await confirmingCost((query) => post(`/experiments/${page.id}/${action}${query}`, body), page.signal);
+  if (!done) throw new Error("Nothing was changed.");
   await page.reload();
 }
 

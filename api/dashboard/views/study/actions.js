@@ -45,7 +45,8 @@ function refusal(study, action) {
  * @param {object} [body]
  */
 async function send(page, action, body) {
-  await confirmingCost((query) => post(`/studies/${page.id}/${action}${query}`, body), page.signal);
+  const done = await confirmingCost((query) => post(`/studies/${page.id}/${action}${query}`, body), page.signal);
+  if (!done) throw new Error("Nothing was changed.");
   await page.reload();
 }
 
