@@ -3,7 +3,7 @@
 import sqlite3
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from functools import cache, wraps
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
@@ -104,19 +104,15 @@ class Store:
 
     def write_at_once(
         self, work: Callable[Concatenate[Session, P], object], /, *args: P.args, **kwargs: P.kwargs
-    ) -> bool:
+    ) -> None:
         """Run `work(session, *args, **kwargs)` in a separate transaction, unless that would wait for another in SQLite.
 
-        Returns:
-            Whether it was run and committed; a database that cannot be used now is no error.
+        A database that cannot be used now is not an error.
         """
-        try:
+        with suppress(StoreUnavailable), database_errors.named():
             self._guard.admit()
-            with database_errors.named(), self._writer(bind=self._hasty) as session, session.begin():
+            with self._writer(bind=self._hasty) as session, session.begin():
                 work(session, *args, **kwargs)
-        except StoreUnavailable:
-            return False
-        return True
 
     def robot_text(self, sha256: str) -> str | None:
         """Return the text of a robot file; None if it is not stored here, or the database cannot be used now."""

@@ -126,9 +126,11 @@ def test_a_step_that_is_delivered_again_is_not_the_one_under_way(store: Store) -
     assert len(stored(store, experiment)[0]) == 2
 
 
+@pytest.mark.dialects
 def test_the_step_under_way_may_be_the_last_of_all(store: Store) -> None:
     experiment = submitted(store, repetitions=1)
     (claim,) = execution.claim(store, "me", 1)
+    submitted(store, repetitions=1, iterations=9)
     deliver(store, claim, 12)
     ask(store, experiment, Verb.PAUSE)
 

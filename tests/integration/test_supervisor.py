@@ -197,3 +197,16 @@ def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_
 
     assert still_held == (claim,)
     assert execution.heartbeat(store, [claim]) == ()
+
+
+def test_what_has_begun_is_never_handed_back_for_what_is_more_urgent(sqlite_store: Store) -> None:
+    usual = submission.submit_experiment(sqlite_store, toy(repetitions=2)).id
+    here = Here(sqlite_store)
+    for _ in range(3):
+        here.step()
+    submission.submit_experiment(sqlite_store, toy(repetitions=1, priority=9))
+
+    here.step()
+
+    attempts = [reading.list_attempts(sqlite_store, usual, number) for number in range(2)]
+    assert [[each.ending for each in attempt] for attempt in attempts] == [[None], [None]]

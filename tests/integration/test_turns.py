@@ -113,6 +113,14 @@ def test_what_waits_for_a_core_gives_way_to_who_has_less(store: Store) -> None:
     assert [each.attempts for each in reading.list_repetitions(store, large)][:4] == [1, 1, 1, 0]
 
 
+def test_one_of_two_gives_way_to_who_has_none(store: Store) -> None:
+    submitted(store, repetitions=2)
+    _, *waiting = execution.claim(store, "me", 2)
+    submitted(store, repetitions=1)
+
+    assert execution.give_way(store, waiting) == tuple(waiting)
+
+
 def test_nobody_gives_way_for_what_would_be_no_fairer(store: Store) -> None:
     submitted(store, repetitions=9)
     submitted(store, repetitions=9)
