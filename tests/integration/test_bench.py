@@ -43,6 +43,7 @@ from gaplab.workers.checkpoints import recorded
 from tests.archiving import exported, imported
 from tests.experiments import same, toy
 
+HOUR = timedelta(hours=1)
 PHYSICAL = {"kind": "physical", "probes": "each"}
 
 
@@ -345,6 +346,34 @@ def test_a_void_measurement_is_asked_for_again(store: Store) -> None:
     assert finish(store, lambda _: pytest.fail("a measurement was asked for twice")) == []
     (after,) = log_of(store, experiment)
     assert all(map(same, after, before))
+
+
+def test_a_void_answer_of_a_paused_experiment_leaves_it_paused(store: Store) -> None:
+    experiment = submit_experiment(store, bench()).id
+    compute(store)
+    (request,) = pending(store)
+    measure(store, request, 0.5)
+    compute(store)
+    lifecycle.ask_experiment(store, experiment, Verb.PAUSE)
+    answer = taking.read_request(store, request.id).answers[0]
+
+    corrections.void(store, answer.id, VoidSpec(reason="the floor was wet"), FREELY)
+
+    assert read_experiment(store, experiment).state is State.PAUSED
+
+
+def test_requests_come_in_pages(store: Store) -> None:
+    submit_experiment(store, bench(repetitions=3))
+    compute(store)
+    with store.transaction() as session:
+        for hours, each in enumerate(session.scalars(select(RequestRow).order_by(RequestRow.id)).all()):
+            each.created_at += hours * HOUR
+
+    first = taking.list_requests(store, RequestFilter(), limit=2)
+    second = taking.list_requests(store, RequestFilter(), limit=2, cursor=first.next)
+
+    assert (*first.items, *second.items) == pending(store)
+    assert (len(second.items), second.next) == (1, None)
 
 
 @pytest.mark.dialects

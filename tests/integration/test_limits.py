@@ -279,7 +279,7 @@ def test_files_that_no_answer_names_have_a_limit_that_frees_itself(store: Store)
     )
     old = update(AttachmentRow).values(created_at=datetime.now(UTC) - UNNAMED_LIVE - timedelta(minutes=1))
     store.write(lambda session: session.execute(old))
-    let_in = api.post("/attachments?name=a", content=b"1234")
+    let_in = api.post("/attachments?name=a", content=b"4321")  # of a greater hash
 
     assert [each.status_code for each in (first, refused, again, let_in)] == [201, 429, 201, 201]
     assert refused.json()["type"] == "urn:gaplab:problem:limit-reached"
