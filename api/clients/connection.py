@@ -82,12 +82,13 @@ class Connection:
             msg = "the token has characters that no token of this service has; check GAPLAB_TOKEN for line breaks"
             raise ServiceUnreachable(msg)
         try:
-            here = httpx2.URL(url).host in LOOPBACK
+            address = httpx2.URL(url)
+            here = address.host in LOOPBACK
             self._http = httpx2.Client(
                 base_url=url,
                 headers={"Authorization": f"Bearer {token}"} if token else {},
                 timeout=timeout_s,
-                verify=_certificates() if not here or url.startswith("https:") else False,
+                verify=not (here and address.scheme == "http") and _certificates(),
                 transport=transport,
                 trust_env=not here,
             )
