@@ -308,6 +308,7 @@ def test_seconds_of_closed_steps_are_taken_back(store: Store) -> None:
             iterations = session.scalars(select(IterationRow.seconds).order_by(IterationRow.number)).all()
             return session.scalars(select(RepetitionRow.seconds)).one(), list(iterations)
 
+    assert min(worked()[1]) >= 0
     with store.transaction() as session:  # as if each took ten seconds
         session.execute(update(IterationRow).values(seconds=10.0))
         session.execute(update(RepetitionRow).values(seconds=40.0))
@@ -440,7 +441,8 @@ def test_a_void_answer_of_a_closed_branch_is_not_answered_again(store: Store) ->
         each for each in asked if (each.iteration, each.kind) == (wanted.iteration, wanted.kind) and each.answers
     )
     assert closed.genome != wanted.genome
-    corrections.void(store, closed.answers[0].id, VoidSpec(reason="the robot slipped"), FREELY)
+    told = corrections.void(store, closed.answers[0].id, VoidSpec(reason="the robot slipped"), FREELY).answer
+    assert (told.steps, told.measurements) == (0, 0)
     (before,) = log_of(store, experiment)
 
     with pytest.raises(Conflict, match="a correction closed its branch"):

@@ -246,6 +246,8 @@ def test_a_repetition_may_be_handed_back_any_number_of_times(store: Store) -> No
     (found,) = reading.list_repetitions(store, experiment)
     assert (found.state, found.attempts, found.error) == (State.QUEUED, 0, None)
     assert not execution.hand_back(store, claim)
+    assert not execution.record(store, claim, next(some_log()))
+    assert reading.list_repetitions(store, experiment) == (found,)
 
 
 def test_the_experiment_is_completed_with_its_last_repetition(store: Store) -> None:

@@ -523,7 +523,13 @@ def test_a_permit_is_for_one_measurement_and_comes_after_its_beginning_is_stored
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     permitted: list[Any] = []
-    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: permitted.append(keys)))
+    ends: list[float] = []
+
+    def renew(keys: Any, until: float) -> None:
+        permitted.append(keys)
+        ends.append(until)
+
+    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=renew))
     held, moving = measuring(handle)
 
     def note(_: Any, claims: Any) -> Any:
@@ -539,6 +545,7 @@ def test_a_permit_is_for_one_measurement_and_comes_after_its_beginning_is_stored
         held._note_measuring()
 
     assert permitted == [[], "noted", [(7, 1, 3)], [], [], "noted", [(7, 1, 8)], []]
+    assert max(ends) < held._renewed + held._lease_s, "a robot moves after its lease"
 
 
 def measuring(handle: Any) -> "tuple[Repetitions, LastAnswers]":

@@ -18,6 +18,7 @@ from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.schemas.lifecycle import Ending
 from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution, supervisors
+from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
 from tests.experiments import toy
@@ -51,6 +52,19 @@ while True:
     pulse.beat()
     time.sleep(0.1)
 """
+
+
+def test_a_supervisor_gives_its_first_sign_of_life_at_once_and_the_next_after_a_while() -> None:
+    heard, told = os.pipe()
+    pulse = PulsePipe(told)
+
+    for _ in range(3):
+        pulse.beat()
+    pulse.name("me")
+    os.close(told)
+
+    assert os.read(heard, 100) == b".\nome\n"
+    os.close(heard)
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from sqlalchemy import text
 from gaplab.schemas.schedule import ScheduleChange
 from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.running import execution, turns
+from gaplab.services.running.versions import provenance as present_provenance
 from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 
@@ -119,6 +120,19 @@ def test_one_of_two_gives_way_to_who_has_none(store: Store) -> None:
     submitted(store, repetitions=1)
 
     assert execution.give_way(store, waiting) == tuple(waiting)
+
+
+def test_nothing_gives_way_to_an_experiment_that_this_supervisor_may_not_run(store: Store) -> None:
+    elsewhere = submitted(store, repetitions=2)
+    other = present_provenance().model_copy(update={"architecture": "another"})
+    for claim in execution.claim(store, "them", 2, other):
+        execution.hand_back(store, claim)
+    submitted(store, repetitions=9)
+    _, *waiting = execution.claim(store, "me", 4)
+
+    assert execution.give_way(store, waiting) == ()
+    assert execution.give_way(store, waiting, other) == tuple(waiting)
+    assert {each.attempts for each in reading.list_repetitions(store, elsewhere)} == {0}
 
 
 def test_nobody_gives_way_for_what_would_be_no_fairer(store: Store) -> None:

@@ -333,6 +333,8 @@ def test_default_bounds_have_the_robots_own_value_inside() -> None:
     assert tunable_of("joint_damping").bounds(WORLD) == (0.0, 0.5)
     assert tunable_of("joint_damping").bounds(damped) == (0.0, pytest.approx(1.6))
     assert tunable_of("mass(trunk, as=value)").bounds(WORLD) == pytest.approx((0.7 * 1.5, 1.3 * 1.5))
+    assert tunable_of("max_torque(*, as=value)").bounds(WORLD) == pytest.approx((0.1 * 8.0, 1.5 * 8.0))
+    assert tunable_of("kp(*, as=value)").bounds(arm()) == pytest.approx((0.5 * 50.0, 1.5 * 50.0))
 
 
 def test_an_engine_need_not_know_of_noise_but_of_all_else() -> None:
