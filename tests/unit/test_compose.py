@@ -1,5 +1,8 @@
 """The containers: their passwords and settings."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -42,3 +45,18 @@ def test_optional_settings_reach_every_service_of_gaplab_and_the_host_stays(serv
     for name in OF_GAPLAB:
         assert services[name]["env_file"] == [{"path": "gaplab.env", "required": False}]
     assert services["api"]["environment"]["GAPLAB_HOST"] == "0.0.0.0"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "told"),
+    [(["check"], 1, "the database cannot be used now"), ([], 2, "usage: "), (["check", "now"], 2, "usage: ")],
+)
+def test_the_check_of_a_worker_says_that_its_database_cannot_be_used(
+    services: Any, tmp_path: Path, arguments: list[str], status: int, told: str
+) -> None:
+    command = [sys.executable, *services["worker"]["healthcheck"]["test"][2:-1], *arguments]
+    environment = os.environ | {"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'gone.db'}"}
+
+    done = subprocess.run(command, cwd=FILE.parent, env=environment, capture_output=True, text=True, check=False)
+
+    assert (done.returncode, done.stderr.startswith(told)) == (status, True), done.stderr
