@@ -114,18 +114,18 @@ class Bodies:
     def friction(self, head: int) -> float | None:
         """Return MuJoCo's coefficient of a body on the ground; None if it touches nothing.
 
-        MuJoCo takes the larger dimension and the larger friction of shape and ground. Dimension 1 has no friction.
+        MuJoCo takes the dimension and the friction of the shape or the ground, whichever has the higher priority, and
+        of equal ones the larger. Dimension 1 has no friction.
         """
         model = self.model
         geoms = [at for at in range(model.ngeom) if model.body_weldid[model.geom_bodyid[at]] == head]
         touching = [at for at in geoms if self._shapes.collides(at)]
-        rough = [at for at in touching if max(int(model.geom_condim[at]), self._shapes.condim) > 1]
-        found = {float(model.geom_friction[at, 0]) if at in rough else 0.0 for at in touching}
+        found = {self._shapes.on_the_ground(at) for at in touching}
         if len(found) > 1:
             self._notes.lose(
                 "shapes of different friction on one body, of which the largest counts: {}", self.name(head)
             )
-        return max(self._shapes.friction if rough else 0.0, *found) if found else None
+        return max(found, default=None)
 
     def _frame(self, head: int) -> Frame:
         model, data = self.model, self._data

@@ -37,17 +37,14 @@ class Shapes:
     """Shapes of the geoms of a model; the hull of a mesh is computed once.
 
     Attributes:
-        friction: coefficient of the file's ground; 0 if the file has no ground.
-        condim: MuJoCo's dimension of contacts of the file's ground: 1 has no friction, and is also that of no ground.
+        planes: numbers of the geoms that are the file's ground.
     """
 
     def __init__(self, model: Any, options: ImportOptions, notes: Notes) -> None:  # noqa: ANN401
         self._model, self._options, self._notes = model, options, notes
         self._hulls: dict[int, Hull | None] = {}
-        planes = [at for at in range(model.ngeom) if model.geom_bodyid[at] == 0 and self._kind(at) == "plane"]
-        self._grounds = [(int(model.geom_contype[at]), int(model.geom_conaffinity[at])) for at in planes]
-        self.friction = max((float(model.geom_friction[at, 0]) for at in planes), default=0.0)
-        self.condim = max((int(model.geom_condim[at]) for at in planes), default=1)
+        self.planes = [at for at in range(model.ngeom) if model.geom_bodyid[at] == 0 and self._kind(at) == "plane"]
+        self._grounds = [(int(model.geom_contype[at]), int(model.geom_conaffinity[at])) for at in self.planes]
 
     def collides(self, geom: int) -> bool:
         """Return whether a geom collides with the file's ground, or with anything, if the file has no ground."""
@@ -55,6 +52,16 @@ class Shapes:
         if not self._grounds:
             return bool(kind or with_kinds)
         return any(kind & ground[1] or with_kinds & ground[0] for ground in self._grounds)
+
+    def on_the_ground(self, geom: int) -> float:
+        """Return the coefficient of MuJoCo's contact of a geom with the file's ground, its own if there is none."""
+        model = self._model
+        able = [geom, *self.planes]
+        highest = max(int(model.geom_priority[at]) for at in able)
+        leading = [at for at in able if int(model.geom_priority[at]) == highest]
+        if max(int(model.geom_condim[at]) for at in leading) == 1:
+            return 0.0
+        return max(float(model.geom_friction[at, 0]) for at in leading)
 
     def part(self, geom: int, center: FloatArray, turn: Rotation) -> Part | None:
         """Return the part of a geom; None of one that a World cannot have.

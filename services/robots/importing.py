@@ -18,12 +18,12 @@ from gaplab.schemas.robots import RobotSource
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
 from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot_file
 from gaplab.services.core.world import Body, Joint, Material, Surfaces, World
-from gaplab.services.robots.bodies import Bodies, joint_name
+from gaplab.services.robots.bodies import FREE, Bodies, joint_name
 from gaplab.services.robots.motors import with_motors, with_swings
 from gaplab.services.robots.notes import Notes
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.poses import base_pose, start_angles, with_starts
-from gaplab.services.robots.reading import Source, body_name, read_source
+from gaplab.services.robots.reading import Source, body_name, mujoco_library, read_source
 from gaplab.services.robots.xml import decoded
 
 URDF_STEP_S = 1 / 240
@@ -114,7 +114,7 @@ def _world(source: Source, bodies: Bodies, options: ImportOptions, notes: Notes)
     _note_losses(source, notes)
     qpos = start_angles(source, options, notes)
     joints = with_starts([bodies.joint(head) for head in bodies.heads[1:]], source, qpos, options, notes)
-    joints = with_swings(with_motors(joints, source, options, notes))
+    joints = with_swings(with_motors(joints, source, options, notes), notes)
     found, material, surfaces = _surfaces(source, bodies, options, notes)
     height_m, turn = base_pose(bodies, found, joints, qpos, fixed=fixed)
     if not fixed and source.is_urdf:
@@ -127,7 +127,7 @@ def _world(source: Source, bodies: Bodies, options: ImportOptions, notes: Notes)
         surfaces=surfaces,
         start_height_m=height_m,
         start_turn=turn,
-        gravity_m_s2=abs(float(model.opt.gravity[2])),
+        gravity_m_s2=0.0 if _flags(model, "disable") >= {"gravity"} else abs(float(model.opt.gravity[2])),
         time_step_s=options.time_step_s or usual_step_s,
         fixed=fixed,
         observed=options.observed or (_last(joints) if fixed else ""),
@@ -172,7 +172,8 @@ def _note_losses(source: Source, notes: Notes) -> None:
     notes.lose("collisions of the robot's bodies with each other are lost: bodies touch the ground alone")
     if source.is_urdf:
         return
-    notes.lose("soft contacts and limits (solref, solimp, margin, condim, priority, cone) are lost: contacts are rigid")
+    notes.lose("soft contacts and limits (solref, solimp, margin, condim, cone) are lost: contacts are rigid")
+    _note_flags(model, notes)
     _note_forces(model, notes)
     for field, what in (("nsensor", "sensors"), ("nexclude", "excluded contacts"), ("npair", "pairs of contacts")):
         if count := int(getattr(model, field, 0)):
@@ -189,6 +190,7 @@ def _note_forces(model: Any, notes: Notes) -> None:  # noqa: ANN401
     bodies = [body_name(model, at) for at in range(model.nbody)]
     joints = [joint_name(model, at) for at in range(model.njnt)]
     owners = [joints[joint] for joint in model.dof_jntid]
+    of_the_base = model.jnt_type[model.dof_jntid] == FREE
     springs = np.logical_or(model.jnt_stiffness, model.jnt_stiffnesspoly.any(axis=1))
     for line, names, has in (
         ("springs of joints are lost: {}", joints, springs),
@@ -198,6 +200,24 @@ def _note_forces(model: Any, notes: Notes) -> None:  # noqa: ANN401
     ):
         if found := list(compress(names, has)):
             notes.lose(line, *found)
+    for field, what in (("damping", "damping"), ("frictionloss", "dry friction"), ("armature", "armature")):
+        if largest := float(np.max(getattr(model, f"dof_{field}")[of_the_base], initial=0.0)):
+            notes.lose(f"{what} {largest:g} of the base's free joint is lost")
+
+
+def _note_flags(model: Any, notes: Notes) -> None:  # noqa: ANN401
+    for what in ("disable", "enable"):
+        if names := sorted(_flags(model, what) - {"gravity"}):
+            notes.lose(f"flags that {what} a part of MuJoCo are lost: {{}}", *names)
+
+
+def _flags(model: Any, what: str) -> set[str]:  # noqa: ANN401
+    """Return the names of the parts of MuJoCo that a file disables or enables."""
+    kind, start = {"disable": ("mjtDisableBit", "mjDSBL_"), "enable": ("mjtEnableBit", "mjENBL_")}[what]
+    bits, set_ = getattr(mujoco_library(), kind).__members__, int(getattr(model.opt, f"{what}flags"))
+    return {
+        name.removeprefix(start).lower() for name, bit in bits.items() if name.startswith(start) and set_ & int(bit)
+    }
 
 
 def _masses(source: Source, bodies: Bodies) -> Iterator[MassRow]:

@@ -37,11 +37,18 @@ def hold(base: Any, notes: Notes) -> Mapping[str, float]:  # noqa: ANN401
     return {base.name or "body1": before}
 
 
+def without_mass(body: Any) -> None:  # noqa: ANN401
+    """Let a body of a spec have neither mass nor inertia, whatever its shapes are."""
+    _state(body)
+    body.mass = 0.0
+    _change(body, 0.0)
+
+
 def mend(spec: Any, notes: Notes, moved: set[str], *, allowed: bool) -> Mapping[str, float]:  # noqa: ANN401
     """Replace what no rigid body has, or refuse it.
 
     Moments that break the triangle inequality become their mean, as by MuJoCo's `balanceinertia`. Moments of zero
-    become those of the body's shapes at uniform density.
+    become those of the body's shapes at uniform density, and a mass of zero is that of the shapes at 1000 kg/m³.
 
     Args:
         spec: MuJoCo's `MjSpec`; its bodies are changed.
@@ -125,10 +132,12 @@ def _state(body: Any) -> None:  # noqa: ANN401
 
 def _fill(spec: Any, empty: list[tuple[int, Any, str]], notes: Notes) -> None:  # noqa: ANN401
     """Give bodies the inertia of their shapes: a copy of the spec is compiled, in which MuJoCo computes it."""
-    copy = spec.copy()
+    copy, shaped = spec.copy(), set[int]()
     for at, _, _ in empty:
         twin = copy.bodies[at]
+        _change(twin, 1.0)  # MuJoCo refuses the moments of zero even where it does not use them
         if any(map(_is_heavy, twin.geoms)):
+            shaped.add(at)
             twin.explicitinertial, twin.ipos = False, [np.nan] * 3  # MuJoCo computes what has no centre of mass
         else:
             _state(twin)
@@ -139,7 +148,7 @@ def _fill(spec: Any, empty: list[tuple[int, Any, str]], notes: Notes) -> None:  
         found = model.body(at)
         before = body.mass
         _state(body)
-        body.mass = max(before, LEAST_KG)
+        body.mass = float(found.mass[0]) if before <= 0 and at in shaped else max(before, LEAST_KG)
         moments = found.inertia * body.mass / float(found.mass[0])
         _change(body, *moments.tolist())
         body.iquat = found.iquat

@@ -9,10 +9,11 @@ import numpy as np
 
 from gaplab.services.core.world import Joint, Motor, PDMotor
 from gaplab.services.robots.bodies import joint_name
+from gaplab.services.robots.efforts import PLACEHOLDER, effort, needed_torque
 from gaplab.services.robots.joint_inertias import joint_inertias
 from gaplab.services.robots.notes import Notes, listed
 from gaplab.services.robots.options import ImportOptions
-from gaplab.services.robots.reading import Source, mujoco_library
+from gaplab.services.robots.reading import Source
 
 REACH_RAD, REACH_M = 0.35, 0.02
 """Error at which a motor whose gain is computed has its largest torque: a share of a usual step of a leg."""
@@ -26,6 +27,9 @@ SWING_RAD, SWING_M = 0.5, 0.02
 BOUNDLESS_RAD = np.pi
 """Error for which a motor without a limit has torque enough, where the joint has no limits either."""
 
+TURNS_RAD = 4 * np.pi
+"""Limit of a hinge beyond which a file may mean degrees."""
+
 _OPTIONS = {"servo": ("position_gain",), "position": ("kp", "kd"), "velocity": ("kp", "kd"), "torque": ()}
 """Options that the kinds of motors use, but for `max_torque`, which all use; kd of `velocity` may be computed of kp."""
 
@@ -37,6 +41,9 @@ def with_motors(joints: list[Joint], source: Source, options: ImportOptions, not
     """Return the joints with their motors: the file's, unless the options say which."""
     if options.motor is None and not source.is_urdf:
         return _of_the_file(joints, source, options, notes)
+    if not joints:
+        notes.refuse("no joint of the file moves, and a controller moves joints")
+        return joints
     chosen = [joint.name for joint in joints if fnmatchcase(joint.name, options.motored)]
     if not chosen:
         notes.refuse(f"no joint is called like {options.motored!r}; joints: {listed((j.name for j in joints), 30)}")
@@ -58,10 +65,16 @@ def _driven(
     options: ImportOptions,
     notes: Notes,
 ) -> Joint:
-    torque = options.max_torque or _effort(source.model, joint.name)
+    torque = options.max_torque or effort(source.model, joint.name)
     unit = "N" if joint.slides else "N·m"
+    needed = needed_torque(source.model, joint.name)
+    if torque is not None and options.max_torque is None and torque > PLACEHOLDER * needed:
+        line = f"{torque:g} {unit} is more than {PLACEHOLDER:g} times what the robot's weight needs, and is taken for"
+        notes.lose(
+            f"{line} the largest effort, from which gains follow; `-s max_torque=` sets another: {{}}", joint.name
+        )
     if torque is None:
-        torque = _needed_torque(source.model, joint.name)
+        torque = needed
         notes.lose(f"{joint.name} has no largest effort: {torque:.3g} {unit}, of the robot's weight")
     if kind == "servo":
         speed = source.speeds.get(joint.name, 20.0)
@@ -76,32 +89,6 @@ def _driven(
     if kind == "velocity":
         return replace(joint, motor=PDMotor("velocity", torque, kd=kd), swing=source.speeds.get(joint.name, 5.0) / 2)
     return replace(joint, motor=PDMotor("torque", torque), swing=torque / 2)
-
-
-def _effort(model: Any, name: str) -> float | None:  # noqa: ANN401
-    at = _number(model, name)
-    largest = float(np.abs(model.jnt_actfrcrange[at]).max())
-    return largest if model.jnt_actfrclimited[at] and largest > 0 else None
-
-
-def _needed_torque(model: Any, name: str) -> float:  # noqa: ANN401
-    """Return half the torque that bears the robot at the farthest point of the limb, as legs share the weight."""
-    mujoco = mujoco_library()
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    at = _number(model, name)
-    moved = {int(model.jnt_bodyid[at])}
-    for body in range(model.nbody):
-        if int(model.body_parentid[body]) in moved:
-            moved.add(body)
-    geoms = [geom for geom in range(model.ngeom) if int(model.geom_bodyid[geom]) in moved]
-    reaches = [np.linalg.norm(data.geom_xpos[geom] - data.xanchor[at]) + model.geom_rbound[geom] for geom in geoms]
-    weight = float(model.body_mass.sum()) * 9.81
-    return weight if model.jnt_type[at] == 2 else 0.5 * weight * float(max(reaches, default=0.1))
-
-
-def _number(model: Any, name: str) -> int:  # noqa: ANN401
-    return next(at for at in range(model.njnt) if joint_name(model, at) == name)
 
 
 def _of_the_file(joints: list[Joint], source: Source, options: ImportOptions, notes: Notes) -> list[Joint]:
@@ -175,7 +162,7 @@ def _motor(
     kd = gear * gear * damping if kind == "torque" else options.kd or gear * gear * damping
     limit = options.max_torque or _limit(model, at, joint, gear, gain)
     if limit is None:
-        limit = _needed_torque(model, joint.name) if kind == "torque" else _unlimited(joint, kp or kd, kind)
+        limit = needed_torque(model, joint.name) if kind == "torque" else _unlimited(joint, kp or kd, kind)
         why = "of the robot's weight" if kind == "torque" else "which is more than it needs"
         notes.lose(f"actuator {name} has no largest torque: {limit:.4g} {'N' if joint.slides else 'N·m'}, {why}")
     motor = PDMotor(kind, limit, kp, kd)  # type: ignore[arg-type]
@@ -216,8 +203,8 @@ def _limit(model: Any, at: int, joint: Joint, gear: float, gain: float) -> float
         found.append(abs(gear) * float(np.abs(model.actuator_forcerange[at]).max()))
     if model.actuator_ctrllimited[at] and not model.actuator_biasprm[at].any():
         found.append(abs(gear * gain) * float(np.abs(model.actuator_ctrlrange[at]).max()))
-    if (effort := _effort(model, joint.name)) is not None:
-        found.append(effort)
+    if (largest := effort(model, joint.name)) is not None:
+        found.append(largest)
     return min(found, default=None)
 
 
@@ -226,11 +213,15 @@ def _unlimited(joint: Joint, gain: float, kind: str) -> float:
     return abs(gain) * max(upper - lower, 1.0) * (1 if kind == "position" else 20)
 
 
-def with_swings(joints: list[Joint]) -> list[Joint]:
+def with_swings(joints: list[Joint], notes: Notes) -> list[Joint]:
     """Return the joints with the usual movement of their position motors.
 
     It is 0.5 rad or 0.02 m, but at most the way to the nearer limit, and at least a tenth of the range.
     """
+    if turning := [each for each in joints if not each.slides and max(map(abs, each.limits or (0.0,))) > TURNS_RAD]:
+        largest = max(max(map(abs, each.limits or ())) for each in turning)
+        line = f"limits up to {largest:g} rad, {largest / (2 * np.pi):.0f} turns, are taken as they are, not as degrees"
+        notes.lose(f"{line}: {{}}", *(each.name for each in turning))
     found = []
     for joint in joints:
         follows = getattr(joint.motor, "follows", "position")

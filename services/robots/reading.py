@@ -11,7 +11,7 @@ from typing import Any
 from gaplab.services.core.errors import EngineUnavailable, InvalidRobot
 from gaplab.services.engines.mujoco.logs import unlogged
 from gaplab.services.robots.keyframes import Keyframe, take_keyframes
-from gaplab.services.robots.mending import hold, mend
+from gaplab.services.robots.mending import hold, mend, without_mass
 from gaplab.services.robots.notes import Notes, listed
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.urdf import read_urdf
@@ -75,7 +75,10 @@ def _read(mujoco: Any, file: Path, text: str, options: ImportOptions, notes: Not
     if is_urdf:
         urdf = read_urdf(file, text, options, notes)
         spec = mujoco.MjSpec.from_string(urdf.text, assets=urdf.assets or None)
-        source = Source(None, is_urdf, urdf.name, urdf.masses_kg, urdf.speeds, fixed=options.fixed)
+        for body in spec.bodies:
+            if body.name in urdf.massless:
+                without_mass(body)
+        source = Source(None, is_urdf, urdf.name, urdf.masses_kg, urdf.speeds, options.fixed or urdf.fixed)
     else:
         spec = mujoco.MjSpec.from_file(str(file))
         keyframes = take_keyframes(spec, notes, with_sensors=bool(options.lock))
@@ -89,7 +92,7 @@ def _compiled(spec: Any, options: ImportOptions, notes: Notes, source: Source) -
     spec.compiler.fusestatic = False
     root = _root(spec, notes)
     notes.check()
-    fixed, replaced = options.fixed, dict[str, float]()
+    fixed, replaced = source.fixed, dict[str, float]()
     if not root.joints:
         fixed = fixed or not source.is_urdf
         root.add_freejoint()
@@ -100,7 +103,9 @@ def _compiled(spec: Any, options: ImportOptions, notes: Notes, source: Source) -
     notes.check()
     model = spec.compile()
     compiled = {body_name(model, at): float(model.body_mass[at]) for at in range(1, model.nbody)}
-    return replace(source, model=model, masses_kg=source.masses_kg or compiled | replaced, fixed=fixed)
+    return replace(
+        source, model=model, masses_kg=source.masses_kg if source.is_urdf else compiled | replaced, fixed=fixed
+    )
 
 
 def _root(spec: Any, notes: Notes) -> Any:  # noqa: ANN401

@@ -15,9 +15,10 @@ from lxml import etree
 
 from gaplab.services.robots.notes import Notes
 from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.urdf_meaning import complete_limits, refuse_xacro, without_the_scene
 from gaplab.services.robots.urdf_structure import check_structure
 from gaplab.services.robots.urdf_values import check_values
-from gaplab.services.robots.xml import Element, child, tree
+from gaplab.services.robots.xml import Element, child, decoded, tree
 
 _LOST = {
     "transmission": "transmissions are lost, a motor moves its joint directly; of {}",
@@ -39,15 +40,19 @@ class Urdf:
         text: URDF with absolute paths of meshes.
         assets: meshes that were converted, by name.
         masses_kg: masses of the links that have one.
+        massless: links without <inertial>, which have no mass.
         speeds: largest speed of each joint that has one, rad/s or m/s.
         name: name of the robot in the file.
+        fixed: whether the file says that the base never moves.
     """
 
     text: str
     assets: dict[str, bytes]
     masses_kg: dict[str, float]
+    massless: list[str]
     speeds: dict[str, float]
     name: str
+    fixed: bool
 
 
 def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Urdf:
@@ -57,16 +62,21 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
         InvalidRobot: a name, a link or a number is wrong, or a mesh is missing; with every reason.
     """
     root = tree(text)
+    refuse_xacro(root, notes)
+    notes.check()
     check_structure(root, notes)
     check_values(root, notes)
     notes.check()
     _lock(root, options.lock, notes)
+    is_held = without_the_scene(root, notes)
+    complete_limits(root, notes)
     _refuse(root, notes)
     _note_losses(root, notes)
     if not options.visuals:
-        for link in root.iter("link"):
-            for visual in link.findall("visual"):
-                link.remove(visual)
+        for visual in list(root.iterfind("link/visual")):
+            lines = etree.Comment("\n" * etree.tostring(visual, with_tail=False).count(b"\n"))
+            lines.tail = visual.tail  # so that MuJoCo's errors name the lines of the file
+            visual.getparent().replace(visual, lines)
     assets = dict(_resolve_meshes(root, file, notes))
     notes.check()
     compiler = child(child(root, "mujoco"), "compiler")
@@ -74,11 +84,13 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
     compiler.set("strippath", "false")
     masses = {_name(link): _mass_kg(link) for link in root.iter("link")}
     return Urdf(
-        text=etree.tostring(root, encoding="unicode"),
+        text="\n" * (root.sourceline - 1) + etree.tostring(root, encoding="unicode"),
         assets=assets,
         masses_kg={name: mass for name, mass in masses.items() if mass is not None},
+        massless=[_name(link) for link in root.iter("link") if _mass_kg(link) is None],
         speeds=dict(_speeds(root)),
         name=_name(root),
+        fixed=is_held,
     )
 
 
@@ -105,10 +117,11 @@ def _note_losses(root: Element, notes: Notes) -> None:
         owners = [_name(found) or _name(owner) for owner in root.iter() for found in owner.findall(tag)]
         if owners:
             notes.lose(line, *owners)
-    massless = [_name(link) for link in root.findall("link") if _mass_kg(link) is None]
+    if foreign := list(dict.fromkeys(str(each.tag) for each in root.iter() if ":" in str(each.tag))):
+        notes.lose("elements of extensions are lost: {}", *foreign)
     shaped = [_name(link) for link in root.findall("link") if link.find("collision") is not None]
-    if guessed := [name for name in massless if name in shaped]:
-        notes.lose("{}: without <inertial>, so mass and inertia are of the shapes at 1000 kg/m³", *guessed)
+    if weightless := [_name(link) for link in root.findall("link") if link.find("inertial") is None]:
+        notes.lose("without <inertial>, so without a mass of their own: {}", *(n for n in weightless if n in shaped))
 
 
 def _speeds(root: Element) -> Iterator[tuple[str, float]]:
@@ -126,7 +139,11 @@ def _resolve_meshes(root: Element, file: Path, notes: Notes) -> Iterator[tuple[s
         path = find_mesh(given, file.absolute().parent)
         if path is None:
             notes.refuse(f"mesh {given!r} was not found beside {file.name} or in a folder above it")
-        elif path.suffix.lower() == ".dae":
+            continue
+        package = given.rpartition("://")[2].partition("/")[0] if given.startswith("package:") else ""
+        if package and package not in path.parts and package != _package(path):
+            notes.lose(f"no folder is called {package}: its meshes are those of {path.parent}")
+        if path.suffix.lower() == ".dae":
             is_new = path not in converted
             name = converted.setdefault(path, f"{len(converted)}_{path.stem}.stl")  # stems may be the same
             mesh.set("filename", name)
@@ -146,9 +163,19 @@ def find_mesh(given: str, folder: Path) -> Path | None:
     scheme, _, rest = given.rpartition("://")
     if scheme == "file":
         return Path(rest) if Path(rest).is_file() else None
-    names = [rest, rest.partition("/")[2]] if scheme else [rest]
-    folders = [folder, *folder.parents] if scheme else [folder]
-    return next((here / name for here in folders for name in names if name and (here / name).is_file()), None)
+    if not scheme:
+        return folder / given if given and (folder / given).is_file() else None
+    folders, (package, _, inside) = [folder, *folder.parents], rest.partition("/")
+    named = [here / rest for here in folders]
+    stated = [here / inside for here in folders if _package(here / inside) == package]
+    renamed = [here / inside for here in folders if _package(here / inside) in {None, package}]
+    return next((each for each in (*named, *stated, *renamed) if inside and each.is_file()), None)
+
+
+def _package(file: Path) -> str | None:
+    """Return the name of the ROS package of a file, as the nearest `package.xml` above it says; None without one."""
+    found = next((each / "package.xml" for each in file.parents if (each / "package.xml").is_file()), None)
+    return None if found is None else str(tree(decoded(found.read_bytes())).findtext("name", "")).strip()
 
 
 def _converted(path: Path, notes: Notes) -> bytes:

@@ -17,6 +17,10 @@ def check_structure(root: Element, notes: Notes) -> None:
     links, joints = root.findall("link"), root.findall("joint")
     for elements in (links, joints):
         _check_names(elements, notes)
+    for inertial in root.iterfind("link/inertial"):
+        for tag in ("mass", "inertia"):
+            if inertial.find(tag) is None:
+                notes.refuse(f"line {inertial.sourceline}: link {inertial.getparent().get('name', '')}: no <{tag}>")
     names, carried = list(dict.fromkeys(filter(None, (link.get("name") for link in links)))), dict[str, Element]()
     for joint in joints:
         kind = joint.get("type")

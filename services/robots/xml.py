@@ -1,6 +1,7 @@
 """XML that keeps its comments, its namespaces and its ends of lines while single values change."""
 
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -16,7 +17,9 @@ _ENCODING = re.compile(r"""\A(\s*<\?xml[^>]*?\bencoding\s*=\s*["'])(?!utf-8["'])
 
 
 def decoded(content: bytes) -> str:
-    """Return a text in UTF-8, or else in Latin-1, which every file is in."""
+    """Return a text in UTF-8, in UTF-16 with its mark, or else in Latin-1, which every file is in."""
+    if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        return content.decode("utf-16")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -53,12 +56,19 @@ class Document:
 def tree(text: str) -> Element:
     """Return the root of an XML text, with comments; no file is read, and nothing is fetched.
 
+    A prefix need not be declared: ROS does not ask for it.
+
     Raises:
         SyntaxError: it is no XML; the message has the line.
     """
     text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)  # some files declare a version of XML that does not exist
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
-    return etree.fromstring(text.encode(), parser)
+    try:
+        return etree.fromstring(text.encode(), parser)
+    except etree.XMLSyntaxError:
+        if any(each.type != etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE for each in parser.error_log):
+            raise
+        return etree.fromstring(text.encode(), etree.XMLParser(resolve_entities=False, no_network=True, recover=True))
 
 
 def child(parent: Element, tag: str) -> Element:

@@ -134,7 +134,7 @@ def urdf(tmp_path: Path, *, base: str = "", kind: str = "fixed", **options: Any)
     return import_robot(tmp_path / "arm.urdf", ImportOptions(**options)).robot
 
 
-@pytest.mark.parametrize("base", ["", VISUAL])
+@pytest.mark.parametrize("base", ["", VISUAL, COLLISION])
 @pytest.mark.parametrize("visuals", [False, True])
 def test_a_root_link_without_inertial_is_no_reason_with_fixed(tmp_path: Path, base: str, visuals: bool) -> None:
     robot = urdf(tmp_path, base=base, fixed=True, visuals=visuals)
@@ -142,11 +142,6 @@ def test_a_root_link_without_inertial_is_no_reason_with_fixed(tmp_path: Path, ba
     assert [body.mass_kg for body in robot.world.bodies] == [1.0, 1.0]
     with pytest.raises(InvalidRobot, match=r"base moves, but has mass 0 kg .*; --mend replaces it"):
         urdf(tmp_path, base=base)
-
-
-def test_a_root_link_has_the_mass_of_its_shapes_if_it_has_any(tmp_path: Path) -> None:
-    assert urdf(tmp_path, base=COLLISION, fixed=True).world.bodies[0].mass_kg == pytest.approx(1.0)
-    assert urdf(tmp_path, base=COLLISION, fixed=True).world.bodies[0].inertia.moments_kg_m2[0] < 0.01
 
 
 def test_a_moving_link_without_inertial_is_mended_or_refused_by_name(tmp_path: Path) -> None:
