@@ -11,7 +11,17 @@ from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.traces import Trace
 
 COLUMNS = ("time_s", "x", "y", "z", "qx", "qy", "qz", "qw")
-"""Columns of a trace: seconds on a clock of its own, metres, and a quaternion; more columns do not matter."""
+"""Columns of a trace: seconds on a clock of its own, metres, and a quaternion; more columns do not matter.
+
+A heading may state another unit: `x [mm]`.
+"""
+
+_UNITS = {"time_s": ("", "s", "ms")} | dict.fromkeys("xyz", ("", "m", "cm", "mm"))
+_UNITS |= dict.fromkeys(COLUMNS[4:], ("", "1"))
+"""Units that a heading may state, by column; without one, seconds and metres."""
+
+_SHARES = {"": 1.0, "1": 1.0, "s": 1.0, "ms": 1000.0, "m": 1.0, "cm": 100.0, "mm": 1000.0}
+"""How many of a unit are a second or a metre."""
 
 MOST_LINES = 500_000
 """Most lines of a trace: 500 s at a kilohertz."""
@@ -39,17 +49,35 @@ def read_trace(text: str, pointer: str) -> Trace:
         raise InvalidSpec([Violation(pointer, f"{len(lines):,} lines", message, f"at most {MOST_LINES:,}")])
     rows = rows_of(lines)
     header = next(rows, CsvRow(1, []))
-    names = [heading.partition("[")[0].strip() for heading in header.cells]
+    names, units = zip(*map(_named, header.cells or [""]), strict=True)
     if missing := [name for name in COLUMNS if names.count(name) != 1]:
         message = header.error or f"the trace needs one column each of {', '.join(missing)}"
         found = first_of(lines)[:200]
         raise InvalidSpec([Violation(pointer, found, f"line {header.line}: {message}", ", ".join(COLUMNS))])
-    numbers, errors = _table(rows, [names.index(name) for name in COLUMNS])
-    errors += [] if errors else _nonsense(numbers)
+    places = [names.index(name) for name in COLUMNS]
+    numbers, errors = _table(rows, places)
+    errors = [*_unknown(header.line, [units[place] for place in places]), *errors]
+    if not errors:
+        numbers = [[value / _SHARES[units[place]] for value, place in zip(row, places, strict=True)] for row in numbers]
+        errors += _nonsense(numbers)
     if errors:
         raise InvalidSpec([Violation(pointer, None, message) for message in errors[:MOST_ERRORS]])
     table = np.array(numbers)
     return Trace(frozen(table[:, 0]), frozen(table[:, 1:4]), frozen(table[:, 4:]))
+
+
+def _named(heading: str) -> tuple[str, str]:
+    """Return the name and the unit of a column: `x [mm]`, `x (mm)` or `x`."""
+    name, _, unit = heading.replace("(", "[").partition("[")
+    return name.strip(), unit.strip(" ])")
+
+
+def _unknown(line: int, units: Sequence[str]) -> Iterator[str]:
+    for name, unit in zip(COLUMNS, units, strict=True):
+        permitted = _UNITS[name]
+        if unit not in permitted:
+            known = ", ".join(filter(None, permitted))
+            yield f"line {line}, {name}: the unit {unit!r} is not known; permitted: {known}"
 
 
 def _table(rows: Iterable[CsvRow], places: Sequence[int]) -> tuple[list[list[float]], list[str]]:
@@ -91,7 +119,8 @@ def _nonsense(numbers: Sequence[Sequence[float]]) -> Iterator[str]:
     table = np.array(numbers)
     backwards = np.nonzero(np.diff(table[:, 0]) <= 0)[0]
     for place in backwards[:3]:
-        yield f"pose {place + 2}: time_s must ascend, and {table[place + 1, 0]:g} follows {table[place, 0]:g}"
+        before, after = table[place : place + 2, 0].tolist()
+        yield f"pose {place + 2}: time_s must ascend, and {after} follows {before}"
     duration = table[-1, 0] - table[0, 0]
     if duration > LONGEST_S:
         yield f"the trace lasts {duration:g} s; at most {LONGEST_S:g} s are permitted"

@@ -112,7 +112,7 @@ def table(**changes: Any) -> str:
 
 
 def test_a_trace_is_read_with_any_order_units_and_more_columns() -> None:
-    text = "qw;qx;qy;qz;note;time_s [s];x [m];y;z\n1;0;0;0;begins;0.5;1;2;3\n1;0;0;0;;0.75;2;2;3\n"
+    text = "qw;qx;qy;qz;note;time_s [ms];x (m);y [cm];z[mm]\n1;0;0;0;begins;500;1;200;3000\n1;0;0;0;;750;2;200;3000\n"
     trace = read_trace(text, "/traces/0")
 
     assert trace.times_s.tolist() == [0.5, 0.75]
@@ -132,7 +132,13 @@ ENDLESS = '"' + "0123456789\n" * 20_000
         (table(x="left"), "line 3, x: 'left' is no finite number"),
         (table(z="nan"), "line 3, z: 'nan' is no finite number"),
         (table(qw=""), "line 3, qw: '' is no finite number"),
-        (table(time_s=0.0), "pose 2: time_s must ascend, and 0 follows 0"),
+        (table(time_s=0.0), "pose 2: time_s must ascend, and 0.0 follows 0.0"),
+        (
+            table().replace("time_s", "time_s [min]").replace("x,", "x (ft),", 1).replace("qw", "qw [rad]"),
+            "line 1, time_s: the unit 'min' is not known; permitted: s, ms; .*x: the unit 'ft' is not known; permitted:"
+            " m, cm, mm; .*qw: the unit 'rad'",
+        ),
+        (table(time_s=1700000000.02), "pose 3: time_s must ascend, and 0.2 follows 1700000000.02"),
         (table(time_s=9e9), "pose 3: time_s must ascend"),
         (table(qw=2), "pose 2: qx, qy, qz, qw have size 2; permitted: 1"),
         (",".join(COLUMNS), "the trace has 0 poses; at least 2 are needed"),
