@@ -132,11 +132,17 @@ class Bench:
         return self._after(answer, "void", {"reason": reason, "operator": operator}, dry_run=dry_run)
 
     def decide(
-        self, answer: str, counts: Literal["this", "other"], *, reason: str, operator: str | None = None
+        self,
+        answer: str,
+        counts: Literal["this", "other"],
+        *,
+        reason: str,
+        operator: str | None = None,
+        dry_run: bool = False,
     ) -> Consequences:
-        """Let an answer in conflict count, or the other one."""
-        body = _without_none({"counts": counts, "reason": reason, "operator": operator})
-        return self._connection.post(Consequences, f"/measurements/{segment(answer)}/decision", body)
+        """Let an answer in conflict count, or the other one; with `dry_run` return what would follow alone."""
+        body = {"counts": counts, "reason": reason, "operator": operator}
+        return self._after(answer, "decision", body, dry_run=dry_run)
 
     def reopen(self, id: str) -> RequestRead:
         """Offer a request again that was taken too often without an answer."""

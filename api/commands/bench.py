@@ -146,18 +146,19 @@ def void(
 
 
 @app.command("decide", rich_help_panel=BENCH)
-def decide(
+def decide(  # noqa: PLR0913, PLR0917 - each is an option of the command
     id: AnswerId,
     counts: Annotated[Literal["this", "other"], typer.Argument(help="which of the two measurements counts")],
     reason: Reason,
     operator: By = None,
+    dry_run: DryRun = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Decide about a measurement in conflict: let it count in place of the other, or dismiss it."""
     with connect(url) as client:
-        found = client.bench.decide(id, counts, reason=reason, operator=operator)
-    _print_consequences(found, dry_run=False, as_json=as_json)
+        found = client.bench.decide(id, counts, reason=reason, operator=operator, dry_run=dry_run)
+    _print_consequences(found, dry_run=dry_run, as_json=as_json)
 
 
 @app.command("reopen", rich_help_panel=BENCH)

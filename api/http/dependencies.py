@@ -9,7 +9,7 @@ from fastapi import Depends, Header, Request, Response
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.datastructures import URLPath
 
-from gaplab.api.http.violations import repeated_parameters
+from gaplab.api.http.violations import wrong_parameters
 from gaplab.schemas.access import Role
 from gaplab.schemas.base import Frozen
 from gaplab.services.access import Caller, demand
@@ -88,14 +88,14 @@ AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
 
 
-async def refuse_repeated_parameters(request: Request) -> None:
-    """Refuse a query that repeats a parameter of one value, rather than choosing one.
+async def refuse_wrong_parameters(request: Request) -> None:
+    """Refuse a query that repeats a parameter of one value, or gives one to an operation that has none.
 
     Raises:
-        InvalidSpec: a parameter is repeated.
+        InvalidSpec: a parameter is repeated or unknown.
     """
-    if repeated := repeated_parameters(request):
-        raise InvalidSpec(repeated)
+    if wrong := wrong_parameters(request):
+        raise InvalidSpec(wrong)
 
 
 def reload_plugins() -> None:

@@ -75,11 +75,5 @@ def _complete(document: dict[str, Any]) -> None:
             responses = operation["responses"]
             if "application/json" in responses.get("422", {}).get("content", {}):
                 del responses["422"]
-            statuses = [*([] if path in OPEN else [401, 403]), *([422] if _can_be_invalid(operation) else [])]
-            if statuses:
-                responses |= {str(status): each for status, each in documented(*statuses).items()}
-
-
-def _can_be_invalid(operation: dict[str, Any]) -> bool:
-    """Return whether a body, a query or a header can be invalid; an id cannot be, only unknown."""
-    return "requestBody" in operation or any(each["in"] != "path" for each in operation.get("parameters", ()))
+            statuses = [*([] if path in OPEN else [401, 403]), 422]
+            responses |= {str(status): each for status, each in documented(*statuses).items()}

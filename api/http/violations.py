@@ -126,13 +126,21 @@ def _models(annotation: object) -> list[type[BaseModel]]:
     return []
 
 
-def repeated_parameters(request: Request) -> list[Violation]:
-    """Return a violation for each query parameter that takes one value and has several."""
-    given = {name: request.query_params.getlist(name) for name, several in _parameters(request).items() if not several}
-    return [
+def wrong_parameters(request: Request) -> list[Violation]:
+    """Return a violation for each query parameter that is repeated, or given to an operation that has none.
+
+    An operation that has parameters refuses unknown ones by their model.
+    """
+    known, given = _parameters(request), {name: request.query_params.getlist(name) for name in request.query_params}
+    repeated = [
         Violation(name, values, f"it is given {len(values)} times; give it once", "one value")
         for name, values in given.items()
-        if len(values) > 1
+        if len(values) > 1 and known.get(name) is False
+    ]
+    return repeated or [
+        Violation(_text(name), values, f"unknown parameter {_text(name)!r}; this operation has none", "no parameter")
+        for name, values in list(given.items())[:MOST_ERRORS]
+        if not known
     ]
 
 

@@ -53,12 +53,13 @@ def void_measurement(
 def decide_measurement(
     id: Id,
     spec: Annotated[ConflictSpec, Body(openapi_examples=ConflictSpec.EXAMPLES)],
+    query: Annotated[Rehearsal, Query()],
     store: StoreDep,
     admitted: AdmissionDep,
     response: Response,
 ) -> Consequences:
     """Let an answer in conflict count in place of the other, or dismiss it."""
-    return once_answered(corrections.decide(store, id, spec, admitted), response)
+    return once_answered(corrections.decide(store, id, spec, admitted, dry_run=query.dry_run), response)
 
 
 @router.get("/experiments/{id}/branches", summary="List the closed branches", responses=documented(404))

@@ -85,13 +85,19 @@ def void(store: Store, id_: str, spec: VoidSpec, admitted: Admission, *, dry_run
     return once(store, admitted, asked, Consequences, lambda session: _void(session, id_, spec))
 
 
-def decide(store: Store, id_: str, spec: ConflictSpec, admitted: Admission) -> Once[Consequences]:
+def decide(
+    store: Store, id_: str, spec: ConflictSpec, admitted: Admission, *, dry_run: bool = False
+) -> Once[Consequences]:
     """Decide about an answer that is in conflict with the one that counts, or with whoever holds the request.
 
     Raises:
         NotFound: there is no such answer.
         Conflict: it is not in conflict, or the request is wanted no more.
     """
+    if dry_run:
+        with store.reading() as session:
+            row = requests.get_answer(session, id_)
+            return Once(_decided(session, row, *requests.get(session, row.request_id), spec))
     asked = AddressedDecision(answer=id_, **spec.model_dump())
     return once(store, admitted, asked, Consequences, lambda session: _decide(session, id_, spec))
 
@@ -101,9 +107,7 @@ def _correct(session: Session, id_: str, spec: CorrectionSpec, token: str | None
     spec = _with_readings(spec, row)
     _check(session, repetition, spec)
     found = consequences(session, request, repetition, "correct")
-    answer = MeasurementSpec(
-        values=spec.values, readings=spec.readings, failed=spec.failed, operator=spec.operator or row.operator
-    )
+    answer = MeasurementSpec(values=spec.values, readings=spec.readings, failed=spec.failed, operator=spec.operator)
     judge(session, row, AnswerState.REPLACED, spec.reason)
     new = insert_answer(session, request, answer, AnswerState.COUNTED, token)
     new.replaces, new.attachments, new.note = row.id, row.attachments, row.note
@@ -136,31 +140,39 @@ def _decide(session: Session, id_: str, spec: ConflictSpec) -> Consequences:
     row = requests.get_answer(session, id_)
     request, repetition = locked(session, row.request_id)
     session.refresh(row)
-    if row.state is not AnswerState.CONFLICT:
-        raise Conflict(f"measurement {row.id} is {row.state.value}, not in conflict, so nothing is to be decided")
-    counted = requests.counted_answer(session, request)
+    found = _decided(session, row, request, repetition, spec)
     if spec.counts == "other":
         judge(session, row, AnswerState.DISMISSED, spec.reason)
         note_answer(session, EventKind.DECIDED, request, repetition, row, spec.operator)
-        return nothing_follows(request, repetition, "the answer is dismissed; what counted still counts")
+        return found
+    counted = requests.counted_answer(session, request)
     if counted is not None:
-        found = consequences(session, request, repetition, "correct")
         judge(session, counted, AnswerState.REPLACED, spec.reason)
         row.replaces = counted.id
-        judge(session, row, AnswerState.COUNTED, spec.reason)
-        note_answer(session, EventKind.DECIDED, request, repetition, row, spec.operator)
-        settle_request(session, request, row)
-        branch = apply(session, request, repetition, row, spec.reason)
-        return found.model_copy(update={"answer": row.id, "branch": branch})
-    if request.state not in requests.PENDING:
-        raise Conflict(f"request {request.id} is wanted no more")
     judge(session, row, AnswerState.COUNTED, spec.reason)
     settle_request(session, request, row)
     note_answer(session, EventKind.DECIDED, request, repetition, row, spec.operator)
+    if counted is not None:
+        return found.model_copy(update={"branch": apply(session, request, repetition, row, spec.reason)})
     record_answer(session, request, row)
-    return nothing_follows(request, repetition, "the answer counts, and the repetition goes on").model_copy(
-        update={"answer": row.id}
-    )
+    return found
+
+
+def _decided(
+    session: Session, row: AnswerRow, request: RequestRow, repetition: RepetitionRow, spec: ConflictSpec
+) -> Consequences:
+    """Return what follows from a decision, of which nothing is done yet."""
+    if row.state is not AnswerState.CONFLICT:
+        raise Conflict(f"measurement {row.id} is {row.state.value}, not in conflict, so nothing is to be decided")
+    if spec.counts == "other":
+        return nothing_follows(request, repetition, "the answer is dismissed; what counted still counts")
+    if requests.counted_answer(session, request) is not None:
+        found = consequences(session, request, repetition, "correct")
+    elif request.state in requests.PENDING:
+        found = nothing_follows(request, repetition, "the answer counts, and the repetition goes on")
+    else:
+        raise Conflict(f"request {request.id} is wanted no more")
+    return found.model_copy(update={"answer": row.id})
 
 
 def _counted(session: Session, id_: str) -> tuple[AnswerRow, RequestRow, RepetitionRow]:

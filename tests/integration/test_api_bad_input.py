@@ -41,6 +41,17 @@ def api(sqlite_store: Store) -> Iterator[TestClient]:
         yield client
 
 
+def test_no_operation_takes_a_parameter_that_it_does_not_know(api: TestClient) -> None:
+    for path, operations in api.get("/openapi.json").json()["paths"].items():
+        for method in operations:
+            answer = api.request(method, path.replace("{", "").replace("}", ""), params={"dry_runn": "true"})
+
+            assert answer.status_code == 422, (method, path)
+            messages = [each["message"] for each in answer.json()["errors"] if each["pointer"] == "dry_runn"]
+            assert messages[0].startswith("unknown parameter 'dry_runn'")
+
+
+
 def problem(answer: Any, status: int) -> dict[str, Any]:
     """The problem that the answer carries, checked for what every problem must be."""
     assert answer.status_code == status, answer.text

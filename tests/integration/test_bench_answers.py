@@ -66,7 +66,11 @@ def test_an_answer_that_adds_or_contradicts_anything_is_kept_as_a_conflict(store
     assert kept[1].note == "warm"
     assert kept[2].attachments == (first, second)
     assert [each.id for each in undecided(store)] == [request_.id]
-    corrections.decide(store, kept[0].id, ConflictSpec(counts="this", reason="the sensor was read again"), FREELY)
+    decision = ConflictSpec(counts="this", reason="the sensor was read again")
+    told = corrections.decide(store, kept[0].id, decision, FREELY, dry_run=True).answer
+    assert [each.id for each in undecided(store)] == [request_.id]
+    done = corrections.decide(store, kept[0].id, decision, FREELY).answer
+    assert (told.branch, done.model_copy(update={"branch": None})) == (None, told)
     states = {each.id: each.state for each in taking.read_request(store, request_.id).answers}
     assert (states[counted.id], states[kept[0].id]) == ("replaced", "counted")
 
