@@ -120,7 +120,7 @@ class StepRecorder:
     def answers(self, setting: Setting) -> Answers:
         """Return the answers of the step under way: those of its checkpoints, then new ones, which are recorded."""
         checkpoints = (checkpoint.answers for checkpoint in tuple(self._parts))
-        return Answers(setting.simulate, setting.batch_size, checkpoints, self, setting.sense)
+        return Answers(setting.simulate, setting.batch_size, checkpoints, self, setting.sense, setting.reading_periods)
 
     def genomes_per_call(self, simulators: int) -> int:
         """Return the number of genomes of a call that is short enough; 1 while durations are unknown."""

@@ -90,6 +90,9 @@ def check_sensors(rates: Rates) -> None:
     noises = np.asarray(sensors.noises)
     assert len(sensors.units) == len(noises) == len(sensors.names), "its sensors lack units or noises"
     assert np.all(noises > 0), f"noises must be above 0, and are {noises.tolist()}"
+    periods = np.asarray(sensors.periods)
+    assert len(periods) in {0, len(noises)}, "its sensors lack periods"
+    assert np.all(periods >= 0), f"periods must be 0 or above, and are {periods.tolist()}"
     many = trajectories(sensors.times_s)
     values = np.asarray(rates.sense(many))
     expected = (4, 5, len(sensors.times_s), len(sensors.names))

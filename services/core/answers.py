@@ -18,7 +18,7 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Outcomes, Parameters
+from gaplab.services.core.arrays import NO_READINGS, Fitnesses, FloatArray, Genomes, Outcomes, Parameters
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.ports import Sense, Simulate
 from gaplab.services.core.types import Cost
@@ -66,6 +66,7 @@ class Answers:
         checkpoints: answers of this step from before an interruption, each as `pack` returns them.
         recorder: records what `simulate` and `sense` return.
         sense: the simulation with readings; None if there is none.
+        periods: `(q,)`: period of each reading, over its noise; 0 if it has none.
     """
 
     def __init__(
@@ -75,7 +76,9 @@ class Answers:
         checkpoints: Iterable[bytes] = (),
         recorder: Recorder | None = None,
         sense: Sense | None = None,
+        periods: FloatArray = NO_READINGS,
     ) -> None:
+        self.periods = periods
         self._simulate = simulate
         self._with_readings = sense
         self._batch_size = batch_size

@@ -11,6 +11,7 @@ from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.search import maximise
+from gaplab.services.core.sensors import nearest
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Score, Strategy
 from gaplab.services.core.types import Belief
@@ -130,7 +131,8 @@ class ControllerSearch:
 
     def _sensed(self, genomes: Genomes, simulators: Parameters, following: Following) -> FloatArray:
         if self.answers.senses:
-            return self.answers.sense(genomes, simulators)
+            outcomes = self.answers.sense(genomes, simulators)
+            return nearest(outcomes, outcomes[:, :1], self.answers.periods)
         return self.answers(genomes, simulators, following)[..., None]
 
 

@@ -65,6 +65,7 @@ class Setting:
         batch_size: returns how many rollouts a call of `simulate` should have at present; it changes no number.
         sense: simulation with readings; None if the robot has no sensors.
         reading_times_s: `(q,)`: time of each reading.
+        reading_periods: `(q,)`: period of each reading, over its noise; 0 if it has none.
         discrepancy: what tuning minimises.
         tuner: finds simulators.
         held_out: share of the samples that no tuning sees.
@@ -89,6 +90,7 @@ class Setting:
     batch_size: Callable[[], int] = lambda: 1
     sense: Sense | None = None
     reading_times_s: FloatArray = field(default_factory=no_readings)
+    reading_periods: FloatArray = field(default_factory=no_readings)
     discrepancy: Discrepancy = field(default_factory=SquaredFitness)
     tuner: Tuner = field(default_factory=SearchTuner)
     held_out: float = 0.0
@@ -108,7 +110,7 @@ class Setting:
 
     def answers(self) -> Answers:
         """Return the answers of one step, which count and prefetch its rollouts."""
-        return Answers(self.simulate, self.batch_size, sense=self.sense)
+        return Answers(self.simulate, self.batch_size, sense=self.sense, periods=self.reading_periods)
 
 
 def repetition(

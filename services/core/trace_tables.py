@@ -16,7 +16,7 @@ COLUMNS = ("time_s", "x", "y", "z", "qx", "qy", "qz", "qw")
 A heading may state another unit: `x [mm]`.
 """
 
-_UNITS = {"time_s": ("", "s", "ms")} | dict.fromkeys("xyz", ("", "m", "cm", "mm"))
+_UNITS: dict[str, tuple[str, ...]] = {"time_s": ("", "s", "ms")} | dict.fromkeys("xyz", ("", "m", "cm", "mm"))
 _UNITS |= dict.fromkeys(COLUMNS[4:], ("", "1"))
 """Units that a heading may state, by column; without one, seconds and metres."""
 

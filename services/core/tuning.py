@@ -12,6 +12,7 @@ from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.search import Question
+from gaplab.services.core.sensors import nearest
 from gaplab.services.core.space import Space
 from gaplab.services.core.types import Sample, Simulator
 
@@ -124,7 +125,7 @@ class Misfit:
 
     def residuals(self, parameters: Parameters) -> FloatArray:
         """Return `(m, r)`: all differences of simulators `(m, p)`, whose squares sum to the discrepancy."""
-        outcomes = self._outcomes(self._genomes, parameters)
+        outcomes = self._beside(self._outcomes(self._genomes, parameters), self._measured)
         found = self.discrepancy.residuals(outcomes, self._measured, self._times_s)
         if self._weights is not None:
             found = found * np.sqrt(self._weights)[:, None, None]
@@ -149,8 +150,13 @@ class Misfit:
         return self._answers(genomes, parameters, following)[..., None]
 
     def _terms(self, outcomes: Outcomes, which: slice) -> FloatArray:
-        terms = self.discrepancy.terms(outcomes, self._measured[which], self._times_s)
+        measured = self._measured[which]
+        terms = self.discrepancy.terms(self._beside(outcomes, measured), measured, self._times_s)
         return terms if self._weights is None else terms * self._weights[which, None]
+
+    def _beside(self, outcomes: Outcomes, measured: FloatArray) -> Outcomes:
+        """Return the outcomes, those of sensors that turn shifted by whole turns next to the measured ones."""
+        return nearest(outcomes, measured[:, None], self._answers.periods) if self.discrepancy.senses else outcomes
 
     def _seen(self, sample: Sample) -> FloatArray:
         return sample.outcome if self.discrepancy.senses else np.array([sample.fitness])

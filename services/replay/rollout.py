@@ -9,6 +9,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
 from gaplab.services.core.motions import Recording
 from gaplab.services.core.robots.base import Robot, Sensors
+from gaplab.services.core.sensors import nearest
 from gaplab.services.core.world import World
 from gaplab.services.replay.sent_specs import SentSpec, received
 from gaplab.services.replay.shapes import extent_of, feet_of, framing_of, labels, observed_of, shapes_of
@@ -127,6 +128,8 @@ def _sensed(
     if not sensors.size:
         return None
     measured = None if real is None or len(real) != sensors.size else np.array(real, dtype=float)
+    if measured is not None and simulated is not None:
+        measured = nearest(measured, simulated, sensors.reading_periods)
     return ReplayReadings(
         sensors=sensors.names,
         units=sensors.units,

@@ -104,6 +104,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         tuner=tuners.create(spec.tuner),
         held_out=spec.held_out,
         reading_times_s=robot.sensors.reading_times_s,
+        reading_periods=robot.sensors.reading_periods,
         names=tuple(ref.name for ref in spec.tunables),
         probes=spec.reality.probes,
         known_samples=samples_of(spec),

@@ -11,7 +11,7 @@ from gaplab.services.core.arrays import NO_READINGS, FloatArray, Readings, froze
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import Violation
 from gaplab.services.core.repeats import mean
-from gaplab.services.core.sensors import Sensors
+from gaplab.services.core.sensors import Sensors, nearest
 from gaplab.services.core.types import Outcome, Sample
 from gaplab.services.specs.robots import robot_of
 
@@ -66,7 +66,7 @@ def lack_violations(
 def _standardised(sensors: Sensors, readings: Sequence[Any] | None) -> Readings:
     """Return the mean over repeats of readings `(q,)`, each over its noise; nan where every repeat lacks it.
 
-    Of equal readings, the mean is exactly that reading.
+    Of equal readings, the mean is exactly that reading; of angles to both sides of a half turn, it is that half turn.
     """
     if readings is None or not sensors.size:
         return frozen(np.full(sensors.size, np.nan)) if sensors.size else NO_READINGS
@@ -76,8 +76,10 @@ def _standardised(sensors: Sensors, readings: Sequence[Any] | None) -> Readings:
     known = ~np.isnan(tables)
     count = known.sum(axis=0)
     first = np.take_along_axis(tables, known.argmax(axis=0)[None, :], axis=0)
-    beyond_first = np.where(known, tables - first, 0.0).sum(axis=0)
-    return frozen(np.where(count > 0, first[0] + beyond_first / np.maximum(count, 1), np.nan))
+    periods = sensors.reading_periods
+    beyond_first = np.where(known, nearest(tables, first, periods) - first, 0.0).sum(axis=0)
+    means = np.where(count > 0, first[0] + beyond_first / np.maximum(count, 1), np.nan)
+    return frozen(nearest(means, np.zeros_like(means), periods))
 
 
 def samples_of(spec: ResolvedSpec) -> tuple[Sample, ...]:

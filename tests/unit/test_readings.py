@@ -16,9 +16,11 @@ from gaplab.services.core.errors import InvalidSpec, PluginBroken
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.robots.base import Sensors
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.types import Measured, Probed
+from gaplab.services.core.sensors import nearest
+from gaplab.services.core.tuning import Misfit
+from gaplab.services.core.types import Measured, Probed, Sample
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.measured import needs_readings
+from gaplab.services.specs.measured import needs_readings, outcome_of
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.robots import sensors
 
@@ -39,6 +41,58 @@ def test_readings_are_in_units_of_noise_and_come_time_by_time() -> None:
     assert (SENSORS.size, readings.tolist()) == (6, pytest.approx([1, 1, 2, 2, 3, 3]))
     assert SENSORS.reading_times_s.tolist() == [1, 1, 2, 2, 3, 3]
     assert np.allclose(SENSORS.values(readings), values)
+
+
+TURNING = Sensors(("roll", "x"), ("rad", "m"), frozen([0.1, 2.0]), frozen([1.0, 2.0]), frozen([2 * np.pi, 0.0]))
+"""Sensors of which the first one is an angle."""
+
+
+def on_its_back(*rolls: float) -> Any:
+    """Readings of repeats, each of one angle at both times."""
+    return [[[roll, 1.0], [roll, 1.0]] for roll in rolls]
+
+
+@pytest.mark.parametrize(
+    ("rolls", "mean"),
+    [
+        ((3.13, -3.13), np.pi),
+        ((-3.13, 3.13), np.pi),
+        ((3.0, -3.2, 3.0), 3.0277),
+        ((0.25, 0.75), 0.5),
+        ((0.5, 0.5), 0.5),
+    ],
+)
+def test_the_mean_of_angles_is_that_on_a_circle(rolls: Any, mean: float) -> None:
+    outcome, _ = outcome_of(TURNING, [0.0] * len(rolls), on_its_back(*rolls))
+
+    roll, x = TURNING.values(outcome.readings)[0]
+    assert (abs(roll), x) == (pytest.approx(mean, abs=1e-4), 1.0)
+
+
+def test_a_simulator_that_lies_on_its_back_reproduces_a_robot_on_its_back() -> None:
+    outcome, _ = outcome_of(TURNING, [0.0], on_its_back(-3.13))
+    sample = Sample(np.zeros(1), *outcome)
+    lying, standing = TURNING.standardised(np.array(on_its_back(3.13, 0.0)))
+    simulated = np.array([[[0.0, *lying], [0.0, *standing]]])
+    answers = Answers(
+        lambda genomes, _: np.zeros((len(genomes), 2)), sense=lambda *_: simulated, periods=TURNING.reading_periods
+    )
+
+    misfit = Misfit(answers, [sample], Readings(), TURNING.reading_times_s)
+
+    near, far = misfit.of(np.zeros((2, 1)))
+    assert near == pytest.approx((2 * np.pi - 6.26) ** 2 / 0.1**2 / 2, rel=1e-6)
+    assert far == pytest.approx(3.13**2 / 0.1**2 / 2, rel=1e-6)
+    assert (misfit.residuals(np.zeros((2, 1))) ** 2).sum(axis=1) == pytest.approx([near, far])
+
+
+def test_what_does_not_turn_is_not_shifted_and_nothing_becomes_nan() -> None:
+    readings, periods = np.array([np.nan, 70.0, 1.0, 50.0]), TURNING.reading_periods
+
+    shifted = nearest(readings, np.array([0.0, -70.0, np.nan, 50.0]), periods)
+
+    assert np.array_equal(shifted, readings, equal_nan=True)
+    assert nearest(readings, readings, SENSORS.reading_periods[:4]) is readings
 
 
 def test_sensing_changes_no_fitness_and_repeats_itself() -> None:

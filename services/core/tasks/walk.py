@@ -51,6 +51,7 @@ class Walk(Task):
             units=("rad", "rad", "m", "m", "m"),
             noises=frozen([TILT_NOISE_RAD] * 2 + [PLACE_NOISE_M] * 3),
             times_s=frozen(settling_s + times),
+            periods=frozen([2 * np.pi, 0.0, 0.0, 0.0, 0.0]),
         )
 
     def fitness(self, trajectory: Trajectory) -> FloatArray:
