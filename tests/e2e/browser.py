@@ -7,13 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import axe_playwright_python
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import expect, sync_playwright
 
 VARIABLE = "GAPLAB_CHROMIUM"
 """Of the environment: the browser to use, for one that is not on the path."""
 
 SCREENSHOTS = "GAPLAB_SCREENSHOTS"
 """Of the environment: the folder that screenshots are kept in; without it they are not taken."""
+
+LONGEST_MS = 600_000
+"""How long a test waits for the page: a machine may be busy, and no test fails because it is slow."""
+
+expect.set_options(timeout=LONGEST_MS)
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
@@ -58,7 +63,7 @@ class Chromium:
             raise
         self._window = self._browser.new_context()
         self._window.grant_permissions(["clipboard-read", "clipboard-write"])
-        self._window.set_default_timeout(180_000)
+        self._window.set_default_timeout(LONGEST_MS)
         self._blank = self._window.new_page()
         self._storage = self._window.new_cdp_session(self._blank)
         self._troubles: list[str] = []

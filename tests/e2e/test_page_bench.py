@@ -24,7 +24,6 @@ from tests.e2e.browser import axe, fits, screenshot
 from tests.integration.test_bench import bench, compute, finish
 
 PHONE = {"width": 390, "height": 844}
-expect.set_options(timeout=180_000)
 MODES: dict[str, dict[str, Any]] = {"light": {}, "dark": {"dark": True}, "phone": PHONE}
 CUT = ("ERR_", "net::")
 KEYS = "() => Object.keys(localStorage).filter((key) => key.includes(' answer '))"

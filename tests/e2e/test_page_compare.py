@@ -13,8 +13,6 @@ from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import run, some_log, toy
 
-SLOW_MS = 120_000
-expect.set_options(timeout=SLOW_MS)
 STUDY = "Fig. 4, lean: MuJoCo in MuJoCo"
 MADE = "made: a study"
 
@@ -225,7 +223,7 @@ def test_it_grows_as_an_experiment_goes_on(api: Any, written: Store, visit: Any)
 def test_its_figure_is_saved_in_every_format(archive: Any, ids: Any, visit: Any) -> None:
     page = visit(address(archive, *ids, band="sd", x="rollouts"))
     for words, begins in (("SVG", b"<?xml"), ("PNG", b"\x89PNG"), ("PDF", b"%PDF"), ("CSV", b"experiment,")):
-        with page.expect_download(timeout=SLOW_MS) as saved:
+        with page.expect_download() as saved:
             page.get_by_role("link", name=words).first.click()
         assert saved.value.path().read_bytes().startswith(begins)
 

@@ -16,8 +16,6 @@ from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
 from tests.waiting import wait_until
 
-SLOW_MS = 120_000
-expect.set_options(timeout=SLOW_MS)
 NAME = "simulated_fit"
 
 
@@ -155,7 +153,7 @@ def test_predictions_are_drawn_once_all_are_computed(archive: Any, ended: Any, v
     figure = page.locator(".figure-predictions")
     figure.scroll_into_view_if_needed()
 
-    expect(figure).to_contain_text("400 samples of 40 repetitions", timeout=600_000)  # 800 rollouts of low priority
+    expect(figure).to_contain_text("400 samples of 40 repetitions")  # 800 rollouts of low priority
     expect(figure).not_to_contain_text("still being computed")
     assert [url.split("?")[0].endswith("/figures/predictions") for url in asked][:2] == [False, True]
 

@@ -11,8 +11,6 @@ from gaplab.services.experiments import editing, lifecycle, submission
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import toy
 
-SLOW_MS = 120_000
-
 NOTES = """# Floor
 
 *slippery* and **wet**, see [the lab](https://lab.example/log) and <img src=x onerror="document.title='hacked'">
@@ -117,9 +115,7 @@ def test_a_view_that_sorts_downwards_keeps_its_order(visit: Any, api: Any, writt
 
     page.get_by_role("link", name="all downwards").click()
     page.locator(".chip[aria-current]", has_text="all downwards").wait_for()
-    expect(page.locator("td.name a:not(.tag)")).to_have_text(
-        ["reversed c", "reversed b", "reversed a"], timeout=SLOW_MS
-    )
+    expect(page.locator("td.name a:not(.tag)")).to_have_text(["reversed c", "reversed b", "reversed a"])
     assert page.get_by_label("Order").input_value() == "-name"
     page.get_by_role("link", name="ones downwards").click()
     page.locator(".chip[aria-current]", has_text="ones downwards").wait_for()

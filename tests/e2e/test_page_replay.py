@@ -49,7 +49,7 @@ def replay(
     visit: Any, archive: Any, walker: Any, query: Any = "repetition=0&iteration=1&kind=sample", **how: Any
 ) -> Any:
     page = visit(f"{archive.url}/#/replay?experiment={walker}&{query}", **how)
-    page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
+    page.wait_for_selector(".stage-canvas[data-time]")
     return page
 
 
@@ -190,11 +190,11 @@ def test_what_is_not_there_says_so_and_another_may_be_chosen(visit: Any, archive
     visit.forgive("404")
     page = visit(f"{archive.url}/#/replay?experiment={walker}&repetition=99&iteration=1")
 
-    page.wait_for_selector("text=no repetition 99; permitted: from 0 to 39", timeout=120_000)
+    page.wait_for_selector("text=no repetition 99; permitted: from 0 to 39")
     page.get_by_label("Repetition", exact=True).fill("3")
     page.get_by_label("Repetition", exact=True).press("Enter")
 
-    page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
+    page.wait_for_selector(".stage-canvas[data-time]")
 
 
 @pytest.mark.release
@@ -218,7 +218,7 @@ def test_the_page_of_an_experiment_leads_to_its_replays(visit: Any, archive: Any
 
     page.get_by_role("link", name="Replay a controller").click()
 
-    page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
+    page.wait_for_selector(".stage-canvas[data-time]")
     assert page.get_by_label("Iteration", exact=True).input_value() == "10"  # the last
 
 
@@ -237,7 +237,7 @@ def test_without_webgl_it_is_seen_from_the_side(visit: Any, archive: Any, walker
     page = replay(visit, archive, walker)
     page.add_init_script(FLAT)
     page.reload()
-    page.wait_for_selector(".stage-canvas[data-drawn=flat]", timeout=120_000)
+    page.wait_for_selector(".stage-canvas[data-drawn=flat]")
 
     assert len(np.unique(picture(page.locator(".stage-canvas").first).reshape(-1, 3), axis=0)) > 5
 

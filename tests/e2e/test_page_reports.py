@@ -9,8 +9,6 @@ from playwright.sync_api import expect
 from tests.e2e.browser import fits, screenshot
 from tests.waiting import wait_until
 
-SLOW_MS = 120_000
-expect.set_options(timeout=SLOW_MS)
 STUDY = "Fig. 4, lean: MuJoCo in MuJoCo"
 
 
@@ -28,7 +26,7 @@ def walker(study: Any) -> Any:
 
 def saved(page: Any, link: str, part: Any = None) -> Any:
     """The name and the content of the file that a link of the page, or of a part of it, saves."""
-    with page.expect_download(timeout=SLOW_MS) as download:
+    with page.expect_download() as download:
         (part or page).get_by_role("link", name=link, exact=True).click()
     return download.value.suggested_filename, download.value.path().read_bytes()
 

@@ -12,9 +12,6 @@ from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
 
-SLOW_MS = 120_000
-expect.set_options(timeout=SLOW_MS)
-
 
 def address(api: Any, experiment: Any) -> str:
     return f"{api.url}/#/experiments/{experiment}"
