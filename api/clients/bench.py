@@ -188,8 +188,8 @@ class Bench:
         options: Mapping[str, Any] | None = None,
         controller: str | Mapping[str, Any] | None = None,
         task: str | Mapping[str, Any] | None = None,
-    ) -> SamplesRead:
-        """Return the samples of a CSV file, for `reality.samples` of a spec, or everything that is wrong with it.
+    ) -> list[dict[str, Any]]:
+        """Return the samples of a CSV file, for `reality.samples` of a spec.
 
         Args:
             file: table with the columns `gene_0`, `gene_1` and so on, and `value`, or `value_1`, `value_2` and so on.
@@ -197,18 +197,22 @@ class Bench:
             options: its options; left out: their defaults.
             controller: its controller, as in a spec; left out: its own.
             task: its task, likewise.
+
+        Raises:
+            InvalidSamples: the file has errors; all are named.
         """
         given = {"options": dict(options or {}), "controller": controller, "task": task}
         query = "".join(
             f"&{name}={segment(json.dumps(json_of(value)))}" for name, value in given.items() if value is not None
         )
-        return self._connection.change(
+        found = self._connection.change(
             SamplesRead,
             "POST",
             f"/samples/check?robot={segment(robot)}{query}",
             content=[Path(file).read_bytes()],
             headers={"Content-Type": "text/csv"},
         )
+        return found.checked(Path(file))
 
     def branches(self, experiment: str) -> tuple[BranchRead, ...]:
         """Return the steps that corrections closed."""

@@ -100,7 +100,7 @@ def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> Non
 
 
 def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  # noqa: ANN401 - those of `show`
-    """Show the progress until the end, then the result; exit with an error if it did not complete."""
+    """Show the progress until the end, then the result; exit with an error if an experiment did not complete."""
     try:
         record = client.watcher.show(id, console(stderr=as_json), **options)
     except KeyboardInterrupt:
@@ -113,7 +113,7 @@ def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  
     for reason in sorted({reason for experiment in experiments_of(record) for reason in experiment.reasons}):
         typer.echo(f"  {reason}", err=True)
     print_warnings(record)
-    if record.state is not State.COMPLETED:
+    if any(each.state is not State.COMPLETED for each in experiments_of(record)):
         raise typer.Exit(Exit.FAILED)
 
 

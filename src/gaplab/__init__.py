@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from gaplab.api.clients.motions import DriverMotion as DriverMotion
     from gaplab.api.process.errors import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
-    from gaplab.samples import InvalidSamples as InvalidSamples
     from gaplab.samples import read_samples as read_samples
+    from gaplab.schemas.samples import InvalidSamples as InvalidSamples
     from gaplab.services.core.errors import InvalidSpec as InvalidSpec
 
 _MODULES = {
@@ -45,7 +45,7 @@ _MODULES = {
     "ExperimentFailed": "gaplab.api.clients.errors",
     "ExtraMissing": "gaplab.api.clients.errors",
     "Figure": "gaplab.api.clients.figures",
-    "InvalidSamples": "gaplab.samples",
+    "InvalidSamples": "gaplab.schemas.samples",
     "InvalidSpec": "gaplab.services.core.errors",
     "MeasurementFailed": "gaplab.api.clients.drivers",
     "NotSubmitted": "gaplab.api.clients.confirmation",

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.errors import InvalidSpec, Violation
@@ -13,26 +13,6 @@ from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sample_tables import read_samples as read_table
 from gaplab.services.plugins import folders
 from gaplab.services.specs.robots import robot_of_file
-
-
-class InvalidSamples(ValueError):
-    """A table of samples has errors.
-
-    Attributes:
-        errors: each with its `line`, `column`, `value`, `message` and `permitted`.
-    """
-
-    def __init__(self, path: Path, errors: tuple[Any, ...], more: int) -> None:
-        self.errors = errors
-        self._made_of = path, errors, more
-        lines = [
-            f"{path.name}:{each.line}{f', {each.column}' if each.column else ''}: {each.message}" for each in errors
-        ]
-        super().__init__("\n".join([*lines, *([f"and {more} more"] if more else [])]))
-
-    def __reduce__(self) -> tuple[type[Self], tuple[Path, tuple[Any, ...], int]]:
-        """Return the class and the arguments from which a copy of the error is made."""
-        return type(self), self._made_of
 
 
 def read_samples(path: str | Path, robot: str | Path, options: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
@@ -57,10 +37,8 @@ def read_samples(path: str | Path, robot: str | Path, options: Mapping[str, Any]
     if not isinstance(robot, str | Path):
         raise TypeError(f"a robot is its name or its file, not {robot!r:.100}; give its options as `options`")
     file = Path(path)
-    found = read_table(file.read_text("utf-8", "replace"), _robot(robot, dict(options or {}), file))
-    if found.errors:
-        raise InvalidSamples(file, found.errors, found.more)
-    return [sample.model_dump(mode="json", exclude_none=True) for sample in found.samples]
+    folders.find()
+    return read_table(file.read_text("utf-8", "replace"), _robot(robot, dict(options or {}), file)).checked(file)
 
 
 def _robot(robot: str | Path, options: dict[str, Any], table: Path) -> Robot:
@@ -74,7 +52,6 @@ def _robot(robot: str | Path, options: dict[str, Any], table: Path) -> Robot:
             message = f"the robot of {robot} comes from a file, which has no options"
             raise InvalidSpec([Violation("/robot/options", options, message, "left out")])
         return robot_of_file(read_robot_file(Path(robot).read_bytes()))
-    folders.find()
     if robot in robots or robot in robots.unusable:
         return robots.create(PluginRef(name=robot, options=options), "/robot")
     known = [name for name in robots if name != IMPORTED]

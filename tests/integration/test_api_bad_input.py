@@ -51,7 +51,6 @@ def test_no_operation_takes_a_parameter_that_it_does_not_know(api: TestClient) -
             assert messages[0].startswith("unknown parameter 'dry_runn'")
 
 
-
 def problem(answer: Any, status: int) -> dict[str, Any]:
     """The problem that the answer carries, checked for what every problem must be."""
     assert answer.status_code == status, answer.text

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from httpx2 import MockTransport, Request, Response
 
-from gaplab import Client, ServiceError, ServiceUnreachable
+from gaplab import Client, InvalidSamples, ServiceError, ServiceUnreachable
 from gaplab.api.clients import driving
 from gaplab.api.clients.journal import Journal
 from gaplab.schemas.access import Role
@@ -294,11 +294,11 @@ def test_an_attachment_keeps_its_name_in_any_script(client: Client) -> None:
 def test_a_table_of_samples_is_checked_and_used(client: Client, tmp_path: Path) -> None:
     file = tmp_path / "runs.csv"
     file.write_text("gene_0,value\n0.25,0.41\n1.5,x\n")
-    wrong = client.bench.check_samples(file, "toy_function")
-    assert [(each.line, each.column) for each in wrong.errors] == [(3, "value")]
+    with pytest.raises(InvalidSamples, match=r"runs.csv:3, value: 'x' is no number") as wrong:
+        client.bench.check_samples(file, "toy_function")
+    assert [(each.line, each.column) for each in wrong.value.errors] == [(3, "value")]
     file.write_text("gene_0,value\n0.25,0.41\n")
-    found = client.bench.check_samples(file, "toy_function", options={})
-    known = [sample.model_dump(mode="json") for sample in found.samples]
+    known = client.bench.check_samples(file, "toy_function", options={})
     experiment = submitted(client, samples=known)
     assert client.experiment(experiment.id).spec["reality"]["samples"][0]["values"] == [0.41]
     with pytest.raises(ServiceError, match="unknown robot"):

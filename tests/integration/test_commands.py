@@ -209,17 +209,24 @@ def test_a_failure_is_on_standard_error_and_the_document_is_not_half_there(gapla
     assert said.out == ""
 
 
+@pytest.mark.parametrize(("failing", "state"), [(slice(None), "FAILED"), (slice(1), "COMPLETED")])
 def test_a_failed_experiment_is_a_document_and_still_a_failure_for_the_shell(
-    gaplab: Gaplab, study: str, sqlite_store: Store
+    gaplab: Gaplab, study: str, sqlite_store: Store, finish: Callable[[], None], failing: slice, state: str
 ) -> None:
-    for claim in execution.claim(sqlite_store, "test", limit=10):
-        execution.fail(sqlite_store, claim, Failure("ValueError: the robot fell apart"))
+    claims = execution.claim(sqlite_store, "test", limit=10)
+    those = list(dict.fromkeys(claim.experiment_id for claim in claims))[failing]
+    for claim in claims:
+        if claim.experiment_id in those:
+            execution.fail(sqlite_store, claim, Failure("ValueError: the robot fell apart"))
+        else:
+            execution.hand_back(sqlite_store, claim)
+    finish()
 
     said = gaplab("watch", study, "--json")
     retried = gaplab("retry", study, "--json")
 
     assert said.code == Exit.FAILED
-    assert json.loads(said.out)["state"] == "FAILED"
+    assert json.loads(said.out)["state"] == state
     assert "the robot fell apart" in said.err
     assert json.loads(retried.out)["state"] == "QUEUED"
 
