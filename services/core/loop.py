@@ -64,8 +64,7 @@ class Setting:
         repetition: number of the repetition, from 0.
         batch_size: returns how many rollouts a call of `simulate` should have at present; it changes no number.
         sense: simulation with readings; None if the robot has no sensors.
-        reading_times_s: `(q,)`: time of each reading.
-        reading_periods: `(q,)`: period of each reading, over its noise; 0 if it has none.
+        reading_times_s, reading_periods: `(q,)`: time of each reading, and its period over its noise; 0 for none.
         discrepancy: what tuning minimises.
         tuner: finds simulators.
         held_out: share of the samples that no tuning sees.
