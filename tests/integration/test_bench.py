@@ -587,6 +587,13 @@ def sent(store: Store, name: str) -> str:
     return attachments.store_attachment(store, name.encode(), name, "text/plain").id
 
 
+def test_a_file_has_a_byte_or_more(sqlite_store: Store) -> None:
+    with pytest.raises(InvalidSpec, match="an attachment has 1 to"):
+        attachments.store_attachment(sqlite_store, b"", "empty", "text/plain")
+
+    assert attachments.store_attachment(sqlite_store, b"1", "contact", "text/plain").size == 1
+
+
 @pytest.mark.dialects
 def test_a_file_goes_with_the_last_answer_that_names_it(store: Store) -> None:
     shared, own, waits, old, again = (sent(store, name) for name in ("shared", "own", "waits", "old", "again"))
