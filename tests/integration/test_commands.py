@@ -310,7 +310,7 @@ def test_each_detail_of_a_plug_in_has_a_line_in_words(gaplab: Gaplab) -> None:
     assert "controller: square_pulses, options (period_s 0.5)" in lines
     assert "tunables: none" in lines
     assert "function: no" in lines
-    assert any(line.startswith("sensors: roll, unit rad, noise 0.02; pitch, unit rad") for line in lines)
+    assert any(line.startswith("sensors: roll, unit rad, noise 0.02, period 6.28") for line in lines)
     assert any(line.startswith("reading_times_s: 0.75, 1, 1.25") for line in lines)
 
 
