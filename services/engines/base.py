@@ -74,6 +74,11 @@ class Engine(Plugin):
         """Return whether the engine can simulate the world."""
 
     @classmethod
+    def exceeded(cls, world: World) -> str | None:  # noqa: ARG003 - for those that have a limit
+        """Return which limit of the engine the world exceeds, for the error that says so; None for none."""
+        return None
+
+    @classmethod
     def lacks(cls, world: World) -> tuple[str, ...]:
         """Return the names of the fields that the world uses and the engine does not honour, sorted.
 

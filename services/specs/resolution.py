@@ -180,7 +180,8 @@ def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
     engine, _ = engines.check(ref, pointer)
     able = [name for name, each in engines.items() if runs(each, robot.world)]
     if ref.name not in able:
-        message = f"{ref.name} cannot run the {robot.label}; {' and '.join(able)} can"
+        why = engine.exceeded(robot.world)
+        message = f"{ref.name} cannot run the {robot.label}{f', since {why}' if why else ''}; {' and '.join(able)} can"
         raise InvalidSpec([Violation(pointer, ref.name, message, able)])
     if not engine.available():
         installed = [name for name in able if engines[name].available()]

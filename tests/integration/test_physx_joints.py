@@ -134,6 +134,9 @@ def test_more_surfaces_than_collision_groups_are_not_simulated() -> None:
 
     assert PhysX.runs(with_surfaces(MOST_SURFACES))
     assert not PhysX.runs(with_surfaces(MOST_SURFACES + 1))
+    assert (
+        PhysX.exceeded(with_surfaces(MOST_SURFACES + 1)) == f"it has {MOST_SURFACES + 1} special surfaces, and PhysX 31"
+    )
 
 
 FEET: list[Shape | tuple[Part, ...]] = [

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from io import BytesIO
 from typing import Any
 
@@ -19,6 +20,7 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.core.robot_files import RobotFile, read_robot_file
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.robots.robot_file import Imported
+from gaplab.services.core.world import Inertia
 from gaplab.services.experiments import stored_robots, submission
 from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.running import execution
@@ -165,6 +167,18 @@ def test_a_robot_that_the_process_knows_but_that_is_not_stored_is_refused(store:
 
     with pytest.raises(InvalidSpec, match=r"no robot with the hash .* is stored here"):
         submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC | {"robot": unstored}))
+
+
+def test_it_is_said_why_an_engine_cannot_run_a_robot(store: Store) -> None:
+    inertia = Inertia((0.01, 0.01, 0.01))
+    bodies = [replace(body, shape=body.parts * 30, inertia=inertia) for body in Quadruped().world.bodies]
+    world = replace(Quadruped().world, bodies=tuple(bodies))
+    stored_robots.add_robot(store, file_of().model_copy(update={"world": world}).text)
+
+    with pytest.raises(InvalidSpec, match=r"pybullet cannot run the .*, since its bodies and shapes need \d+ links"):
+        submission.submit_experiment(
+            store, ExperimentSpec.model_validate(SPEC | {"robot": "walker", "engine": "pybullet"})
+        )
 
 
 def test_a_robot_from_a_file_takes_no_options(store: Store) -> None:

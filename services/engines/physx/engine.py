@@ -55,7 +55,13 @@ class PhysX(SteppedEngine[PhysXScene]):
     @classmethod
     def runs(cls, world: World) -> bool:
         """Return whether the world has bodies, with no more surfaces than PhysX can tell apart."""
-        return super().runs(world) and len(surface_names(world)) <= 1 + MOST_SURFACES
+        return super().runs(world) and cls.exceeded(world) is None
+
+    @classmethod
+    def exceeded(cls, world: World) -> str | None:
+        """Return how many surfaces the world has, if PhysX cannot tell them apart."""
+        found = len(surface_names(world)) - 1
+        return None if found <= MOST_SURFACES else f"it has {found} special surfaces, and PhysX {MOST_SURFACES}"
 
     def _build(self, world: World) -> PhysXScene:
         return PhysXScene(self._library, world)

@@ -53,7 +53,15 @@ class PyBullet(SteppedEngine[PyBulletScene]):
     @classmethod
     def runs(cls, world: World) -> bool:
         """Return whether the world has bodies, and no more links than Bullet permits."""
-        return super().runs(world) and len(links_of(world)) - 1 <= MOST_LINKS
+        return super().runs(world) and cls.exceeded(world) is None
+
+    @classmethod
+    def exceeded(cls, world: World) -> str | None:
+        """Return how many links the world needs, if Bullet has fewer: one for each body and each further shape."""
+        needed = len(links_of(world)) - 1 if world.bodies else 0
+        if needed <= MOST_LINKS:
+            return None
+        return f"its bodies and shapes need {needed} links beside the base, and Bullet has {MOST_LINKS}"
 
     def _build(self, world: World) -> PyBulletScene:
         return PyBulletScene(self._bullet, world)
