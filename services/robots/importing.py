@@ -127,7 +127,7 @@ def _world(source: Source, bodies: Bodies, options: ImportOptions, notes: Notes)
         surfaces=surfaces,
         start_height_m=height_m,
         start_turn=turn,
-        gravity_m_s2=0.0 if _flags(model, "disable") >= {"gravity"} else abs(float(model.opt.gravity[2])),
+        gravity_m_s2=0.0 if "gravity" in _flags(model, "disable") else abs(float(model.opt.gravity[2])),
         time_step_s=options.time_step_s or usual_step_s,
         fixed=fixed,
         observed=options.observed or (_last(joints) if fixed else ""),

@@ -119,9 +119,9 @@ def _note_losses(root: Element, notes: Notes) -> None:
             notes.lose(line, *owners)
     if foreign := list(dict.fromkeys(str(each.tag) for each in root.iter() if ":" in str(each.tag))):
         notes.lose("elements of extensions are lost: {}", *foreign)
-    shaped = [_name(link) for link in root.findall("link") if link.find("collision") is not None]
-    if weightless := [_name(link) for link in root.findall("link") if link.find("inertial") is None]:
-        notes.lose("without <inertial>, so without a mass of their own: {}", *(n for n in weightless if n in shaped))
+    shaped = [link for link in root.findall("link") if link.find("collision") is not None]
+    if weightless := [_name(link) for link in shaped if link.find("inertial") is None]:
+        notes.lose("without <inertial>, so without a mass of their own: {}", *weightless)
 
 
 def _speeds(root: Element) -> Iterator[tuple[str, float]]:
@@ -167,9 +167,8 @@ def find_mesh(given: str, folder: Path) -> Path | None:
         return folder / given if given and (folder / given).is_file() else None
     folders, (package, _, inside) = [folder, *folder.parents], rest.partition("/")
     named = [here / rest for here in folders]
-    stated = [here / inside for here in folders if _package(here / inside) == package]
-    renamed = [here / inside for here in folders if _package(here / inside) in {None, package}]
-    return next((each for each in (*named, *stated, *renamed) if inside and each.is_file()), None)
+    owned = [here / inside for owner in (package, None) for here in folders if _package(here / inside) == owner]
+    return next((each for each in (*named, *owned) if inside and each.is_file()), None)
 
 
 def _package(file: Path) -> str | None:
