@@ -87,7 +87,7 @@ def test_the_root_says_whether_the_base_moves(tmp_path: Path) -> None:
     fixed = FLOATING.replace("scene", "world").replace("floating", "fixed")
     worlds = [imported(tmp_path, edits={BASE: BASE + more}).robot.world for more in ("", FLOATING, fixed)]
 
-    assert not [line for line in imported(tmp_path, edits={BASE: BASE + FLOATING}).robot.lost if "<inertial>" in line]
+    assert not [line for line in imported(tmp_path, edits={BASE: BASE + fixed}).robot.lost if "<inertial>" in line]
     assert [(world.fixed, world.bodies[0].name, len(world.joints)) for world in worlds[:2]] == [(False, "base", 1)] * 2
     assert (worlds[2].fixed, len(worlds[2].joints)) == (True, 1)
 
