@@ -20,7 +20,7 @@ class Test(Frozen):
 
 
 class Estimate(Frozen):
-    """A number with its 95 % bootstrap interval.
+    """A number with its 95 % interval: by Student's t for a mean, over bootstrap resamples for all else.
 
     The ends are null if they were not asked for, if there are fewer than two values, or if all resamples agree.
     """

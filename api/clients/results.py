@@ -78,7 +78,7 @@ class Results:
             last: last number; left out: the last that all experiments have.
             margin: difference in the unit of fitness; `equivalence` of a pair says whether it differs by less.
             margin_of_direct: the same margin as a share of the direct baseline's mean fitness, like 0.03.
-            intervals: with bootstrap intervals; left out: for up to 20 experiments.
+            intervals: with intervals; left out: for up to 20 experiments.
         """
         records = [each for id in _several(experiments) for each in experiments_of(self._records.find(id))]
         query: dict[str, Parameter] = {"experiment": [each.id for each in records], "from": first, "to": last}

@@ -71,9 +71,7 @@ class ComparisonQuery(MarginQuery):
     to_evaluations: Evaluations = Field(
         default=None, alias="to", description="last number; left out: the last that the experiments share"
     )
-    intervals: bool | None = Field(
-        default=None, description="with bootstrap intervals; left out: for up to 20 experiments"
-    )
+    intervals: bool | None = Field(default=None, description="with intervals; left out: for up to 20 experiments")
 
 
 @router.get(

@@ -110,7 +110,7 @@ def compare_all(
         first: first number of real-world evaluations.
         last: last number of real-world evaluations.
         margin: difference in the unit of fitness within which two experiments are equivalent; None: not tested.
-        intervals: with bootstrap intervals.
+        intervals: with intervals.
     """
     over = Range(first, last)
     summaries = {one.id: summary(over.values(one), intervals=intervals) for one in experiments}

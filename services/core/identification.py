@@ -70,9 +70,13 @@ def overfitting(point: MisfitPoint, unit: str) -> str:
 
 
 def remaining(found: TunableDistribution) -> float | None:
-    """Return the share of the uncertainty before any sample that is left; None if nothing says it."""
+    """Return the share of the uncertainty before any sample that is left, at most 1; None if nothing says it.
+
+    Values at both bounds spread more than uniform draws. That is as uncertain as before, not more.
+    """
     spread = found.spread if found.n >= FEWEST else None
-    return max((each for each in (spread, found.interval, found.posterior) if each is not None), default=None)
+    known = [min(each, 1.0) for each in (spread, found.interval, found.posterior) if each is not None]
+    return max(known, default=None)
 
 
 def _verdict(

@@ -1,7 +1,9 @@
-"""Bootstrap intervals of the mean, the interquartile mean and the probability of improvement.
+"""Intervals of the mean, by Student's t; of the interquartile mean and the probability of improvement, by bootstrap.
+
+Of eight values, percentiles of resampled means hold the mean in 89 % of cases rather than 95 %, Student's t in 95 %.
 
 Source: Agarwal et al. 2021, Deep reinforcement learning at the edge of the statistical precipice (rliable). As there,
-an interval holds 95 % of the statistic over resamples (percentiles). Unlike BCa's, its ends exist for every sample.
+a bootstrap interval holds 95 % of the statistic over resamples. Unlike BCa's, its ends exist for every sample.
 Each interval draws its resamples from one fixed stream, so that equal values have equal intervals.
 """
 
@@ -34,7 +36,9 @@ def summary(values: FloatArray, *, intervals: bool) -> Summary:
     there = finite(values)
     point = curve_point(0, there)
     middle = known(_interquartile_mean(there)) if len(there) else None
-    of_mean, of_middle = _ends_of_means(there.tobytes()) if intervals else ((None, None), (None, None))
+    unequal = intervals and len(there) > 1 and not constant(there)
+    of_mean = (point.lower, point.upper) if unequal else (None, None)
+    of_middle = _ends_of_middle(there.tobytes()) if unequal else (None, None)
     return Summary(
         n=point.n, sd=point.sd, mean=_estimate(point.mean, of_mean), interquartile_mean=_estimate(middle, of_middle)
     )
@@ -60,12 +64,9 @@ def improvement(first: FloatArray, second: FloatArray, *, paired: bool, interval
 
 
 @lru_cache(maxsize=_KEPT)
-def _ends_of_means(values: bytes) -> tuple[Ends, Ends]:
-    """Return the intervals of the mean and of the interquartile mean."""
-    found = np.frombuffer(values)
-    if len(found) < 2 or constant(found):
-        return (None, None), (None, None)
-    return _ends((found,), np.mean), _ends((found,), _interquartile_mean)
+def _ends_of_middle(values: bytes) -> Ends:
+    """Return the interval of the interquartile mean."""
+    return _ends((np.frombuffer(values),), _interquartile_mean)
 
 
 @lru_cache(maxsize=_KEPT)

@@ -20,7 +20,7 @@ NAMES = {
 
 
 def summaries(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
-    """Return mean and interquartile mean of each experiment, with their bootstrap intervals."""
+    """Return mean and interquartile mean of each experiment, with their intervals."""
     found: dict[str, Summary] = {}
     for pair in compared:
         found |= {pair.first: pair.summary_first, pair.second: pair.summary_second}
@@ -29,9 +29,7 @@ def summaries(facts: Facts, compared: Sequence[Comparison], caption: str) -> Gri
         (names[key], f"{one.n}", _estimate(one.mean), _estimate(one.interquartile_mean), fixed(one.sd))
         for key, one in found.items()
     )
-    return Grid(
-        f"{caption}, with 95 % bootstrap intervals", ("Experiment", "n", "Mean", "Interquartile mean", "SD"), rows
-    )
+    return Grid(f"{caption}, with 95 % intervals", ("Experiment", "n", "Mean", "Interquartile mean", "SD"), rows)
 
 
 def pairs(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:

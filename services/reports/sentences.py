@@ -76,8 +76,13 @@ def _disagreements(pairs: Sequence[Comparison], names: Mapping[str, str]) -> Ite
         tests = {"Wilcoxon": pair.wilcoxon.p_holm} if pair.shared_streams else unpaired
         other = [name for name, p in tests.items() if p is not None and (p < SIGNIFICANT) != differs(pair)]
         if other and p_of(pair) is not None:
-            result = "does not find" if differs(pair) else "finds"
-            yield f"{' and '.join(other)} {result} a difference between {names[pair.first]} and {names[pair.second]}."
+            found, p = (
+                ("differ", f"p of at least {SIGNIFICANT}")
+                if differs(pair)
+                else ("are not shown to differ", f"p below {SIGNIFICANT}")
+            )
+            both = f"{names[pair.first]} and {names[pair.second]}"
+            yield f"{both} {found} by the test that the verdict goes by, although {' and '.join(other)} has a {p}."
 
 
 def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: Sequence[Comparison]) -> Iterator[str]:

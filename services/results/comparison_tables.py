@@ -82,7 +82,7 @@ def _experiments(comparisons: Sequence[Comparison], unit: str) -> str:
         [_name(name), str(one.n), _estimate(one.mean), _estimate(one.interquartile_mean), _plain(one.sd)]
         for name, one in found.values()
     ]
-    caption = f"Fitness in reality{_units(unit)}, {_where(comparisons[0])}, with 95\\,\\% bootstrap intervals"
+    caption = f"Fitness in reality{_units(unit)}, {_where(comparisons[0])}, with 95\\,\\% intervals"
     return _table(caption, ["Experiment", "$n$", "Mean", "Interquartile mean", "SD"], rows)
 
 

@@ -20,7 +20,7 @@ from gaplab.services.store.queries import experiments
 from gaplab.services.store.session import Session, Store
 
 MOST_WITH_INTERVALS = 20
-"""Most experiments whose comparison has bootstrap intervals unless it is asked for without them."""
+"""Most experiments whose comparison has intervals unless it is asked for without them."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def compare(
         from_evaluations: the first number of evaluations; by default the last.
         to_evaluations: the last number of evaluations; by default the last that the experiments share.
         margin: difference within which two experiments are equivalent; None: not tested.
-        intervals: with bootstrap intervals; by default for up to `MOST_WITH_INTERVALS` experiments.
+        intervals: with intervals; by default for up to `MOST_WITH_INTERVALS` experiments.
 
     Raises:
         NotFound: an experiment does not exist.

@@ -1,5 +1,5 @@
 // @ts-check
-/** Each experiment over the chosen range, with bootstrap intervals. */
+/** Each experiment over the chosen range, with intervals. */
 
 import { h } from "../../lib/dom.js";
 import { threeDigits } from "../../lib/format.js";
