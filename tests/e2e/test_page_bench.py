@@ -110,6 +110,8 @@ def test_an_operator_keeps_the_form_when_the_experiment_is_paused(visit: Any, ap
     page.get_by_role("button", name="Give it back").click()
     expect(page.get_by_text("Nothing is to be measured now.")).to_be_visible()
 
+    visit.forgive(*CUT)
+    page.route(re.compile("/events(\\?|$)"), lambda route: route.abort())  # it learns of the state from a reload alone
     page.goto(f"{api.url}/#/experiments/{experiment.id}?tab=samples")
     panel = page.get_by_role("tabpanel")
     panel.scroll_into_view_if_needed()

@@ -185,7 +185,10 @@ def test_a_spec_that_compares_readings_needs_a_robot_that_has_some() -> None:
         )
 
     (violation,) = refused.value.violations
-    assert (violation.pointer, violation.permitted) == ("/discrepancy", ["absolute_fitness", "huber", "squared_fitness"])
+    assert (violation.pointer, violation.permitted) == (
+        "/discrepancy",
+        ["absolute_fitness", "huber", "squared_fitness"],
+    )
 
 
 def test_a_tuner_that_needs_squares_says_so() -> None:

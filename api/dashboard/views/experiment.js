@@ -40,8 +40,10 @@ export async function show(root, parameters, signal) {
     update: () => top.update(),
     hasEnded: () => ENDED.includes(page.experiment.state),
     ...latestAnswers(() => getTagged(`/experiments/${id}`, signal), ({ value, tag }) => {
+      const isMoved = value.state !== page.experiment.state;
       Object.assign(page, { experiment: value, tag });
       page.update();
+      if (isMoved) page.sections.reload([]);  // what they say may depend on the state
     }),
   };
   const top = head(page);
@@ -76,16 +78,14 @@ function panels(page) {
 }
 
 /**
- * Reload what events change, and everything after a change of state whose event was missed.
+ * Reload what events change.
  *
  * @param {Page.ExperimentPage} page
  */
 function keepUp(page) {
   const refresh = async (/** @type {Page.ServerEvent[]} */ events) => {
     page.sections.reload(events);
-    const before = page.experiment.state;
     await page.reload();
-    if (page.experiment.state !== before) page.sections.reload([]);
   };
   follow({ experiment: page.id, after: page.latest }, refresh, page.signal);
   reloadEvery(page, RELOAD_MS);
