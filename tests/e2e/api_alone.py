@@ -9,7 +9,7 @@ from typing import Any
 
 import httpx2
 
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 
 class Api:
@@ -25,7 +25,7 @@ class Api:
             probe.bind(("127.0.0.1", 0))
             self._port = probe.getsockname()[1]
         self.url = f"http://127.0.0.1:{self._port}"
-        self.http = httpx2.Client(base_url=self.url, timeout=120)
+        self.http = httpx2.Client(base_url=self.url, timeout=LONGEST_S)
         self._log = log
         self._environment = os.environ | {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(self._port)}
         self._environment |= {"GAPLAB_PLUGINS": str(plugins)}

@@ -30,7 +30,7 @@ class Service:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
         self.url = f"http://127.0.0.1:{port}"
-        self.http = httpx2.Client(base_url=self.url, timeout=120)
+        self.http = httpx2.Client(base_url=self.url, timeout=LONGEST_S)
         self._log = folder / "service.log"
         self._environment = os.environ | {
             "GAPLAB_DATABASE_URL": database_url or f"sqlite:///{folder / 'gaplab.db'}",

@@ -16,7 +16,7 @@ import pytest
 from gaplab.api.process.local_service import LocalService, local_service
 from tests.experiments import same
 from tests.pretended_robot import SETTINGS
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 pytestmark = pytest.mark.release
 
@@ -35,7 +35,6 @@ SPEC = {
     },
     "seed": 7,
 }
-LONGEST_S = 600.0
 
 
 @pytest.fixture(scope="module")

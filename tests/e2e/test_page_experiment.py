@@ -14,7 +14,7 @@ from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 NAME = "simulated_fit"
 
@@ -200,7 +200,7 @@ def test_its_files_are_saved(api: Any, known: Any, visit: Any) -> None:
         figure.scroll_into_view_if_needed()
     links = page.locator(".figures .files a, .figure-curves .files a")
     expect(links).to_have_count(4 * 3 + 4)
-    drawn = httpx2.get(f"{api.url}/{links.first.get_attribute('href')}", timeout=120)
+    drawn = httpx2.get(f"{api.url}/{links.first.get_attribute('href')}", timeout=LONGEST_S)
     assert drawn.status_code == 200
 
 
