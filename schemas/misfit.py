@@ -39,7 +39,7 @@ class TunableDistribution(Distribution):
 
 
 class MisfitPoint(Frozen):
-    """The best simulators of one iteration; those of iteration 0 are random."""
+    """The best simulators of one iteration; those before the first sample are random."""
 
     iteration: int
     error: Distribution = Field(

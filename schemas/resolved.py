@@ -73,7 +73,7 @@ class ResolvedSpec(ExperimentSpec):
     """
 
     name: Label
-    iterations: Count
+    iterations: Annotated[int, Field(strict=True, ge=0, le=10_000_000)]
     repetitions: Count
     robot: PluginRef
     controller: PluginRef | None

@@ -103,8 +103,10 @@ class RealitySpec(Frozen):
 class SharedSettings(Frozen):
     """Settings that all experiments of a study share."""
 
-    iterations: Annotated[Count, Field(le=1_000)] | None = Field(
-        default=None, description="real-world evaluations of each repetition; the paper: 10"
+    iterations: Annotated[int, Field(strict=True, ge=0, le=1_000)] | None = Field(
+        default=None,
+        description="real-world evaluations of each repetition; the paper: 10. 0: tune on the samples from before, and "
+        "measure nothing",
     )
     repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
         default=None, description="repetitions of each experiment; the paper: 40"

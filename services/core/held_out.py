@@ -17,7 +17,8 @@ ROUNDING = 1e-9
 def is_held_out(number: int, share: float) -> bool:
     """Return whether sample `number`, from 1, is held out: each fifth with a share of 0.2.
 
-    It depends on nothing else, so an experiment that is extended holds out the same samples.
+    Samples from before the experiment are the first. It depends on nothing else, so an experiment that is extended
+    holds out the same samples.
     """
     return int(number * share + ROUNDING) > int((number - 1) * share + ROUNDING)
 

@@ -206,8 +206,7 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     strategy = setting.strategy
     if not strategy.tunes:
         return Tuned(iteration, history.simulators)
-    seen, unseen = split(history.samples[len(setting.known_samples) :], setting.held_out)
-    seen = setting.known_samples + seen
+    seen, unseen = split(history.samples, setting.held_out)
     evaluations = setting.budget.simulator_evaluations // setting.tuner.divisor(len(seen))
     ensemble, budget = strategy.ensemble, evaluations * len(seen) + len(unseen)
     if _keeps(setting, history):

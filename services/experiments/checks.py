@@ -93,7 +93,7 @@ def queue(session: Session, spec: Checked) -> SensitivityRow:
 
 def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
     """Queue the check that these experiments share; an experiment without tunables has none."""
-    tuning = [row for row in experiments if row.iterations > 1]
+    tuning = [row for row in experiments if row.tunes]
     if not tuning:
         return
     check = queue(session, checked(tuning[0].spec))
@@ -134,7 +134,7 @@ def summaries(session: Session, experiments: Iterable[ExperimentRow]) -> dict[st
 
     An imported experiment names no check: it has the check of the same tunables, if there is one.
     """
-    ids = {row.id: row.sensitivity_id or _id_of_text(subject(row.spec)) for row in experiments if row.iterations > 1}
+    ids = {row.id: row.sensitivity_id or _id_of_text(subject(row.spec)) for row in experiments if row.tunes}
     rows = session.scalars(select(SensitivityRow).where(SensitivityRow.id.in_(ids.values())))
     found = {row.id: CheckSummary(row.id, warnings(row)) for row in rows}
     return {experiment: found[check] for experiment, check in ids.items() if check in found}

@@ -151,7 +151,7 @@ def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bo
         archived_at=row.archived_at,
         strategy=row.strategy,
         direct=row.strategy in strategies and strategies[row.strategy].in_reality,
-        level=row.iterations == 1,  # a strategy with samples has at least one iteration after number 0
+        level=not row.tunes,
         state=row.state,
         caveat=caveat_of(row.state, work.tally),
         spec=without_truth(row.spec) if secret else row.spec,

@@ -94,7 +94,7 @@ def _fitness(sample: SampleRead) -> float:
 
 def _latest(session: Session, row: ExperimentRow, repetition: int) -> tuple[SimulatorRead, ...]:
     """Return the simulators of the latest tuning of a repetition; none of an experiment that tunes nothing."""
-    if row.iterations < 2:
+    if not row.tunes:
         return ()
     found = results.page_of_simulators(
         session, row, repetition=repetition, iteration=None, limit=MOST_ROWS, cursor=None

@@ -112,7 +112,7 @@ def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
         state=row.state,
         unit=unit(spec),
         direct=direct,
-        level=row.iterations == 1,
+        level=not row.tunes,
         points=curve_points(values),
         best_of=best_of_searches(values[:, 0]) if direct else (),
     )

@@ -25,7 +25,7 @@ class TunedSimulators:
         error: kind of error that tuning minimised.
         dimensions: the tunables.
         simulators: the best of each iteration of each repetition.
-        errors: squared errors by iteration and repetition, without iteration 0; None if the physics failed.
+        errors: squared errors by iteration and repetition, from the first sample on; None if the physics failed.
         samples: numbers of samples that the simulators were tuned on, by iteration and repetition.
         truth: the known parameters of reality; None as long as they are hidden, empty if reality has none.
         real_engine: the engine of reality, if it is not that of the simulators.
@@ -49,16 +49,17 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        simulators = tunings.best_simulators(session, experiment_id) if row.iterations > 1 else ()
+        simulators = tunings.best_simulators(session, experiment_id) if row.tunes else ()
         measured = tunings.measured(session, row)
         hidden = row.id in hiding.hidden(session, [row])
     spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
     errors: dict[int, dict[int, float | None]] = defaultdict(dict)
     samples: dict[int, dict[int, int]] = defaultdict(dict)
     for simulator in simulators:
-        if at := simulator.iteration:
+        at = simulator.iteration
+        if count := measured.tuned_until(simulator.repetition, at):
             errors[at][simulator.repetition] = simulator.squared_error
-            samples[at][simulator.repetition] = measured.tuned_until(simulator.repetition, at)
+            samples[at][simulator.repetition] = count
     real = spec.reality.engine
     elsewhere = real is None or real.name != spec.engine.name
     return TunedSimulators(

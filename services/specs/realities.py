@@ -46,7 +46,7 @@ def physical_reality(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
         parameters={},
         bench=given.bench or robot.label,
         repeats=given.repeats,
-        probes=given.probes or PHYSICAL_PROBES,
+        probes=given.probes or ("never" if spec.iterations == 0 else PHYSICAL_PROBES),
         samples=given.samples,
         limits=given.limits,
         beyond=given.beyond,

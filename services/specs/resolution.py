@@ -69,8 +69,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     real = simulated if physical else spec.reality.engine or simulated
     place = "/reality/engine" if spec.reality.engine and not physical else "/engine"
     engine, reality_engine = gather(lambda: _engine(simulated, robot, "/engine"), lambda: _engine(real, robot, place))
-    budget, iterations = _budget(spec, preset), spec.iterations or preset.iterations
-    divisor = tuner.divisor(seen_of(iterations, spec.held_out) + len(spec.reality.samples))
+    budget, iterations = _budget(spec, preset), preset.iterations if spec.iterations is None else spec.iterations
+    divisor = tuner.divisor(seen_of(iterations + len(spec.reality.samples), spec.held_out))
     if violations := [
         *engine_violations(robot, {reality_engine: "/reality/engine", engine: "/engine"}),
         *tunable_violations(spec, robot, engine),

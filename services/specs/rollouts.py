@@ -32,6 +32,6 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
 
 def _of_tuning(spec: ResolvedSpec, iteration: int) -> int:
     """Return the rollouts of the tuning of an iteration, with the tests on samples that are held out."""
-    seen = seen_of(iteration, spec.held_out)
-    samples, tests = seen + len(spec.reality.samples), iteration - seen
-    return spec.budget.simulator_evaluations // tuners.create(spec.tuner).divisor(samples) * samples + tests
+    samples = iteration + len(spec.reality.samples)
+    seen = seen_of(samples, spec.held_out)
+    return spec.budget.simulator_evaluations // tuners.create(spec.tuner).divisor(seen) * seen + samples - seen

@@ -60,7 +60,10 @@ def tuning_violations(robot: Robot, discrepancy: Discrepancy, tuner: Tuner) -> I
 
 
 def strategy_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) -> Iterator[Violation]:
-    """Yield a strategy that needs sensors which the robot lacks, and named tunables that the spec does not tune."""
+    """Yield what a strategy lacks: sensors of the robot, tunables that it names, samples."""
+    if spec.iterations == 0 and strategy.takes_samples and not spec.reality.samples:
+        message = "0 iterations tune on samples from before alone, and the spec has none"
+        yield Violation("/iterations", 0, message, "at least 1, or samples in /reality/samples")
     if strategy.senses and not robot.sensors.size:
         able = [name for name, each in robots.items() if each.example().sensors.size]
         message = (

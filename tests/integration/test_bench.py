@@ -31,6 +31,9 @@ from gaplab.services.experiments.deletion import Deleter, delete_experiment
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.reading import list_samples, read_experiment
 from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.reports.outcome import outcome_of
+from gaplab.services.results.misfit import misfit
+from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
@@ -503,6 +506,29 @@ def test_known_samples_tune_the_first_simulators(store: Store) -> None:
     (log,) = log_of(store, experiment)
     assert log[0].cost.rollouts > 0
     assert log[0].simulators[0].squared_error < 1e-2
+
+
+def test_without_iterations_one_tunes_on_what_was_measured_before(store: Store) -> None:
+    real = truth(bench())
+    known = [{"genome": [gene], "values": [real([gene])]} for gene in (0.2, 0.7, 0.4, 0.9)]
+    spec = bench(iterations=0, held_out=0.25, reality={"samples": known, "probes": None})
+    experiment = submit_experiment(store, spec)
+
+    assert compute(store) == 1
+
+    assert pending(store) == ()
+    read = read_experiment(store, experiment.id)
+    (log,) = log_of(store, experiment)
+    found = misfit(store, experiment.id)
+    assert (read.state, read.level, read.progress.counted_iterations) == (State.COMPLETED, False, 0)
+    assert log[0].simulators[0].squared_error < 1e-2
+    assert [(point.error.n, point.held_out_error.n) for point in found.points] == [(1, 1)]
+    assert found.verdicts
+    assert tuned_simulators(store, experiment.id).samples == {0: {0: 3}}
+    assert outcome_of(store, experiment.id).samples == 3
+
+    with pytest.raises(InvalidSpec, match="0 iterations tune on samples from before alone, and the spec has none"):
+        resolve_experiment(bench(iterations=0))
 
 
 def test_repeats_weigh_samples_and_put_a_floor_under_weights(store: Store) -> None:

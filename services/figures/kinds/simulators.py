@@ -145,7 +145,7 @@ def _caption(
     of = f" of {all_}" if all_ > repetitions else ""
     parts = [
         f"The best simulator after each iteration of {number_of('repetition', repetitions)}{of}, within the bounds of "
-        "tuning; those of iteration 0 are random."
+        "tuning; those before the first sample are random."
     ]
     if real_engine:
         parts.append(f"Reality is the engine {printable(real_engine)}: no setting of the simulators is reality.")

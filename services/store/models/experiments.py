@@ -100,6 +100,11 @@ class ExperimentRow(Base):
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
 
+    @property
+    def tunes(self) -> bool:
+        """Whether it has samples to tune on: it takes some, beside iteration 0, or has some from before."""
+        return self.iterations > 1 or bool(self.spec["reality"]["samples"])
+
 
 class RepetitionRow(LeasedRow):
     """One run of the algorithm, with its lease and its tallies.

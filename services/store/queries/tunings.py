@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.discrepancies.base import Discrepancy
-from gaplab.services.core.held_out import is_held_out
+from gaplab.services.core.held_out import is_held_out, seen_of
 from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries.repetition_rows import of_experiments
 
@@ -55,12 +55,14 @@ class MeasuredIterations:
     Attributes:
         tuned_on: those of the samples that tuning sees.
         held_out: those of the samples that it does not see.
-        known: number of samples from before the experiment; every tuning sees them.
+        known: number of samples from before the experiment that every tuning sees.
+        known_held_out: number of those that none sees.
     """
 
     tuned_on: Mapping[int, Sequence[int]]
     held_out: Mapping[int, Sequence[int]]
     known: int = 0
+    known_held_out: int = 0
 
     def tuned_until(self, repetition: int, iteration: int) -> int:
         """Return the number of samples that the simulators of an iteration were tuned on."""
@@ -68,7 +70,7 @@ class MeasuredIterations:
 
     def tested_until(self, repetition: int, iteration: int) -> int:
         """Return the number of held-out samples that the simulators of an iteration were tested on."""
-        return _until(self.held_out, repetition, iteration)
+        return self.known_held_out + _until(self.held_out, repetition, iteration)
 
 
 def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
@@ -76,13 +78,13 @@ def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
     row, share = MeasurementRow, experiment.spec["held_out"]
     query = of_experiments(row, [experiment.id], RepetitionRow.number, row.iteration)
     tuned_on, held_out = dict[int, list[int]](), dict[int, list[int]]()
+    before = len(experiment.spec["reality"]["samples"])
     for repetition, iteration in session.execute(
         query.where(row.kind == MeasurementKind.SAMPLE, row.fitness.is_not(None))
     ):
-        (held_out if is_held_out(iteration, share) else tuned_on).setdefault(repetition, []).append(iteration)
-    tunes = experiment.iterations > 1  # a strategy without samples has iteration 0 only, and tunes nothing
-    known = len(experiment.spec["reality"]["samples"]) if tunes else 0
-    return MeasuredIterations(tuned_on, held_out, known)
+        (held_out if is_held_out(before + iteration, share) else tuned_on).setdefault(repetition, []).append(iteration)
+    known = seen_of(before, share)
+    return MeasuredIterations(tuned_on, held_out, known, before - known)
 
 
 def repeats(session: Session, experiment: str) -> list[list[float]]:

@@ -10,7 +10,7 @@ import { table } from "../../lib/table.js";
 import { REWRITES } from "./event_words.js";
 
 const KINDS = ["tuned", "probed", ...REWRITES];
-const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Iteration 0 is not tuned.";
+const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Simulators before the first sample are random.";
 
 const VERDICT_NOTE = "100 % is as uncertain as before any sample. The largest counts of the spread over repetitions, the tuner’s 95 % intervals, and its posterior. Agreement is not truth: simulators that lack an effect agree on a value that makes up for it.";
 
