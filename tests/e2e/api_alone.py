@@ -2,13 +2,13 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 from typing import Any
 
 import httpx2
 
+from tests.ports import free_port
 from tests.waiting import LONGEST_S, wait_until
 
 
@@ -21,9 +21,7 @@ class Api:
     """
 
     def __init__(self, database_url: str, log: Any, plugins: Any = "") -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = probe.getsockname()[1]
+        self._port = free_port()
         self.url = f"http://127.0.0.1:{self._port}"
         self.http = httpx2.Client(base_url=self.url, timeout=LONGEST_S)
         self._log = log

@@ -3,7 +3,6 @@
 import os
 import shlex
 import signal
-import socket
 import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -14,6 +13,7 @@ import psycopg
 
 from gaplab.api.clients.client import Client
 from tests.e2e.reading import ROOT, commands
+from tests.ports import free_port
 from tests.postgres import Installation, Server
 from tests.processes import processes_with
 from tests.waiting import wait_until
@@ -21,12 +21,6 @@ from tests.waiting import wait_until
 PASSWORD = "correct-horse"
 SERVERS = {"gaplab serve", "python -m workers serve", "python -m api"}
 """Lines that do not end by themselves."""
-
-
-def free_port() -> Any:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Postgres:

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import httpx2
 
+from tests.ports import free_port
 from tests.processes import processes, processes_with
 from tests.waiting import LONGEST_S, wait_until
 
@@ -26,9 +26,7 @@ class Service:
     """
 
     def __init__(self, folder: Path, database_url: str | None = None, plugins: Any = "") -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         self.url = f"http://127.0.0.1:{port}"
         self.http = httpx2.Client(base_url=self.url, timeout=LONGEST_S)
         self._log = folder / "service.log"

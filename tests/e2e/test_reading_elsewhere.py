@@ -12,8 +12,9 @@ from typing import Any
 
 import pytest
 
-from tests.e2e.elsewhere import PASSWORD, Postgres, Shell, free_port
+from tests.e2e.elsewhere import PASSWORD, Postgres, Shell
 from tests.e2e.reading import DOCUMENTS, ROOT, blocks
+from tests.ports import free_port
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.release

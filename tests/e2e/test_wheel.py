@@ -13,7 +13,7 @@ from zipfile import ZipFile
 import httpx2
 import pytest
 
-from tests.e2e.elsewhere import free_port
+from tests.ports import free_port
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.release

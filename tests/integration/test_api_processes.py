@@ -27,6 +27,7 @@ from gaplab.services.access import create_token, revoke_token
 from gaplab.services.core.errors import StoreUnavailable, Unauthenticated
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
+from tests.ports import free_port
 from tests.waiting import LONGEST_S, wait_until
 
 
@@ -60,9 +61,7 @@ def ended(environment: dict[str, str], *arguments: str) -> tuple[int, str]:
 
 @pytest.fixture
 def port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    return free_port()
 
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.release)])

@@ -6,7 +6,6 @@ What runs outside of gaplab in production, a service manager that starts again w
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -21,6 +20,7 @@ import httpx2
 
 from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
+from tests.ports import free_port
 from tests.soak import witness
 from tests.waiting import wait_until
 
@@ -112,9 +112,7 @@ class Stage:
         self.database, self.lease_s, self.plugins, self.history = database, lease_s, plugins, history
         self._folder = Path(folder)
         self.journal = self._folder / "journal.txt"
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = probe.getsockname()[1]
+        self._port = free_port()
         self.url = f"http://127.0.0.1:{self._port}"
         self._environment = os.environ | {
             "GAPLAB_DATABASE_URL": database.url_of_service,
