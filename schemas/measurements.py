@@ -116,6 +116,7 @@ class MeasurementSpec(Frozen):
     attachments: tuple[Hash, ...] = Field(
         default=(), max_length=20, description="hashes of stored attachments: a trace, a photograph"
     )
+    confirmed: bool = Field(default=False, description="a person was asked about what is doubtful, and it is right")
 
     @model_validator(mode="after")
     def _check_that_it_is_one(self) -> "MeasurementSpec":
@@ -124,6 +125,12 @@ class MeasurementSpec(Frozen):
         if self.traces is not None and self.readings is not None:
             raise ValueError("readings are computed from `traces`, so leave them out")
         return self
+
+
+class DoubtsRead(Frozen):
+    """What is plausible in an answer, but unlikely; nothing is stored."""
+
+    doubts: tuple[str, ...] = Field(examples=[("31 is 1e+02 times the other repeats",)])
 
 
 class AnswerState(StrEnum):
@@ -151,6 +158,11 @@ class AnswerRead(Frozen):
     note: str | None = Field(default=None, examples=["on the new carpet"])
     attachments: tuple[str, ...] = ()
     traces: tuple[TraceRead, ...] = Field(default=(), description="the traces that the values were computed from")
+    doubts: tuple[str, ...] = Field(
+        default=(),
+        description="what is unlikely about it, until a person confirms it: a decision that `this` counts",
+        examples=[("31 is 1e+02 times the other repeats",)],
+    )
     replaces: Id | None = Field(default=None, description="the answer that it corrects")
     reason: str | None = Field(
         default=None, description="why it was corrected, voided or dismissed", examples=["4.4 was 0.44"]

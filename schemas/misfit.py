@@ -46,6 +46,9 @@ class MisfitPoint(Frozen):
         description="error per sample over the samples tuned on; by default the root mean square of simulated minus "
         "real fitness"
     )
+    expected_error: Distribution = Field(
+        description="error per sample that noise and rough physics alone would leave; no values where noise is unknown"
+    )
     held_out_error: Distribution = Field(
         description="the same over the held-out samples, which no tuning sees; it has no values without any"
     )
@@ -56,11 +59,16 @@ class MisfitPoint(Frozen):
 
 
 class Identification(StrEnum):
-    """Verdict on a tunable; `unknown` with too few repetitions and no interval."""
+    """Verdict on a tunable; `unknown` with too few repetitions and no interval.
+
+    `doubtful` where it would be identified, at least partly, but no simulator reproduces the samples: the value then
+    makes up for what is missing.
+    """
 
     IDENTIFIED = "identified"
     PARTLY = "partly identified"
     NOT = "not identified"
+    DOUBTFUL = "doubtful"
     UNKNOWN = "unknown"
 
 
@@ -88,6 +96,10 @@ class MisfitRead(Frozen):
     points: tuple[MisfitPoint, ...]
     remarks: tuple[str, ...] = Field(
         description="sentences about the latest iteration", examples=[("restitution is at its lower bound, 0",)]
+    )
+    unreproduced: str = Field(
+        default="",
+        description="that no simulator reproduces the samples, in sentences; empty if one does, or noise is unknown",
     )
     held_out: float = Field(default=0.0, description="share of the samples that no tuning sees")
     noise: Statistic = Field(

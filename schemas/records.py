@@ -137,8 +137,10 @@ class ExperimentRead(Frozen):
         default=(), description="why it was paused, if not by a person; then the distinct reasons of failed repetitions"
     )
     sensitivity: Id | None = Field(default=None, description="id of the sensitivity check")
+    doubts: tuple[str, ...] = Field(default=(), description="measurements that are unlikely, until a person confirms")
     warnings: tuple[str, ...] = Field(
-        default=(), description="findings of the sensitivity check, and versions that prevent continuing"
+        default=(),
+        description="these, findings of the sensitivity check, and versions that prevent continuing",
     )
     created_at: Moment
     started_at: Moment | None = None

@@ -73,5 +73,13 @@ class SimulatorRead(Frozen):
         description="95 % interval of each tunable, if the tuner gives them",
         examples=[{"dynamic_friction": (0.7, 0.9)}],
     )
+    expected_error: Statistic = Field(
+        default=None, description="error that noise and rough physics alone would leave; null if noise is unknown"
+    )
+    surprise: Statistic = Field(
+        default=None,
+        description="share of right simulators that leave as much error; up to 0.05, no simulator reproduces the "
+        "samples. Intervals are widened by what is left",
+    )
     weight: Statistic = Field(default=None, description="share of the posterior probability, if the tuner gives it")
     held_out_error: Statistic = Field(default=None, description="discrepancy from held-out samples, of rank 0")

@@ -12,7 +12,7 @@ from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.mcap_traces import mcap_to_csv
 from gaplab.api.clients.records import Records
 from gaplab.schemas.corrections import BranchRead, Consequences
-from gaplab.schemas.measurements import AnswerRead, AttachmentRead, RequestRead
+from gaplab.schemas.measurements import AnswerRead, AttachmentRead, DoubtsRead, RequestRead
 from gaplab.schemas.records import Page
 from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.traces import TracesRead
@@ -33,6 +33,7 @@ class Details(TypedDict, total=False):
     traces: Sequence[str]
     lags_s: Sequence[float | None]
     take: int
+    confirmed: bool
 
 
 class Bench:
@@ -96,9 +97,14 @@ class Bench:
             id: id of the request.
             values: fitness of each repeat; None if it failed, or has `traces`.
             details: `failed`, `readings`, `unit`, `operator`, `note`, `attachments` (hashes) and `take`; in place of
-                values, `traces` (hashes, one for each repeat) and perhaps their `lags_s`.
+                values, `traces` (hashes, one for each repeat) and perhaps their `lags_s`. With `confirmed`, nothing
+                about it is doubtful; else the answer's `doubts` say what is unlikely.
         """
         return self._connection.post(AnswerRead, f"/requests/{segment(id)}/measurements", _body(values, details))
+
+    def doubts(self, id: str, values: Sequence[float] | None = None, **details: Unpack[Details]) -> tuple[str, ...]:
+        """Return what is unlikely about an answer that was not given yet, each as a sentence; see `answer`."""
+        return self._connection.post(DoubtsRead, f"/requests/{segment(id)}/doubts", _body(values, details)).doubts
 
     def correct(
         self,

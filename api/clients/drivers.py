@@ -97,7 +97,9 @@ def measure(task: TakenRequest, driver: Driver, limit_s: float | None, tell: Cal
         tell(f"failed: {failure}")
         return
     tables = [readings for _, readings in found]
-    task.tell([value for value, _ in found], None if None in tables else tables)
+    answer = task.tell([value for value, _ in found], None if None in tables else tables)
+    for doubt in answer.doubts:
+        tell(f"doubtful: {doubt}; correct {answer.id}, or confirm it")
 
 
 def _limited(driver: Driver, motion: DriverMotion, limit_s: float) -> Any:  # noqa: ANN401 - whatever a driver returns

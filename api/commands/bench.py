@@ -13,6 +13,7 @@ from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import BENCH, AsJson, Url, app, connect
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.measured_values import ValuesCommand, numbers
+from gaplab.api.commands.questions import confirmed
 from gaplab.api.commands.request_words import print_safety, request_table, request_words, stored_words
 from gaplab.schemas.corrections import Consequences
 from gaplab.schemas.measurements import RequestRead
@@ -26,6 +27,7 @@ Failed = Annotated[str | None, typer.Option("--failed", help="why there are no v
 Reason = Annotated[str, typer.Option("--reason", help="why")]
 Operator = Annotated[str | None, typer.Option("--operator", help="person who measured", show_default=False)]
 By = Annotated[str | None, typer.Option("--operator", help="person who says so", show_default=False)]
+Yes = Annotated[bool, typer.Option("--yes", help="send it without a question, also if it is unlikely")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="only say what would follow")]
 
 
@@ -77,12 +79,15 @@ def measured(  # noqa: PLR0913, PLR0917 - each is an option of the command
     failed: Failed = None,
     note: Annotated[str | None, typer.Option("--note", show_default=False)] = None,
     operator: Operator = None,
+    yes: Yes = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Answer a request by hand: with the fitness of each repeat, or --failed and why."""
     measured, details = numbers(values), _given(failed=failed, note=note, operator=operator)
     with connect(url) as client:
+        sure = yes or confirmed(client.bench.doubts(id, measured, **details))
+        details["confirmed"] = sure
         found = client.bench.answer(id, measured, **details)
     print_result(found, stored_words(found), as_json=as_json)
 

@@ -1,8 +1,10 @@
 """How a command asks the person at the terminal."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+
+import typer
 
 from gaplab.api.clients.confirmation import Ask, is_yes
 from gaplab.api.commands.exit_codes import CommandError, Exit
@@ -26,6 +28,26 @@ def keyboard() -> Iterator[Ask | None]:
             return terminal.readline().decode(errors="replace")
 
         yield ask
+
+
+def confirmed(doubts: Sequence[str]) -> bool:
+    """Ask about what is doubtful; return whether a person says that it is right, False without doubts or a terminal.
+
+    Raises:
+        CommandError: the person says that it is not.
+    """
+    for doubt in doubts:
+        typer.echo(f"doubtful: {doubt}", err=True)
+    with keyboard() as ask:
+        if not doubts or ask is None:
+            return False
+        try:
+            answer = ask("Send it all the same? [y/N] ")
+        except (KeyboardInterrupt, EOFError):
+            answer = ""
+        if not is_yes(answer):
+            raise CommandError("nothing was sent", Exit.INTERRUPTED)
+        return True
 
 
 def demand_yes(what: str) -> None:

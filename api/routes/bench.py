@@ -22,6 +22,7 @@ from gaplab.api.http.dependencies import (
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.measurements import (
     AnswerRead,
+    DoubtsRead,
     HolderSpec,
     MeasurementSpec,
     RequestRead,
@@ -29,7 +30,7 @@ from gaplab.schemas.measurements import (
 )
 from gaplab.schemas.records import Page
 from gaplab.schemas.traces import TracesRead, TracesSpec
-from gaplab.services.bench import answering, motions, taking
+from gaplab.services.bench import answering, doubts, motions, taking
 from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.replay import traces
 from gaplab.services.replay.traces import measured_by_traces
@@ -169,6 +170,14 @@ def answer_request(
     found = measured_by_traces(store, request.app.state.rollout_process, id, spec)
     done = answering.answer(store, id, spec, admitted, found)
     return created(done, response, request.app.url_path_for("read_request", id=done.answer.request))
+
+
+@router.post("/{id}/doubts", summary="Check an answer", responses=documented(404, 413, 415, 422))
+def check_answer(
+    id: Id, spec: Annotated[MeasurementSpec, Body(openapi_examples=MeasurementSpec.EXAMPLES)], store: StoreDep
+) -> DoubtsRead:
+    """Say what is unlikely about an answer before it is given, and store nothing."""
+    return doubts.read(store, id, spec)
 
 
 @router.post("/{id}/traces", summary="Evaluate traces", responses=documented(404, 409, 413, 415, 422, 429))

@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from gaplab.schemas.mistakes import sentence
-from gaplab.services.archives.columns import EXPERIMENT, columns_of
+from gaplab.services.archives.columns import ADDED, EXPERIMENT, columns_of
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.store.tables import Column, Kind
 
@@ -111,9 +111,11 @@ def _refuse_constant(constant: str) -> NoReturn:
 
 @cache
 def _model(table: str) -> type[BaseModel]:
-    """Return the pydantic model of a row: every column is required, others are not permitted."""
+    """Return the pydantic model of a row: every column is required but those added later, others are not permitted."""
+    added = ADDED.get(table, frozenset())
     fields: dict[str, Any] = {
-        column.name: (_type(column) | None if column.nullable else _type(column), ...) for column in columns_of(table)
+        column.name: (_type(column) | None if column.nullable else _type(column), None if column.name in added else ...)
+        for column in columns_of(table)
     }
     return create_model(table, __config__=ConfigDict(extra="forbid", strict=True), **fields)
 

@@ -10,10 +10,14 @@ from gaplab.services.core.types import Step
 
 
 def difference(stored: Step, computed: Step) -> str | None:
-    """Return the first number that differs, with both values; None if all numbers have the same bits."""
+    """Return the first number that differs, with both values; None if all numbers have the same bits.
+
+    The fit of simulators is compared if the archive knows it: those of earlier versions do not.
+    """
     if type(stored) is not type(computed):
         return f"it is {type(computed).__name__} here, and {type(stored).__name__} in the archive"
-    before, now = dict(_numbers(stored)), dict(_numbers(computed))
+    before = dict(_numbers(stored))
+    now = {place: number for place, number in _numbers(computed) if place in before or ".fit." not in place}
     for place in before | now:
         if place not in before or place not in now or not _same_bits(before[place], now[place]):
             return f"{place} is {_shown(now, place)} here, and {_shown(before, place)} in the archive"

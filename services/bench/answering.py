@@ -11,6 +11,7 @@ from gaplab.schemas.measurements import (
 )
 from gaplab.schemas.traces import AlignedTrace, TraceRead, TracesRead
 from gaplab.services.bench.checking import check_attachments, check_values
+from gaplab.services.bench.doubts import doubts
 from gaplab.services.bench.taking import locked
 from gaplab.services.bench.views import view_answer
 from gaplab.services.core.errors import Conflict
@@ -78,11 +79,14 @@ def _answer(
         msg = f"request {row.id} is wanted no more: its experiment has ended, or a correction closed its branch"
         raise Conflict(msg)
     if counted is not None and _says_nothing_new(counted, spec):
+        counted.doubts = None if spec.confirmed else counted.doubts
         return view_answer(counted)
     counts = counted is None and (row.state is not RequestState.TAKEN or spec.take == row.takes)
     given = insert_answer(session, row, spec, AnswerState.COUNTED if counts else AnswerState.CONFLICT, token)
     given.traces = None if traces is None else [_stored(trace) for trace in traces.traces]
     if counts:
+        told = () if spec.confirmed else doubts(session, repetition, row, spec.values)
+        given.doubts = list(told) or None
         settle_request(session, row, given)
         record_answer(session, row, given)
     else:

@@ -90,9 +90,11 @@ def decide(
 ) -> Once[Consequences]:
     """Decide about an answer that is in conflict with the one that counts, or with whoever holds the request.
 
+    If it counts already, and something about it is doubtful, it is confirmed.
+
     Raises:
         NotFound: there is no such answer.
-        Conflict: it is not in conflict, or the request is wanted no more.
+        Conflict: it is neither in conflict nor doubtful, or the request is wanted no more.
     """
     if dry_run:
         with store.reading() as session:
@@ -141,6 +143,10 @@ def _decide(session: Session, id_: str, spec: ConflictSpec) -> Consequences:
     request, repetition = locked(session, row.request_id)
     session.refresh(row)
     found = _decided(session, row, request, repetition, spec)
+    if row.state is AnswerState.COUNTED:
+        row.doubts = None
+        note_answer(session, EventKind.DECIDED, request, repetition, row, spec.operator)
+        return found
     if spec.counts == "other":
         judge(session, row, AnswerState.DISMISSED, spec.reason)
         note_answer(session, EventKind.DECIDED, request, repetition, row, spec.operator)
@@ -162,6 +168,8 @@ def _decided(
     session: Session, row: AnswerRow, request: RequestRow, repetition: RepetitionRow, spec: ConflictSpec
 ) -> Consequences:
     """Return what follows from a decision, of which nothing is done yet."""
+    if row.state is AnswerState.COUNTED and row.doubts and spec.counts == "this":
+        return nothing_follows(request, repetition, "the answer is confirmed; nothing about it is doubtful any more")
     if row.state is not AnswerState.CONFLICT:
         raise Conflict(f"measurement {row.id} is {row.state.value}, not in conflict, so nothing is to be decided")
     if spec.counts == "other":

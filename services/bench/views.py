@@ -99,6 +99,7 @@ def view_answer(row: AnswerRow) -> AnswerRead:
         note=row.note,
         attachments=tuple(row.attachments or ()),
         traces=tuple(TraceRead.model_validate(trace) for trace in row.traces or ()),
+        doubts=tuple(row.doubts or ()),
         replaces=row.replaces,
         reason=row.reason,
         at=row.at,

@@ -42,7 +42,9 @@ class Means:
     intervals: Sequence[str] = ()
 
 
-def verdicts(points: Sequence[MisfitPoint], samples: Sequence[float], means: Means) -> tuple[TunableVerdict, ...]:
+def verdicts(
+    points: Sequence[MisfitPoint], samples: Sequence[float], means: Means, *, unreproduced: bool = False
+) -> tuple[TunableVerdict, ...]:
     """Return the verdict on each tunable at the latest iteration; none before the first sample.
 
     Args:
@@ -50,6 +52,7 @@ def verdicts(points: Sequence[MisfitPoint], samples: Sequence[float], means: Mea
         samples: number of samples that each was tuned on, with those from before the experiment; a mean over
             repetitions.
         means: what the experiment has not used.
+        unreproduced: whether no simulator reproduces the samples.
     """
     tuned = [(point.tunables, count) for point, count in zip(points, samples, strict=True) if point.error.n]
     if not tuned:
@@ -57,7 +60,8 @@ def verdicts(points: Sequence[MisfitPoint], samples: Sequence[float], means: Mea
     latest, most = tuned[-1]
     earlier = [tunables for tunables, count in tuned if 2 * count <= most]
     halves = earlier[-1] if earlier else [None] * len(latest)
-    return tuple(_verdict(now, then, most, means) for now, then in zip(latest, halves, strict=True))
+    told = tuple(_verdict(now, then, most, means) for now, then in zip(latest, halves, strict=True))
+    return tuple(map(_doubted, told)) if unreproduced else told
 
 
 def overfitting(point: MisfitPoint, unit: str) -> str:
@@ -91,6 +95,15 @@ def _verdict(
         sentence=_sentence(now, verdict, left),
         helps=() if verdict is Identification.IDENTIFIED else tuple(_helps(now, then, samples, means)),
     )
+
+
+def _doubted(found: TunableVerdict) -> TunableVerdict:
+    """Return the verdict where no simulator reproduces the samples."""
+    if found.verdict not in {Identification.IDENTIFIED, Identification.PARTLY}:
+        return found
+    sentence = found.sentence.replace(found.verdict.value, "doubtful, for no simulator reproduces the samples", 1)
+    helps = ("a tunable for what the model lacks",)
+    return found.model_copy(update={"verdict": Identification.DOUBTFUL, "sentence": sentence, "helps": helps})
 
 
 def _judged(left: float | None) -> Identification:

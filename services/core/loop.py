@@ -21,6 +21,7 @@ from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.held_out import split, tested
 from gaplab.services.core.history import History
+from gaplab.services.core.misspecification import fitted
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Forecast, Reality, Sense, Simulate
 from gaplab.services.core.probes import probe_of
@@ -224,7 +225,8 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     found = tuple(sound(simulator, setting.parameters, source) for simulator in found)
     if tests:
         found = tested(found, Misfit(answers, tests, setting.discrepancy, setting.reading_times_s))
-    return Tuned(iteration, found, answers.cost_within(budget, source))
+    cost = answers.cost_within(budget, source)  # without what the check of the fit simulates
+    return Tuned(iteration, fitted(found, misfit, setting.parameters, setting.stream(iteration, "fit")), cost)
 
 
 def _transfer(setting: Setting, history: History, iteration: int, answers: Answers) -> Transferred:

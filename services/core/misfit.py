@@ -17,6 +17,7 @@ from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.space import Space
+from gaplab.services.core.types import Fit
 
 AT_BOUND = 0.01
 """Largest distance from a bound, as a share of the distance between the bounds, that counts as at the bound."""
@@ -46,6 +47,7 @@ class Tuning:
         interval: `(p, 2)`: ends of the 95 % intervals of its tunables; None if the tuner gives none.
         posterior: `(p,)`: standard deviations of the posterior; None if the tuner gives none.
         discrepancy: what tuning minimised.
+        fit: how well it reproduces the samples; None if it is not known.
     """
 
     parameters: FloatArray
@@ -58,6 +60,12 @@ class Tuning:
     interval: FloatArray | None = None
     posterior: FloatArray | None = None
     discrepancy: Discrepancy = field(default_factory=SquaredFitness)
+    fit: Fit | None = None
+
+    @property
+    def expected(self) -> float:
+        """Error per sample that noise and rough physics alone would leave; nan if it is not known."""
+        return float("nan") if self.fit is None else self._error(self.fit.expected_error, self.samples)
 
     @property
     def error(self) -> float:
@@ -89,6 +97,7 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
     return MisfitPoint(
         iteration=iteration,
         error=Distribution.model_validate(_distribution([each.error for each in tunings])),
+        expected_error=Distribution.model_validate(_distribution([each.expected for each in tunings])),
         held_out_error=Distribution.model_validate(_distribution([each.error_on_held_out for each in tunings])),
         gap=Distribution.model_validate(_distribution([abs(each.simulated - each.real) for each in tunings])),
         tunables=tuple(

@@ -131,6 +131,18 @@ class Misfit:
             found = found * np.sqrt(self._weights)[:, None, None]
         return np.moveaxis(found, 1, 0).reshape(len(parameters), -1)
 
+    def reading_errors(self, parameters: FloatArray) -> FloatArray:
+        """Return `(q,)`: root mean square differences of readings over the samples, of a simulator `(p,)`.
+
+        They are in units of noise; nan where no sample has the reading. Empty unless readings are compared.
+        """
+        if not self.discrepancy.senses:
+            return NO_READINGS
+        outcomes = self._beside(self._outcomes(self._genomes, parameters[None, :]), self._measured)
+        away = outcomes[:, 0, 1:] - self._measured[:, 1:]
+        there = np.isfinite(away).sum(axis=0)
+        return np.asarray(np.sqrt(np.nansum(away**2, axis=0) / np.where(there, there, np.nan)))
+
     def _one(self, parameters: Parameters, limit: float) -> float:
         """Return minus the discrepancy of one simulator `(1, p)`, or -inf if the discrepancy exceeds the limit."""
         terms = np.empty((len(self._measured), 1))

@@ -52,6 +52,24 @@ def learnable(samples: Iterable[Sample]) -> tuple[Sample, ...]:
 
 
 @dataclass(frozen=True, eq=False)
+class Fit:
+    """How well a simulator reproduces the samples, beside what noise and rough physics alone would leave.
+
+    Attributes:
+        expected_error: the discrepancy that they would leave, as large as `squared_error`.
+        surprise: share of right simulators that leave as much; small if no simulator reproduces the samples.
+        interval_scale: factor of the half widths of intervals, at least 1.
+        reading_errors: `(q,)`: root mean square difference of each reading over samples, in units of its noise; empty
+            unless readings were compared.
+    """
+
+    expected_error: float
+    surprise: float
+    interval_scale: float
+    reading_errors: FloatArray = field(default_factory=no_readings)
+
+
+@dataclass(frozen=True, eq=False)
 class Simulator:
     """One setting of the tunables, with its discrepancy from the samples that it was tuned on.
 
@@ -63,6 +81,7 @@ class Simulator:
         weight: share of the posterior probability; None if the tuner gives none.
         held_out_error: the discrepancy from the held-out samples, which only the best simulator knows; None without
             any, or where the physics failed on one.
+        fit: how well it reproduces the samples, which only the best simulator knows; None if the noise is unknown.
     """
 
     parameters: FloatArray
@@ -70,6 +89,7 @@ class Simulator:
     interval: FloatArray | None = None
     weight: float | None = None
     held_out_error: float | None = None
+    fit: Fit | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries import attempts
 from gaplab.services.store.queries.experiments import experiments_of
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
+from gaplab.services.store.queries.requests import doubtful
 from gaplab.services.store.queries.results import best_recorded
 from gaplab.services.store.stored_specs import checked, without_truth
 from gaplab.services.store.texts import unpack_tags
@@ -116,7 +117,7 @@ def _view(
 ) -> tuple[ExperimentRead, ...]:
     ids = [row.id for row in rows]
     failures, checks, best = reasons(session, ids), summaries(session, rows), best_recorded(session, ids)
-    fitness = fitness_of(session, ids)
+    fitness, doubts = fitness_of(session, ids), doubtful(session, ids)
     secret = frozenset() if reveal else hidden(session, rows)
     found = {
         id_: _Findings(
@@ -124,6 +125,7 @@ def _view(
             check=checks.get(id_, CheckSummary()),
             fitness=fitness.get(id_),
             best=mean_best(best[id_]) if id_ in best else None,
+            doubts=doubts.get(id_, ()),
         )
         for id_ in ids
     }
@@ -132,12 +134,13 @@ def _view(
 
 @dataclass(frozen=True)
 class _Findings:
-    """Findings on an experiment: reasons of failure, its sensitivity check, and its fitness."""
+    """Findings on an experiment: reasons of failure, sensitivity check, fitness, doubtful measurements."""
 
     failures: tuple[str, ...]
     check: CheckSummary
     fitness: FitnessRead | None
     best: float | None
+    doubts: tuple[str, ...]
 
 
 def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bool) -> ExperimentRead:
@@ -162,7 +165,8 @@ def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bo
         best_fitness=found.best,
         reasons=(*([row.paused_because] if row.paused_because else []), *found.failures),
         sensitivity=found.check.id,
-        warnings=(*found.check.warnings, *_version_warnings(row, work.tally)),
+        doubts=found.doubts,
+        warnings=(*found.doubts, *found.check.warnings, *_version_warnings(row, work.tally)),
         created_at=row.created_at,
         started_at=row.started_at,
         ended_at=row.ended_at,

@@ -20,7 +20,7 @@ from gaplab.services.waiting_line import WaitingLine
 
 T = TypeVar("T")
 
-LONGEST_S = 120.0
+LONGEST_S = 300.0
 """Time limit of one call, after which its process is killed. The first call of a process loads all libraries."""
 
 NICENESS = 10

@@ -74,7 +74,8 @@ def study_verdict(store: Store, study_id: str, margin: Margin | None = None) -> 
         NotFound: no such study.
     """
     study = reading.read_study(store, study_id)
-    return _verdict(store, results.study_curves(store, study_id), study.experiments, margin)[0]
+    misfits = _misfits(store, study.experiments)
+    return _verdict(store, results.study_curves(store, study_id), study.experiments, misfits, margin)[0]
 
 
 def experiment_verdict(store: Store, experiment_id: str, margin: Margin | None = None) -> VerdictRead:
@@ -84,7 +85,8 @@ def experiment_verdict(store: Store, experiment_id: str, margin: Margin | None =
         NotFound: no such experiment.
     """
     experiment = reading.read_experiment(store, experiment_id)
-    return _verdict(store, results.curves(store, [experiment_id]), [experiment], margin)[0]
+    misfits = _misfits(store, [experiment])
+    return _verdict(store, results.curves(store, [experiment_id]), [experiment], misfits, margin)[0]
 
 
 def study_facts(store: Store, study_id: str, margin: Margin | None = None) -> Facts:
@@ -115,7 +117,8 @@ def _facts(
 ) -> Facts:
     ids = [experiment.id for experiment in experiments]
     curves = results.curves(store, ids)
-    verdict, at_last = _verdict(store, curves, experiments, margin)
+    misfits = _misfits(store, experiments)
+    verdict, at_last = _verdict(store, curves, experiments, misfits, margin)
     judged = judged_curves(curves, experiments, verdict.evaluations)
     columns = [SpecColumn(each.id, each.name, (each.spec,)) for each in experiments]
     with store.reading() as session:
@@ -133,22 +136,31 @@ def _facts(
         over_all=_over_all(store, ids, verdict.evaluations),
         differing=differences(columns) if len(ids) > 1 else None,
         checks=_checks(store, experiments),
-        misfits={each.id: misfit(store, each.id) for each in experiments if not each.level},
+        misfits=misfits,
         work=work,
         provenance={id_: provenance.read(store, id_) for id_ in ids},
         leading=_leading(store, judged),
     )
 
 
+def _misfits(store: Store, experiments: Sequence[ExperimentRead]) -> dict[str, MisfitRead]:
+    return {each.id: misfit(store, each.id) for each in experiments if not each.level}
+
+
 def _verdict(
-    store: Store, curves: Sequence[Curve], experiments: Sequence[ExperimentRead], margin: Margin | None
+    store: Store,
+    curves: Sequence[Curve],
+    experiments: Sequence[ExperimentRead],
+    misfits: Mapping[str, MisfitRead],
+    margin: Margin | None,
 ) -> tuple[VerdictRead, tuple[Comparison, ...]]:
     """Return the verdict, and the comparisons at the common count that it uses."""
     count, ids = common_count(experiments), [curve.experiment for curve in curves]
     pairs: tuple[Comparison, ...] = ()
     if count is not None and len(ids) > 1:
         pairs = compare(store, ids, from_evaluations=count, to_evaluations=count, margin=margin)
-    return judge(curves, experiments, pairs), pairs
+    unreproduced = {id_: found.unreproduced for id_, found in misfits.items() if found.unreproduced}
+    return judge(curves, experiments, pairs, unreproduced), pairs
 
 
 def _over_all(store: Store, ids: Sequence[str], count: int | None) -> tuple[Comparison, ...]:

@@ -11,6 +11,13 @@ from gaplab.services.figures.words import number_of
 from gaplab.services.reports.judged import SIGNIFICANT, Judged, differs, is_equivalent, p_of
 
 
+def unreproduced(told: Mapping[str, str], names: Mapping[str, str]) -> Iterator[str]:
+    """Yield that no simulator reproduces the samples of an experiment, with its name if there are others."""
+    for id_, sentence in told.items():
+        begin = f"{names[id_]}: {sentence[0]}" if len(names) > 1 else sentence[0].upper()
+        yield f"{begin}{sentence[1:]}."
+
+
 def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], count: int | None) -> Iterator[str]:
     """Yield who is ahead, in one sentence."""
     ids = {one.curve.experiment for one in learned}
@@ -148,9 +155,10 @@ def continuing(trends: Sequence[TrendRead]) -> Iterator[str]:
 
 
 def incomplete(experiments: Sequence[ExperimentRead], names: Mapping[str, str]) -> Iterator[str]:
-    """Yield what is missing: experiments that still run, were stopped or cancelled, or have failed repetitions."""
+    """Yield what is doubtful or missing: unlikely measurements, and repetitions that still run, stopped or failed."""
     for experiment in experiments:
         progress, state = experiment.progress, experiment.state
+        yield from (f"{names[experiment.id]}, {doubt}." for doubt in experiment.doubts)
         done = f"{progress.completed} of {number_of('repetition', progress.repetitions)} completed"
         if experiment.caveat or state is not State.COMPLETED:
             why = f" ({experiment.caveat})" if experiment.caveat else ""

@@ -1,6 +1,7 @@
 """The verdict: what curves and tests say, in words, by stated rules."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Curve
@@ -9,6 +10,8 @@ from gaplab.schemas.reports import Trend, TrendRead, VerdictRead
 from gaplab.services.core.trends import FEWEST_EVALUATIONS, FEWEST_REPETITIONS, SMALL, CurveEnd
 from gaplab.services.reports import sentences
 from gaplab.services.reports.judged import SIGNIFICANT, Judged, judged_curves
+
+NONE: Mapping[str, str] = MappingProxyType({})
 
 NOTHING = "There are no results yet."
 
@@ -27,17 +30,25 @@ RULES = (
     f"{SMALL:.0%} of the mean fitness; k is at least {FEWEST_EVALUATIONS} evaluations before the last. A curve is "
     f"rising or falling if the interval of the gain over the last {FEWEST_EVALUATIONS} evaluations is above or below "
     "0. Otherwise more repetitions would tell.",
+    "No simulator is said to reproduce the samples if at least half of the repetitions are surprised: of 40 plausible "
+    "simulators that play reality with the noise of the measurements, fewer than two leave as much error after tuning.",
     f"Nothing is said of a curve with fewer than {FEWEST_REPETITIONS} repetitions or {FEWEST_EVALUATIONS} evaluations.",
 )
 
 
-def judge(curves: Sequence[Curve], experiments: Sequence[ExperimentRead], pairs: Sequence[Comparison]) -> VerdictRead:
+def judge(
+    curves: Sequence[Curve],
+    experiments: Sequence[ExperimentRead],
+    pairs: Sequence[Comparison],
+    unreproduced: Mapping[str, str] = NONE,
+) -> VerdictRead:
     """Return the verdict on experiments.
 
     Args:
         curves: the curves of the experiments, in their order.
         experiments: one or more experiments.
         pairs: comparisons of all pairs at the common count.
+        unreproduced: by experiment, that no simulator reproduces its samples.
     """
     count = common_count(experiments)
     judged = judged_curves(curves, experiments, count)
@@ -52,7 +63,8 @@ def judge(curves: Sequence[Curve], experiments: Sequence[ExperimentRead], pairs:
         *sentences.spread(learned),
         *sentences.incomplete(experiments, names),
     ]
-    headline = [*sentences.standing(learned, pairs, count), *sentences.continuing(trends)]
+    wrong = sentences.unreproduced(unreproduced, names)
+    headline = [*wrong, *sentences.standing(learned, pairs, count), *sentences.continuing(trends)]
     return VerdictRead(
         headline=" ".join(headline) or NOTHING,
         sentences=tuple(told),

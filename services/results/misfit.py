@@ -3,10 +3,11 @@
 import csv
 import io
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf, nan
 from statistics import fmean
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.core.repeats import pooled_variance
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
+from gaplab.services.core.unreproduced import unreproduced
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import installed_robot, unit
@@ -26,7 +28,7 @@ from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator, MeasuredIterations
 from gaplab.services.store.session import Store
 
-DISTRIBUTIONS = ("error", "held_out_error", "gap")
+DISTRIBUTIONS = ("error", "expected_error", "held_out_error", "gap")
 STATISTICS = tuple(Distribution.model_fields)
 OF_A_TUNABLE = (*STATISTICS, "at_lower", "at_upper", "spread", "interval", "posterior")
 
@@ -48,7 +50,9 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     by_iteration: dict[int, list[Tuning]] = defaultdict(list)
     for best in simulators:
         posterior = posteriors.get((best.repetition, best.iteration))
-        by_iteration[best.iteration].append(replace(_tuning(best, measured, posterior), discrepancy=discrepancy))
+        by_iteration[best.iteration].append(
+            replace(_tuning(best, measured, posterior, row.spec["tunables"]), discrepancy=discrepancy)
+        )
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, by_iteration[iteration], names, parameters_of(spec.tunables))
@@ -58,15 +62,19 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
     unseen = overfitting(points[-1], error_unit) if points else ""
+    robot = installed_robot(spec)
+    latest = by_iteration[points[-1].iteration] if points else []
+    wrong = unreproduced(latest, None if robot is None else robot.sensors, error_unit)
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
         error_unit=error_unit,
         points=points,
-        remarks=(*remarks(points, unit(spec), error_unit), *([unseen] if unseen else [])),
+        remarks=(*([wrong] if wrong else []), *remarks(points, unit(spec), error_unit), *([unseen] if unseen else [])),
+        unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
-        verdicts=verdicts(points, samples, _means(spec)),
+        verdicts=verdicts(points, samples, _means(spec), unreproduced=bool(wrong)),
     )
 
 
@@ -85,9 +93,13 @@ def misfit_csv(found: MisfitRead) -> str:
     return text.getvalue()
 
 
-def _tuning(best: BestSimulator, measured: MeasuredIterations, posterior: FloatArray | None) -> Tuning:
+def _tuning(
+    best: BestSimulator,
+    measured: MeasuredIterations,
+    posterior: FloatArray | None,
+    tunables: Sequence[Mapping[str, Any]],
+) -> Tuning:
     place = best.repetition, best.iteration
-    pairs = None if best.lower is None or best.upper is None else list(zip(best.lower, best.upper, strict=True))
     return Tuning(
         parameters=frozen(best.parameters),
         squared_error=inf if best.squared_error is None else best.squared_error,
@@ -96,8 +108,9 @@ def _tuning(best: BestSimulator, measured: MeasuredIterations, posterior: FloatA
         real=nan if best.real is None else best.real,
         held_out_error=nan if best.held_out_error is None else best.held_out_error,
         held_out=measured.tested_until(*place),
-        interval=None if pairs is None else frozen(pairs),
+        interval=tunings.intervals(best.parameters, best.lower, best.upper, best.fit, tunables),
         posterior=posterior,
+        fit=best.fit,
     )
 
 

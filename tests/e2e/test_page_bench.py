@@ -99,6 +99,22 @@ def test_an_operator_takes_measures_and_sends(visit: Any, api: Any, written: Sto
 
 
 @pytest.mark.release
+def test_an_operator_is_asked_once_about_an_unlikely_number(visit: Any, api: Any, written: Store) -> None:
+    experiment, request = asked(written, "slip")
+    page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
+    take(page)
+    fill(page, "0.41", "44", "0.4")
+    send = page.get_by_role("button", name="Send 3 values")
+    send.click()
+    expect(page.get_by_text("44 is 1.1e+02 times the other repeats")).to_be_visible()
+    assert answers_of(written, request) == ()
+    send.click()
+
+    expect(page.get_by_text("All of them are stored by the service.")).to_be_visible()
+    assert [(answer.values[1], answer.doubts) for answer in answers_of(written, request)] == [(44.0, ())]
+
+
+@pytest.mark.release
 def test_an_operator_keeps_the_form_when_the_experiment_is_paused(visit: Any, api: Any, written: Store) -> None:
     experiment, _ = asked(written, "stairs")
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}")

@@ -21,7 +21,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives import export_experiment
 from gaplab.services.archives.rerunning import verify
-from gaplab.services.bench import answering, attachments, corrections, taking
+from gaplab.services.bench import answering, attachments, corrections, doubts, taking
 from gaplab.services.bench.branches import list_branches
 from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.core.errors import Conflict, InvalidSpec, KeyReused, NotFound
@@ -31,6 +31,7 @@ from gaplab.services.experiments.deletion import Deleter, delete_experiment
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.reading import list_samples, read_experiment
 from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.reports.content import experiment_verdict
 from gaplab.services.reports.outcome import outcome_of
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import tuned_simulators
@@ -529,6 +530,41 @@ def test_without_iterations_one_tunes_on_what_was_measured_before(store: Store) 
 
     with pytest.raises(InvalidSpec, match="0 iterations tune on samples from before alone, and the spec has none"):
         resolve_experiment(bench(iterations=0))
+
+
+def test_an_unlikely_number_stays_a_remark_until_a_person_confirms_or_corrects_it(store: Store) -> None:
+    experiment = submit_experiment(store, bench(reality={"repeats": 3}))
+    compute(store)
+    request, slip = pending(store)[0], (0.31, 31.0, 0.29)
+
+    told = doubts.read(store, request.id, MeasurementSpec(values=slip)).doubts
+    likely = doubts.read(store, request.id, MeasurementSpec(values=(0.31, 0.4, 0.29))).doubts
+    failed = doubts.read(store, request.id, MeasurementSpec(failed="it fell")).doubts
+    answer = measure(store, request, *slip)
+
+    assert told[0] == "31 is 1e+02 times the other repeats"
+    assert "times the largest fitness that was simulated or measured" in told[1]
+    assert (likely, failed, answer.state.value, answer.doubts) == ((), (), "counted", told)
+    (warning,) = read_experiment(store, experiment.id).warnings
+    assert warning.startswith("repetition 0, iteration 0: 31 is 1e+02 times the other repeats; ")
+    assert f"gaplab decide {answer.id} this" in warning
+    assert any(warning in sentence for sentence in experiment_verdict(store, experiment.id).sentences)
+
+    decision = ConflictSpec(counts="this", reason="it flew")
+    assert "confirmed" in corrections.decide(store, answer.id, decision, FREELY, dry_run=True).answer.words
+    assert read_experiment(store, experiment.id).doubts
+    corrections.decide(store, answer.id, decision, FREELY)
+    assert read_experiment(store, experiment.id).doubts == ()
+    with pytest.raises(Conflict, match="is counted, not in conflict"):
+        corrections.decide(store, answer.id, decision, FREELY)
+
+    compute(store)
+    second = measure(store, pending(store)[0], 0.3, 0.3, 200.0)
+    corrections.correct(store, second.id, CorrectionSpec(values=(0.3, 0.3, 0.2), reason="a slip"), FREELY)
+    assert read_experiment(store, experiment.id).doubts == ()
+    compute(store)
+    sure = MeasurementSpec(values=(0.3, 0.3, 200.0), confirmed=True)
+    assert answering.answer(store, pending(store)[0].id, sure, FREELY).answer.doubts == ()
 
 
 def test_repeats_weigh_samples_and_put_a_floor_under_weights(store: Store) -> None:

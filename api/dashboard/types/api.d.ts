@@ -26,6 +26,7 @@ declare namespace Api {
     note: string | null;
     attachments: Array<string>;
     traces: Array<TraceRead>;
+    doubts: Array<string>;
     replaces: string | null;
     reason: string | null;
     at: string;
@@ -205,6 +206,9 @@ declare namespace Api {
     least: number | null;
     greatest: number | null;
   }
+  interface DoubtsRead {
+    doubts: Array<string>;
+  }
   interface Edit {
     name: string | null;
     notes: string | null;
@@ -288,6 +292,7 @@ declare namespace Api {
     best_fitness: number | null;
     reasons: Array<string>;
     sensitivity: string | null;
+    doubts: Array<string>;
     warnings: Array<string>;
     created_at: string;
     started_at: string | null;
@@ -343,7 +348,7 @@ declare namespace Api {
   interface HolderSpec {
     take: number;
   }
-  type Identification = "identified" | "partly identified" | "not identified" | "unknown";
+  type Identification = "identified" | "partly identified" | "not identified" | "doubtful" | "unknown";
   interface IgnoredFile {
     file: string;
     why: string;
@@ -378,10 +383,12 @@ declare namespace Api {
     operator: string | null;
     note: string | null;
     attachments: Array<string>;
+    confirmed: boolean;
   }
   interface MisfitPoint {
     iteration: number;
     error: Distribution;
+    expected_error: Distribution;
     held_out_error: Distribution;
     gap: Distribution;
     tunables: Array<TunableDistribution>;
@@ -392,6 +399,7 @@ declare namespace Api {
     error_unit: string;
     points: Array<MisfitPoint>;
     remarks: Array<string>;
+    unreproduced: string;
     held_out: number;
     noise: number | null;
     verdicts: Array<TunableVerdict>;
@@ -706,6 +714,8 @@ declare namespace Api {
     squared_error: number | null;
     error: number | null;
     intervals: Record<string, [number, number]> | null;
+    expected_error: number | null;
+    surprise: number | null;
     weight: number | null;
     held_out_error: number | null;
   }

@@ -10,22 +10,13 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.linear_models import LinearModel, cutter
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.types import Simulator
 
 CONFIDENCE = 0.95
 """Probability that an interval contains the truth."""
-
-PRIOR_VARIANCE = 0.25
-"""Variance of a tunable before any sample, in units of its bounds. It is three times that of a uniform one, so that a
-truth on a bound is hardly drawn to the middle."""
-
-OWN = 0.3
-"""Share of the scatter of a difference that is taken as its own, independent of the others."""
-
-FARTHEST = 3.0
-"""Deviations from the median at which a difference is cut; a robot that falls is no line."""
 
 REACH = 2.0
 """Half the width of the next box, in standard deviations of the estimate."""
@@ -130,37 +121,14 @@ def _estimate(places: FloatArray, differences: FloatArray, noise: float) -> Loca
         differences: `(n, r)`: of their readings from those of reality.
         noise: variance of a difference of the right simulator.
     """
-    middle = np.median(differences, axis=0)
-    reach = FARTHEST * np.maximum(scipy.stats.median_abs_deviation(differences, axis=0, scale="normal"), noise**0.5)
-    cut = np.clip(differences, middle - reach, middle + reach)
+    cut = cutter(differences, noise)
+    answers = cut(differences)
     others = ~np.eye(len(places), dtype=bool)
-    known = [_place(places[rest], cut[rest], one, noise) for rest, one in zip(others, cut, strict=True)]
-    return LocalEstimate(
-        _place(places, cut, np.clip(0.0, middle - reach, middle + reach), noise), np.array(known) - places
-    )
-
-
-def _place(places: FloatArray, answers: FloatArray, asked: FloatArray, noise: float) -> FloatArray:
-    """Return the place `(p,)` whose answers `(r,)` are those asked for, by a linear model of n answers `(n, r)`.
-
-    It is the mean of a normal posterior. The scatter around the model is low-rank plus diagonal, so that it can be
-    inverted although there are more answers than places.
-    """
-    (count, size), centre = places.shape, places.mean(axis=0)
-    design = np.column_stack([np.ones(count), places - centre])
-    lines, *_ = np.linalg.lstsq(design, answers, rcond=None)
-    level, slopes = lines[0], lines[1:].T
-    scatter = (answers - design @ lines) / np.sqrt(max(1, count - size - 1))
-    own = OWN * (scatter**2).sum(axis=0) + noise
-    own = np.maximum(own, 1e-12 * max(float(own.max()), 1e-300))
-    shared = np.sqrt(1 - OWN) * scatter
-    weighted = slopes / own[:, None]
-    inner = np.eye(count) + shared / own @ shared.T
-    weighted -= shared.T / own[:, None] @ np.linalg.solve(inner, shared @ weighted)
-    middle = np.full(size, 0.5)
-    away = asked - level - slopes @ (middle - centre)
-    found = middle + np.linalg.solve(slopes.T @ weighted + np.eye(size) / PRIOR_VARIANCE, weighted.T @ away)
-    return np.asarray(np.clip(found, 0.0, 1.0))
+    known = [
+        LinearModel.of(places[rest], answers[rest], noise).place(one) for rest, one in zip(others, answers, strict=True)
+    ]
+    estimate = LinearModel.of(places, answers, noise).place(cut(np.zeros(answers.shape[1])))
+    return LocalEstimate(estimate, np.array(known) - places)
 
 
 def _simulators(task: TuningTask, estimate: LocalEstimate, rng: Generator) -> tuple[Simulator, ...]:

@@ -66,6 +66,7 @@ class AnswerRow(Base):
         values: fitness of each repeat; NULL if the measurement failed.
         readings: of each repeat, a row for each time and a column for each sensor.
         traces: the traces that the values were computed from, with the lags of their clocks.
+        doubts: what is unlikely about it; NULL if nothing is, or a person confirmed it.
         failed: why there are no values.
         reason: why it was corrected, voided or dismissed.
         replaces: id of the answer that it corrects.
@@ -87,6 +88,7 @@ class AnswerRow(Base):
     note: Mapped[str | None] = mapped_column(Text)
     attachments: Mapped[list[str] | None]
     traces: Mapped[list[dict[str, Any]] | None]
+    doubts: Mapped[list[str] | None]
     replaces: Mapped[str | None] = mapped_column(String(32))
     reason: Mapped[str | None] = mapped_column(Reason)
     token_id: Mapped[str | None] = mapped_column(String(32))

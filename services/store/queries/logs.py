@@ -10,7 +10,18 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Readings, frozen
-from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
+from gaplab.services.core.types import (
+    Cost,
+    Fit,
+    Measured,
+    Probed,
+    Sample,
+    Selected,
+    Simulator,
+    Step,
+    Transferred,
+    Tuned,
+)
 from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
 
 R = TypeVar("R", IterationRow, MeasurementRow, SimulatorRow)
@@ -73,7 +84,7 @@ def _selected(row: IterationRow) -> Selected | None:
 def _measured(row: MeasurementRow | None) -> Measured | None:
     if row is None:
         return None
-    sample = Sample(frozen(row.genome), _or(nan, row.fitness), _readings(row), _repeats(row))
+    sample = Sample(frozen(row.genome), _or(nan, row.fitness), _readings(row.readings), _repeats(row))
     return Measured(row.iteration, sample)
 
 
@@ -86,7 +97,15 @@ def _tuned(row: IterationRow, simulators: Sequence[SimulatorRow]) -> Tuned | Non
 
 def _simulator(row: SimulatorRow) -> Simulator:
     interval = None if row.lower is None or row.upper is None else frozen(list(zip(row.lower, row.upper, strict=True)))
-    return Simulator(frozen(row.parameters), _or(inf, row.squared_error), interval, row.weight, row.held_out_error)
+    error = _or(inf, row.squared_error)
+    return Simulator(frozen(row.parameters), error, interval, row.weight, row.held_out_error, fit_of(row))
+
+
+def fit_of(row: Any) -> Fit | None:  # noqa: ANN401 - a row of the table, or of a query with its columns
+    """Return the fit of a simulator; None if it is not known."""
+    if row.expected_error is None or row.surprise is None or row.interval_scale is None:
+        return None
+    return Fit(row.expected_error, row.surprise, row.interval_scale, _readings(row.reading_errors))
 
 
 def _transferred(row: IterationRow) -> Transferred | None:
@@ -100,11 +119,11 @@ def _probed(row: IterationRow, probe: MeasurementRow | None) -> Probed | None:
     if probe is None:
         return None
     fitnesses = _or(nan, probe.fitness), _or(nan, row.recorded_fitness)
-    return Probed(row.number, *fitnesses, _readings(probe), _repeats(probe), probe.left_out)
+    return Probed(row.number, *fitnesses, _readings(probe.readings), _repeats(probe), probe.left_out)
 
 
-def _readings(row: MeasurementRow) -> Readings:
-    return frozen([_or(nan, each) for each in row.readings]) if row.readings else NO_READINGS
+def _readings(values: list[float | None] | None) -> Readings:
+    return frozen([_or(nan, each) for each in values]) if values else NO_READINGS
 
 
 def _repeats(row: MeasurementRow) -> FloatArray:

@@ -5,9 +5,9 @@ from typing import Any
 
 from sqlalchemy import Select, select
 
-from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.models import AnswerRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
 
-ResultRow = IterationRow | MeasurementRow | SimulatorRow
+ResultRow = IterationRow | MeasurementRow | SimulatorRow | AnswerRow
 
 
 def of_experiments(row: type[ResultRow], experiments: Sequence[str], *columns: Any) -> Select[Any]:  # noqa: ANN401

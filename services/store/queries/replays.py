@@ -47,9 +47,9 @@ def tuned_samples(session: Session, experiment: ExperimentRow) -> tuple[TunedSam
     for found, iteration in ((before, row.iteration - 1), (after, row.iteration)):
         best = (found.repetition_id == row.repetition_id) & (found.iteration == iteration) & (found.rank == 0)
         query = query.join(found, best)
-    share, before = experiment.spec["held_out"], len(experiment.spec["reality"]["samples"])
+    share, known = experiment.spec["held_out"], len(experiment.spec["reality"]["samples"])
     samples = starmap(TunedSample, session.execute(query.order_by(RepetitionRow.number, row.iteration)))
-    return tuple(each for each in samples if not is_held_out(before + each.iteration, share))
+    return tuple(each for each in samples if not is_held_out(known + each.iteration, share))
 
 
 @dataclass(frozen=True)

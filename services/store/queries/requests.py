@@ -15,6 +15,7 @@ from gaplab.services.store.models import AnswerRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import request_states
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import new_id
+from gaplab.services.store.queries.repetition_rows import of_experiments
 from gaplab.services.store.queries.request_states import ANSWERED as ANSWERED
 from gaplab.services.store.queries.request_states import PENDING as PENDING
 from gaplab.services.store.queries.step_rows import vector
@@ -169,4 +170,18 @@ def answers_of(session: Session, requests: Iterable[str]) -> dict[str, list[Answ
     row, found = AnswerRow, dict[str, list[AnswerRow]]()
     for each in session.scalars(select(row).where(row.request_id.in_(list(requests))).order_by(row.at, row.id)):
         found.setdefault(each.request_id, []).append(each)
+    return found
+
+
+def doubtful(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the doubts about answers that count, by experiment, each as a sentence with what to do about it."""
+    row, request = AnswerRow, RequestRow
+    columns = RepetitionRow.experiment_id, RepetitionRow.number, request.iteration, row.id, row.doubts
+    query = of_experiments(row, experiments, *columns).join(request, request.id == row.request_id)
+    query = query.where(row.state == AnswerState.COUNTED, row.doubts.is_not(None)).order_by(row.at, row.id)
+    found = dict[str, tuple[str, ...]]()
+    for experiment, number, iteration, id_, doubts in session.execute(query):
+        where = f"repetition {number}, iteration {iteration}: {'; '.join(doubts or ())}"
+        what = f"correct the measurement {id_}, or confirm it: gaplab decide {id_} this --reason …"
+        found[experiment] = (*found.get(experiment, ()), f"{where}; {what}")
     return found

@@ -15,8 +15,9 @@ from gaplab.services.core.repeats import standard_error
 from gaplab.services.core.stored_specs import discrepancy_of
 from gaplab.services.store.cursor import decode, encode
 from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.queries.logs import fit_of
 from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.queries.tunings import measured, per_sample
+from gaplab.services.store.queries.tunings import intervals, measured, per_sample
 
 _TURN = case((MeasurementRow.kind == MeasurementKind.SAMPLE, 0), else_=1)
 """Within an iteration the sample comes before the probe."""
@@ -87,19 +88,20 @@ def page_of_simulators(
     key = (RepetitionRow.number, row.iteration, row.rank)
     query = of_experiments(row, [experiment.id], *key, row)
     wanted = {RepetitionRow.number: repetition, row.iteration: iteration}
-    names = [each["name"] for each in experiment.spec["tunables"]]
     tuned = measured(session, experiment)
     discrepancy = discrepancy_of(experiment.spec)
+    tunables = experiment.spec["tunables"]
     return tuple(
-        _simulator(number, found, names, tuned.tuned_until(number, found.iteration), discrepancy)
+        _simulator(number, found, tunables, tuned.tuned_until(number, found.iteration), discrepancy)
         for number, *_, found in _page(session, query, key, wanted, limit, cursor)
     )
 
 
 def _simulator(
-    repetition: int, row: SimulatorRow, names: Sequence[str], samples: int, discrepancy: Discrepancy
+    repetition: int, row: SimulatorRow, tunables: Sequence[Mapping[str, Any]], samples: int, discrepancy: Discrepancy
 ) -> SimulatorRead:
-    pairs = None if row.lower is None or row.upper is None else zip(row.lower, row.upper, strict=True)
+    names, fit = [each["name"] for each in tunables], fit_of(row)
+    pairs = intervals(row.parameters, row.lower, row.upper, fit, tunables)
     return SimulatorRead(
         repetition=repetition,
         iteration=row.iteration,
@@ -107,7 +109,9 @@ def _simulator(
         parameters=dict(zip(names, row.parameters, strict=True)),
         squared_error=row.squared_error,
         error=per_sample(row.squared_error, samples, discrepancy),
-        intervals=None if pairs is None else dict(zip(names, pairs, strict=True)),
+        intervals=None if pairs is None else dict(zip(names, map(tuple, pairs.tolist()), strict=True)),
+        expected_error=None if fit is None else per_sample(fit.expected_error, samples, discrepancy),
+        surprise=row.surprise,
         weight=row.weight,
         held_out_error=row.held_out_error,
     )

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray, known
-from gaplab.services.core.types import Cost, Measured, Probed, Selected, Step, Transferred, Tuned
+from gaplab.services.core.types import Cost, Fit, Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import TimedStep
 from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
@@ -20,6 +20,9 @@ _ITERATION, _MEASUREMENT, _SIMULATOR = (
 )
 
 _ORDER: tuple[type[Step], ...] = (Selected, Measured, Tuned, Transferred, Probed)
+
+FIT = ("expected_error", "surprise", "interval_scale", "reading_errors")
+"""Columns of the fit of a simulator."""
 
 Row = dict[str, Any]
 Key = tuple[int, int]
@@ -133,9 +136,16 @@ def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
             "upper": None if each.interval is None else vector(each.interval[:, 1]),
             "weight": each.weight,
             "held_out_error": each.held_out_error,
+            **_fit(each.fit),
         }
         for rank, each in enumerate(step.simulators)
     ]
+
+
+def _fit(fit: Fit | None) -> dict[str, Any]:
+    """Return the columns of a fit; None in each without one."""
+    numbers = {name: getattr(fit, name, None) for name in FIT[:-1]}
+    return numbers | {"reading_errors": None if fit is None else _readings(fit.reading_errors)}
 
 
 def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, Any]:

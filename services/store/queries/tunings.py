@@ -2,14 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import starmap
+from typing import Any
 
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import MeasurementKind
+from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.held_out import is_held_out, seen_of
+from gaplab.services.core.misspecification import widened
+from gaplab.services.core.space import Space
+from gaplab.services.core.types import Fit
 from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.queries.logs import fit_of
 from gaplab.services.store.queries.repetition_rows import of_experiments
+from gaplab.services.store.queries.step_rows import FIT
 
 
 @dataclass(frozen=True)
@@ -19,10 +27,11 @@ class BestSimulator:
     Attributes:
         squared_error: None if the physics failed on a sample.
         held_out_error: None without held-out samples, or if the physics failed on one.
-        lower: lower ends of the 95 % intervals; None if the tuner gives none.
+        lower: lower ends of the 95 % intervals as the tuner gave them; None if it gives none.
         upper: their upper ends.
         simulated: fitness in the simulator; None if there is none.
         real: fitness in reality; None if there is none.
+        fit: how well it reproduces the samples; None if it is not known.
     """
 
     repetition: int
@@ -34,18 +43,44 @@ class BestSimulator:
     upper: list[float] | None
     simulated: float | None
     real: float | None
+    fit: Fit | None = None
 
 
 def best_simulators(session: Session, experiment: str) -> tuple[BestSimulator, ...]:
     """Return the best simulator of every iteration of every repetition, ordered by repetition, then iteration."""
     row, found, probe = IterationRow, SimulatorRow, MeasurementRow
-    errors = found.squared_error, found.held_out_error
+    errors, fits = (found.squared_error, found.held_out_error), [getattr(found, name) for name in FIT]
     columns = found.parameters, *errors, found.lower, found.upper, row.simulated_fitness, probe.fitness
     best = (found.repetition_id == row.repetition_id) & (found.iteration == row.number) & (found.rank == 0)
     probed = (probe.repetition_id == row.repetition_id) & (probe.iteration == row.number)
-    query = of_experiments(row, [experiment], RepetitionRow.number, row.number, *columns)
+    query = of_experiments(row, [experiment], RepetitionRow.number, row.number, *columns, *fits)
     query = query.join(found, best).outerjoin(probe, probed & (probe.kind == MeasurementKind.PROBE))
-    return tuple(BestSimulator(*each) for each in session.execute(query.order_by(RepetitionRow.number, row.number)))
+    ordered = session.execute(query.order_by(RepetitionRow.number, row.number))
+    found_all: list[tuple[Any, ...]] = [(*each[: -len(FIT)], fit_of(each)) for each in ordered]
+    return tuple(starmap(BestSimulator, found_all))
+
+
+def intervals(
+    parameters: Sequence[float],
+    lower: Sequence[float] | None,
+    upper: Sequence[float] | None,
+    fit: Fit | None,
+    tunables: Sequence[Mapping[str, Any]],
+) -> FloatArray | None:
+    """Return the 95 % intervals `(p, 2)`, widened if the samples differ more than they should; None without any.
+
+    Args:
+        parameters: of the simulator.
+        lower: lower ends as the tuner gave them; None if it gives none.
+        upper: their upper ends.
+        fit: how well it reproduces the samples; None if it is not known.
+        tunables: of the resolved spec.
+    """
+    if lower is None or upper is None:
+        return None
+    space = Space.box([float(each["lower"]) for each in tunables], [float(each["upper"]) for each in tunables])
+    scale = 1.0 if fit is None else fit.interval_scale
+    return widened(frozen(list(zip(lower, upper, strict=True))), frozen(parameters), scale, space)
 
 
 @dataclass(frozen=True)

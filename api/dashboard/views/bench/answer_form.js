@@ -1,6 +1,7 @@
 // @ts-check
 /** The form for an answer: a number for each repeat, or why there are none. What is typed is kept until it is sent. */
 
+import { post } from "../../lib/api.js";
 import { browserStore } from "../../lib/bench/browser_store.js";
 import { isMine } from "../../lib/bench/choosing.js";
 import { operatorName } from "../../lib/bench/corrections.js";
@@ -9,6 +10,8 @@ import { requestWords, typedValues, withOtherSign } from "../../lib/bench/values
 import { h, setText } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
 import { filesField } from "./files_field.js";
+
+const ASK_MS = 5000;
 
 /** @typedef {{ values: string[], note: string, failed: string, files?: import("./files_field.js").Kept[] }} Draft */
 
@@ -48,7 +51,7 @@ function make(request, view) {
   const why = h("input", { id: "failed", maxlength: 2000, autocomplete: "off" });
   Object.assign(note, { value: draft.note });
   Object.assign(why, { value: draft.failed });
-  const trouble = h("p", { class: "failed", role: "alert" });
+  const [trouble, doubt] = [h("p", { class: "failed", role: "alert" }), h("p", { class: "failed", role: "alert" })];
   const keep = () => drafts.write(id, { values: fields.map(({ input }) => input.value), note: note.value, failed: why.value, files: files.kept() });
   const files = filesField(draft.files ?? [], keep);
 
@@ -68,13 +71,21 @@ function make(request, view) {
     view.answered(id);
   }
 
-  const submit = (/** @type {SubmitEvent} */ event) => {
+  let asked = "";
+  const submit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
     const { values, mistakes } = typedValues(fields.map(({ input }) => input.value));
     fields.forEach((field, index) => field.mark(mistakes[index]));
     const first = mistakes.findIndex(Boolean);
-    if (first < 0) give({ values });
-    else fields[first].input.focus();
+    if (first >= 0) {
+      fields[first].input.focus();
+      return;
+    }
+    const isConfirmed = asked === String(values);
+    const doubts = isConfirmed ? [] : await doubtsAbout(id, values);
+    asked = String(values);
+    setText(doubt, doubts.length ? `${doubts.join("; ")}. Send it all the same?` : "");
+    if (!doubts.length) give({ values, ...(isConfirmed ? { confirmed: true } : {}) });
   };
   const fail = () => {
     setText(trouble, why.value.trim() ? "" : "Enter why it failed.");
@@ -89,11 +100,26 @@ function make(request, view) {
   return h("form", { class: "answer", novalidate: true, oninput: keep, onsubmit: submit },
     ...fields.map(({ element }) => element),
     h("p", { class: "field" }, h("label", { for: "note" }, "Note"), note), files.element,
-    h("button", { type: "submit", class: "big" }, repeats === 1 ? "Send the value" : `Send ${repeats} values`),
+    doubt, h("button", { type: "submit", class: "big" }, repeats === 1 ? "Send the value" : `Send ${repeats} values`),
     h("details", { open: Boolean(draft.failed) }, h("summary", {}, "It failed…"),
       h("p", { class: "field" }, h("label", { for: "failed" }, "Why?"), why,
         h("small", {}, "The controller counts as tried and teaches nothing. If the measurement itself was wrong, measure again instead.")),
       trouble, h("button", { type: "button", class: "quiet", onclick: fail }, "Send that it failed")));
+}
+
+/**
+ * Return what is unlikely about values; nothing if the service is away. It then remarks on what it gets later.
+ *
+ * @param {string} id
+ * @param {number[]} values
+ * @returns {Promise<string[]>}
+ */
+async function doubtsAbout(id, values) {
+  try {
+    return (await post(`/requests/${id}/doubts`, { values }, {}, AbortSignal.timeout(ASK_MS))).doubts;
+  } catch {
+    return [];
+  }
 }
 
 /**

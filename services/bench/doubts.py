@@ -1,0 +1,74 @@
+"""Doubts: what is plausible in an answer, but so unlikely that a person is asked once.
+
+A decimal point that was lost, or centimetres for metres, makes a number that is many times larger than what the
+simulators expect of any controller, than all that was measured before, or than the other repeats.
+
+Source: gaplab.
+"""
+
+from collections.abc import Iterator, Sequence
+from statistics import median
+
+from gaplab.schemas.measurements import DoubtsRead, MeasurementSpec
+from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, RequestRow
+from gaplab.services.store.queries.repetition_rows import of_experiments
+from gaplab.services.store.queries.requests import get
+from gaplab.services.store.session import Session, snapshot
+
+OF_REPEATS = 10.0
+"""How many times the median of the other repeats a value is, from which it is doubtful."""
+
+OF_KNOWN = 5.0
+"""How many times the largest known fitness, simulated or measured, a value is, from which it is doubtful."""
+
+
+@snapshot
+def read(session: Session, request: str, spec: MeasurementSpec) -> DoubtsRead:
+    """Return what is doubtful about an answer that was not given yet.
+
+    Raises:
+        NotFound: the request does not exist.
+    """
+    row, repetition = get(session, request)
+    return DoubtsRead(doubts=doubts(session, repetition, row, spec.values))
+
+
+def doubts(
+    session: Session, repetition: RepetitionRow, request: RequestRow, values: Sequence[float] | None
+) -> tuple[str, ...]:
+    """Return what is doubtful about values of an answer, each as a sentence.
+
+    Args:
+        session: of a transaction.
+        repetition: of the request.
+        request: what was to be measured.
+        values: fitness of each repeat; None if it failed.
+    """
+    if values is None:
+        return ()
+    return (*_beside_repeats(values), *_beside_known(values, _largest_known(session, repetition, request)))
+
+
+def _beside_repeats(values: Sequence[float]) -> Iterator[str]:
+    for place, value in enumerate(values):
+        others = [each for at, each in enumerate(values) if at != place]
+        middle = abs(median(others)) if others else 0.0
+        if middle and abs(value) >= OF_REPEATS * middle:
+            yield f"{value:g} is {abs(value) / middle:.2g} times the other repeats"
+
+
+def _beside_known(values: Sequence[float], known: float) -> Iterator[str]:
+    value = max(values, key=abs)
+    if known and abs(value) >= OF_KNOWN * known:
+        times = abs(value) / known
+        yield f"{value:g} is {times:.2g} times the largest fitness that was simulated or measured, {known:.3g}"
+
+
+def _largest_known(session: Session, repetition: RepetitionRow, request: RequestRow) -> float:
+    """Return the largest size of a fitness that is known from other requests of the experiment; 0 without any."""
+    row, measured = IterationRow, MeasurementRow
+    own = (measured.repetition_id == repetition.id) & (measured.iteration == request.iteration)
+    seen = of_experiments(measured, [repetition.experiment_id], measured.fitness).where(~own)
+    simulated = of_experiments(row, [repetition.experiment_id], row.simulated_fitness)
+    values = [*session.scalars(seen), *session.scalars(simulated)]
+    return max((abs(each) for each in values if each is not None), default=0.0)

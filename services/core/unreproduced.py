@@ -1,0 +1,79 @@
+"""The sentence about samples that no simulator reproduces: how far off, where most, and what is often missing.
+
+Source: gaplab.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.misfit import OFTEN, Tuning
+from gaplab.services.core.misspecification import SURPRISING
+from gaplab.services.core.sensors import Sensors
+from gaplab.services.core.types import Fit
+
+MISSING = (
+    "Often missing in a model: a slope of the ground, a weak or slow motor, mass, latency; or a tunable is at its bound"
+)
+
+SHOWN = 2
+"""Sensors that are named, those with the largest differences."""
+
+
+def fits_of(tunings: Sequence[Tuning]) -> list[Fit]:
+    """Return the fits of tunings that know theirs."""
+    return [each.fit for each in tunings if each.fit is not None]
+
+
+def is_unreproduced(tunings: Sequence[Tuning]) -> bool:
+    """Return whether at least half of the repetitions that know say that no simulator reproduces their samples."""
+    surprised = [fit.surprise <= SURPRISING for fit in fits_of(tunings)]
+    return bool(surprised) and sum(surprised) >= OFTEN * len(surprised)
+
+
+def unreproduced(tunings: Sequence[Tuning], sensors: Sensors | None, unit: str) -> str:
+    """Return that no simulator reproduces the samples, with numbers; "" if one does, or nobody knows.
+
+    Args:
+        tunings: the latest tuning of each repetition.
+        sensors: of the robot; None if they are not known.
+        unit: of errors.
+    """
+    if not is_unreproduced(tunings):
+        return ""
+    fits = fits_of(tunings)
+    errors = [each.error for each in tunings if each.fit is not None]
+    left = [each.expected for each in tunings if each.fit is not None]
+    said = sum(fit.surprise <= SURPRISING for fit in fits)
+    of = f"{said} of {len(fits)} repetitions say so" if len(fits) > 1 else "by one repetition"
+    return (
+        f"no simulator reproduces the samples: the best err by {np.nanmean(errors):.2g} {unit} a sample, where noise "
+        f"and rough physics would leave {np.nanmean(left):.2g} ({of}){_where(fits, sensors)}. {MISSING}"
+    )
+
+
+def _where(fits: Sequence[Fit], sensors: Sensors | None) -> str:
+    """Return the sensors with the largest differences, each with its worst time."""
+    rows = [fit.reading_errors for fit in fits if fit.reading_errors.size]
+    if sensors is None or not rows or rows[0].size != sensors.size:
+        return ""
+    squares = np.square(rows).reshape(len(rows), len(sensors.times_s), len(sensors.names))
+    by_time = np.sqrt(_mean(squares, 0))
+    by_sensor = np.sqrt(_mean(by_time**2, 0))
+    worst = np.argsort(-np.nan_to_num(by_sensor, nan=-1.0), kind="stable")[:SHOWN]
+    told = [_sensor(sensors, place, by_sensor[place], by_time[:, place]) for place in worst.tolist()]
+    return f"; most differs {', then '.join(told)}"
+
+
+def _sensor(sensors: Sensors, place: int, size: float, by_time: FloatArray) -> str:
+    name, unit = sensors.names[place], sensors.units[place]
+    at = sensors.times_s[int(np.argmax(np.nan_to_num(by_time, nan=-1.0)))]
+    value = f"{size * sensors.noises[place]:.2g}{f' {unit}' if unit else ''}"
+    return f"{name}, by {size:.2g} × noise or {value}, most at {at:g} s"
+
+
+def _mean(values: FloatArray, axis: int) -> FloatArray:
+    """Return the mean over an axis without nan; nan where nothing is known."""
+    known = np.isfinite(values)
+    return np.asarray(np.where(known, values, 0.0).sum(axis) / np.maximum(known.sum(axis), 1))
