@@ -40,7 +40,7 @@ BEYOND = {
     "slope of 3°": {"slope": np.radians(3.0)},
     "one weak knee": {"motor_gain(front_left_knee)": 0.4},
     "legs 10 % longer": {"length_scale": 1.1},
-    "delay of 30 ms": {"delay": 0.03},
+    "trunk half as heavy again": {"mass(trunk)": 1.5},
 }
 """What each kind of reality has and no simulator."""
 
@@ -86,7 +86,7 @@ def row(kind: str, samples: int, realities: Sequence[int]) -> str:
     within, called = np.array(inside), np.array(identified)
     shares = "  ".join(f"{share:4.0%}" for share in within.mean(axis=0))
     said = f"{(within & called).sum():3} of {called.sum():3} identified are right; {surprised} unreproduced"
-    return f"{kind:18} {samples:3} samples of {len(realities)}: {within.mean():4.0%} covered ({shares}); {said}"
+    return f"{kind:25} {samples:3} samples of {len(realities)}: {within.mean():4.0%} covered ({shares}); {said}"
 
 
 def main() -> None:

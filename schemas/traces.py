@@ -15,7 +15,8 @@ Lags = Annotated[
     tuple[Annotated[Real, Field(ge=-1e9, le=1e10)] | None, ...],
     Field(
         max_length=20,
-        description="time on the clock of each trace at which the motion began, s; null: found by cross-correlation",
+        description="time on the clock of each trace at which the motion began, s; null: found by the rest before it, "
+        "and by cross-correlation",
     ),
 ]
 
@@ -48,6 +49,7 @@ class TraceRead(Frozen):
         description="correlation with the motion that the best simulator expects, at most 1; null: the lag was given, "
         "or the expected motion does not change",
     )
+    after_rest: bool = Field(default=False, description="whether the rest before the motion shows when it began")
 
 
 class AlignedTrace(TraceRead):
@@ -73,3 +75,8 @@ class TracesRead(Frozen):
         examples=[[[[0.02, None]]]],
     )
     traces: tuple[AlignedTrace, ...]
+    doubts: tuple[str, ...] = Field(
+        default=(),
+        description="what is unlikely about the traces; an answer with them is refused unless it is `confirmed`",
+        examples=[("trace 1: there is no pose from 1.5 to 3.5 s",)],
+    )

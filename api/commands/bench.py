@@ -11,6 +11,7 @@ from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import BENCH, AsJson, Url, app, connect
+from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.measured_values import ValuesCommand, numbers
 from gaplab.api.commands.questions import confirmed
@@ -100,7 +101,12 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
         str | None, typer.Option("--topic", help="topic of the base's pose in MCAP", show_default=False)
     ] = None,
     answer: Annotated[bool, typer.Option("--answer", help="answer the request with them")] = False,
+    lag_s: Annotated[
+        list[float] | None,
+        typer.Option("--lag", help="when the motion began on the clock of each recording, s", show_default=False),
+    ] = None,
     operator: Operator = None,
+    yes: Yes = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
@@ -109,11 +115,14 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
         raise typer.BadParameter("an operator is of an answer; add --answer", param_hint="--operator")
     with connect(url) as client:
         stored = [client.bench.attach_trace(file, topic).id for file in files]
-        said = client.bench.traces(id, stored)
+        said = client.bench.traces(id, stored, lag_s)
         if not answer:
             print_result(said, _words_of(said), as_json=as_json)
             return
-        found = client.bench.answer(id, **_given(operator=operator) | {"traces": stored})
+        if said.doubts and not yes and not confirmed(said.doubts):
+            raise CommandError("nothing was sent; if the traces are right, add --yes", Exit.CONFLICT)
+        details: Details = {"traces": stored, "lags_s": [each.lag_s for each in said.traces], "confirmed": True}
+        found = client.bench.answer(id, **_given(operator=operator) | details)
     print_result(found, f"{_words_of(said)}\n{stored_words(found)}", as_json=as_json)
 
 
@@ -181,11 +190,12 @@ def _given(**details: str | None) -> Details:
 
 def _words_of(found: TracesRead) -> str:
     """Return what traces say, and how well their clocks were aligned."""
-    return "\n".join(
+    lines = [
         f"{value:.6g} {found.unit}; the motion begins at {trace.lag_s:.3f} s"
-        + ("" if trace.match is None else f" (match {trace.match:.2f})")
+        + ("" if trace.match is None else f" ({'after rest, ' if trace.after_rest else ''}match {trace.match:.2f})")
         for value, trace in zip(found.values, found.traces, strict=True)
-    )
+    ]
+    return "\n".join([*lines, *(f"doubtful: {each}" for each in found.doubts)])
 
 
 def _one(read: Callable[[str], RequestRead], id: str) -> RequestRead | None:

@@ -57,7 +57,7 @@ def answer(
     Raises:
         NotFound: the request does not exist.
         InvalidSpec: the values do not fit the request; every violation is named.
-        Conflict: the request is wanted no more.
+        Conflict: the request is wanted no more, or its traces are doubtful and not confirmed.
     """
     asked = AddressedAnswer(request=id_, **spec.model_dump())
     return once(store, admitted, asked, AnswerRead, lambda session: _answer(session, id_, spec, traces, admitted.token))
@@ -66,6 +66,8 @@ def answer(
 def _answer(
     session: Session, id_: str, spec: MeasurementSpec, traces: TracesRead | None, token: str | None
 ) -> AnswerRead:
+    if traces is not None and traces.doubts and not spec.confirmed:
+        raise Conflict(f"{'; '.join(traces.doubts)}. Look at the traces; if they are right, send `confirmed` with them")
     spec = spec if traces is None else _with_values(spec, traces)
     row, repetition = locked(session, id_)
     experiment = session.get_one(ExperimentRow, repetition.experiment_id)

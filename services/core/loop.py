@@ -71,7 +71,7 @@ class Setting:
         held_out: share of the samples that no tuning sees.
         names: `(p,)`: names of the tunables.
         probes: iterations whose transferred controller is measured in reality.
-        known_samples: samples from before the experiment, on which the first simulators are tuned.
+        known_samples: samples from before, on which the first simulators are tuned.
         forecast: safety forecast of a controller for a physical robot; None if there is none.
         controller_optimizer: searches for controllers.
     """
@@ -154,9 +154,8 @@ def next_step(setting: Setting, history: History, answers: Answers) -> Step | No
 
 def _drawn(setting: Setting, iteration: int) -> tuple[Simulator, ...]:
     """Return simulators before the first sample, which are random. Source: paper, section 2."""
-    strategy, space = setting.strategy, setting.parameters
+    strategy, space, source = setting.strategy, setting.parameters, f"strategy {setting.strategy.name!r}"
     drawn = strategy.draw(space, setting.names, setting.stream(iteration, "tune"))
-    source = f"strategy {strategy.name!r}"
     if len(drawn) != strategy.ensemble:
         raise PluginBroken(f"{source} drew {len(drawn)} simulators; permitted: {strategy.ensemble}, its ensemble")
     return tuple(Simulator(space.check(parameters, source)) for parameters in drawn)
@@ -201,8 +200,8 @@ def _select(setting: Setting, history: History, iteration: int, answers: Answers
 def _tune(setting: Setting, history: History, iteration: int, answers: Answers) -> Tuned:
     """Return simulators tuned on the strategy's lessons whose measurement succeeded; random ones if there are none.
 
-    Samples that are held out are not tuned on: the best simulator is tested on them. The budget includes samples that
-    are no lessons or whose measurement failed; their rollouts count as saved.
+    The best simulator is tested on samples that are held out. The budget includes samples that are no lessons or whose
+    measurement failed; their rollouts count as saved.
     """
     strategy = setting.strategy
     if not strategy.tunes:
@@ -225,7 +224,7 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     found = tuple(sound(simulator, setting.parameters, source) for simulator in found)
     if tests:
         found = tested(found, Misfit(answers, tests, setting.discrepancy, setting.reading_times_s))
-    cost = answers.cost_within(budget, source)  # without what the check of the fit simulates
+    cost = answers.cost_within(budget, source)  # without those of the next line
     return Tuned(iteration, fitted(found, misfit, setting.parameters, setting.stream(iteration, "fit")), cost)
 
 

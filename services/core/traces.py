@@ -1,8 +1,8 @@
 """Traces: the recorded motion of a physical robot's base, from which the robot's code computes fitness and readings.
 
-A trace has its own clock and its own place on the ground. The clock is aligned with the motion by cross-correlation
-with the motion that a simulator expects, and the place by the pose at the start of the motion. Heights are above the
-ground, and z points up.
+A trace has its own clock and its own place on the ground. A recording that begins at rest shows when the motion
+begins; around that moment, else anywhere, the clock is aligned by cross-correlation with the motion that a simulator
+expects. The place is aligned by the pose at the start of the motion. Heights are above the ground, and z points up.
 
 Source: gaplab.
 """
@@ -19,6 +19,15 @@ from gaplab.services.core.world import World
 
 STEP_S = 0.005
 """Resolution of the alignment."""
+
+REST_S = 0.2
+"""Shortest rest before a motion that shows when it begins."""
+
+MOVED_M, MOVED_RAD = 0.005, 0.03
+"""How far a base has moved, or turned, since its rest, from which it moves; and as much noise as rest may have."""
+
+AROUND_S = 0.03
+"""Longest time between the start that rest shows and the one with the best match; half a period of a gait is more."""
 
 LEAST_CHANGE = 1e-9
 """Standard deviation of a feature below which it says nothing about time."""
@@ -53,10 +62,12 @@ class Alignment:
     Attributes:
         lag_s: time on that clock.
         match: correlation with the expected motion, at most 1; None if nothing was correlated.
+        after_rest: whether the trace begins at rest, so that its start is where the base begins to move.
     """
 
     lag_s: float
     match: float | None = None
+    after_rest: bool = False
 
 
 class TooShort(ValueError):
@@ -93,8 +104,30 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None) -> Alignmen
     scores = _correlations(moving, template)
     if scores is None:
         return Alignment(float(first))
-    best = int(np.argmax(scores))
-    return Alignment(float(min(first + best * STEP_S, max(first, latest))), float(min(scores[best], 1.0)))
+    near, begun = np.ones(len(scores), dtype=bool), _onset(trace)
+    if begun is not None and (expected_to := _onset(expected, at_once=True)) is not None:
+        away = np.abs(first + np.arange(len(scores)) * STEP_S - (begun - expected_to))
+        near = away <= max(AROUND_S, float(away.min()))
+    best = int(np.argmax(np.where(near, scores, -np.inf)))
+    lag_s = float(min(first + best * STEP_S, max(first, latest)))
+    return Alignment(lag_s, float(min(scores[best], 1.0)), after_rest=not near.all())
+
+
+def _onset(trace: Trace, *, at_once: bool = False) -> float | None:
+    """Return when a base begins to move, on the clock of its trace; None if it does not, or not after rest.
+
+    Args:
+        trace: of the base.
+        at_once: whether the motion begins with the trace, so that there is no rest.
+    """
+    resting = trace.times_s <= trace.times_s[0] + (0.0 if at_once else REST_S)
+    away_m = np.linalg.norm(trace.positions_m - trace.positions_m[resting].mean(axis=0), axis=1)
+    cosine = np.abs(trace.orientations @ trace.orientations[0])
+    away_rad = 2.0 * np.arccos(np.clip(cosine, 0.0, 1.0))
+    moved = (away_m > MOVED_M) | (away_rad > MOVED_RAD)
+    if np.any(moved[resting]) or not np.any(moved):
+        return None
+    return float(trace.times_s[int(np.argmax(moved))])
 
 
 def placed(trace: Trace, lag_s: float, times_s: FloatArray, world: World) -> Trajectory:

@@ -15,6 +15,7 @@ from gaplab.services.core.kinematics import observes_base
 from gaplab.services.core.motions import Trajectory
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.trace_checks import unlikely
 from gaplab.services.core.trace_tables import read_trace
 from gaplab.services.core.traces import Alignment, TooShort, Trace, align, placed
 from gaplab.services.core.world import World
@@ -149,7 +150,7 @@ def _tables(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) -
 def _evaluated(
     robot: Robot, genome: FloatArray, traces: Sequence[Trace], expected: Trace, spec: TracesSpec
 ) -> TracesRead:
-    aligned, values, readings, violations = [], list[float](), [], list[Violation]()
+    aligned, values, readings, violations, doubts = [], list[float](), [], list[Violation](), list[str]()
     lags = spec.lags_s or (None,) * len(traces)
     observe_s, sensors = robot.motion(genome).observe_s, robot.sensors
     for place, (digest, trace) in enumerate(zip(spec.traces, traces, strict=True)):
@@ -166,10 +167,15 @@ def _evaluated(
             seen = robot.sense(placed(trace, found.lag_s, sensors.times_s, robot.world))
             readings.append(_told(seen))
         aligned.append(_beside(digest, trace, expected, found, robot.world))
+        doubts += [f"trace {place + 1}: {what}" for what in unlikely(trace, expected, found)]
     if violations:
         raise InvalidSpec(violations)
     return TracesRead(
-        values=tuple(values), unit=robot.unit, readings=tuple(readings) if sensors.size else None, traces=tuple(aligned)
+        values=tuple(values),
+        unit=robot.unit,
+        readings=tuple(readings) if sensors.size else None,
+        traces=tuple(aligned),
+        doubts=tuple(doubts),
     )
 
 
@@ -186,6 +192,7 @@ def _beside(digest: str, trace: Trace, expected: Trace, alignment: Alignment, wo
         attachment=digest,
         lag_s=alignment.lag_s,
         match=alignment.match,
+        after_rest=alignment.after_rest,
         times_s=tuple(times.tolist()),
         heights_m=_heights(seen),
         distances_m=_distances(seen),

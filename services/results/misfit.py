@@ -62,20 +62,23 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
     unseen = overfitting(points[-1], error_unit) if points else ""
-    robot = installed_robot(spec)
-    latest = by_iteration[points[-1].iteration] if points else []
-    wrong = unreproduced(latest, None if robot is None else robot.sensors, error_unit)
+    wrong = _unreproduced(spec, by_iteration[points[-1].iteration], error_unit) if points else ""
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
         error_unit=error_unit,
         points=points,
-        remarks=(*([wrong] if wrong else []), *remarks(points, unit(spec), error_unit), *([unseen] if unseen else [])),
+        remarks=tuple(filter(None, [wrong, *remarks(points, unit(spec), error_unit), unseen])),
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
         verdicts=verdicts(points, samples, _means(spec), unreproduced=bool(wrong)),
     )
+
+
+def _unreproduced(spec: ResolvedSpec, latest: Sequence[Tuning], error_unit: str) -> str:
+    robot = installed_robot(spec)
+    return unreproduced(latest, None if robot is None else robot.sensors, error_unit)
 
 
 def misfit_csv(found: MisfitRead) -> str:

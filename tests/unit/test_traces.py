@@ -12,6 +12,7 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.trace_checks import unlikely
 from gaplab.services.core.trace_tables import COLUMNS, MOST_ERRORS, read_trace
 from gaplab.services.core.traces import TooShort, Trace, align, placed
 from gaplab.services.engines.mujoco.engine import MuJoCo
@@ -40,6 +41,37 @@ def shifted(trace: Trace, lag_s: float, turn_rad: float = 0.0, noise: float = 0.
     return Trace(frozen(times + lag_s), positions, (turn * Rotation.from_quat(seen.orientations)).as_quat())
 
 
+def cut(trace: Trace, begin_s: float, end_s: float) -> Trace:
+    kept = (trace.times_s <= begin_s + 1e-9) | (trace.times_s >= end_s - 1e-9)
+    return Trace(trace.times_s[kept], trace.positions_m[kept], trace.orientations[kept])
+
+
+def frozen_from(trace: Trace, begin_s: float, end_s: float) -> Trace:
+    held = np.clip(trace.times_s, None, begin_s)
+    inside = (trace.times_s > begin_s) & (trace.times_s <= end_s)
+    times = frozen(np.where(inside, held, trace.times_s))
+    seen = trace.at(times)
+    return Trace(trace.times_s, seen.positions_m, seen.orientations)
+
+
+def moved(trace: Trace, by_m: Any) -> Trace:
+    return replace(trace, positions_m=trace.positions_m + by_m)
+
+
+def scaled(trace: Trace, factor: float) -> Trace:
+    return replace(trace, positions_m=trace.positions_m * factor)
+
+
+def on_its_side(trace: Trace) -> Trace:
+    side = Rotation.from_rotvec([np.pi / 2, 0.0, 0.0])
+    return replace(trace, orientations=(side * Rotation.from_quat(trace.orientations)).as_quat())
+
+
+def still(trace: Trace) -> Trace:
+    count = len(trace.times_s)
+    return Trace(trace.times_s, np.tile(trace.positions_m[:1], (count, 1)), np.tile(trace.orientations[:1], (count, 1)))
+
+
 @pytest.mark.parametrize(("lag_s", "noise"), [(0.0, 0.0), (12.34, 0.0), (1.7e9, 0.0), (-3.0, 0.0005)])
 def test_the_clock_of_a_trace_is_found(expected: Trace, lag_s: float, noise: float) -> None:
     found = align(shifted(expected, lag_s, 1.0, noise), expected)
@@ -47,6 +79,50 @@ def test_the_clock_of_a_trace_is_found(expected: Trace, lag_s: float, noise: flo
     assert found.lag_s == pytest.approx(lag_s, abs=0.011, rel=0)
     assert found.match is not None
     assert 0.5 < found.match <= 1.0
+
+
+def test_the_start_is_where_a_base_at_rest_begins_to_move_however_it_moves_then(expected: Trace) -> None:
+    """A gait repeats itself: what a wrong simulator expects fits a later step better."""
+    slower = Trace(frozen(expected.times_s * 1.3), expected.positions_m, expected.orientations)
+    trace = shifted(expected, 5.0)
+
+    until = slower.times_s <= END_S
+    found = align(trace, Trace(slower.times_s[until], slower.positions_m[until], slower.orientations[until]))
+
+    assert found.after_rest
+    assert found.lag_s == pytest.approx(5.0, abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda trace: trace, ""),
+        (lambda trace: cut(trace, 6.0, 7.0), "there is no pose from 6 to 7 s"),
+        (lambda trace: frozen_from(trace, 6.0, 7.0), "the pose stays the same from 6 s for 1 s"),
+        (lambda trace: moved(trace, [0.0, 0.0, 230.0]), "the base begins 230 m high, and the simulators expect 0.17 m"),
+        (lambda trace: scaled(trace, 1000.0), "m, and the simulators expect"),
+        (lambda trace: on_its_side(trace), "the base begins tilted by 90° from what the simulators expect"),
+        (lambda trace: still(trace), "the base does not move"),
+    ],
+)
+def test_what_is_unlikely_beside_the_expected_motion_is_said(expected: Trace, wrong: Any, said: str) -> None:
+    trace = wrong(shifted(expected, 5.0))
+
+    told = list(unlikely(trace, expected, align(trace, expected, 5.0)))
+
+    assert bool(told) == bool(said)
+    assert any(said in each for each in told or [""])
+
+
+def test_a_weak_match_without_rest_is_uncertain(expected: Trace) -> None:
+    times = frozen(np.arange(0.0, 6.0, 0.02))
+    driven = np.stack([0.3 * times, 0.01 * np.sin(9.0 * times), np.full(len(times), 0.17)], axis=-1)
+    trace = Trace(times, driven, np.tile([0.0, 0.0, 0.0, 1.0], (len(times), 1)))
+
+    found = align(trace, expected)
+
+    assert not found.after_rest
+    assert any("the recording does not begin at rest" in each for each in unlikely(trace, expected, found))
 
 
 @pytest.mark.parametrize("turn_rad", [0.0, 2.5, -1.0])
