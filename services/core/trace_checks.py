@@ -62,9 +62,10 @@ def _holes(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
     if not changes.size:
         yield "the base does not move"
         return
-    still = np.diff(times_s[changes])
-    if still.size and (longest := int(np.argmax(still))) >= 0 and still[longest] > 2 * LONGEST_GAP_S:
-        yield f"the pose stays the same from {times_s[changes[longest] + 1]:.10g} s for {still[longest]:.2g} s"
+    begins, ends = times_s[changes[:-1] + 1], times_s[changes[1:]]
+    still = ends - begins
+    if still.size and still.max() > 2 * LONGEST_GAP_S:
+        yield f"the pose stays the same from {begins[int(np.argmax(still))]:.10g} s for {still.max():.2g} s"
 
 
 def _start(height_m: float, wanted_m: float, seen: FloatArray, wanted: FloatArray) -> Iterator[str]:

@@ -426,6 +426,17 @@ def test_an_answer_may_be_computed_from_traces(client: Client, store: Store, tmp
     assert again.values == pytest.approx(read.values, abs=0.02)
     assert again.values[0] == pytest.approx(again.values[1], abs=1e-6)
 
+    assert read.doubts == ()
+    holed = tmp_path / "holed.csv"
+    lines = (tmp_path / "a.csv").read_text().splitlines(keepends=True)
+    holed.write_text("".join([*lines[:250], *lines[350:]]))
+    doubtful = [client.bench.attach(holed).id, hashes[1]]
+    (doubt,) = client.bench.traces(request.id, doubtful).doubts
+    assert doubt.startswith("trace 1: there is no pose from ")
+    with pytest.raises(ServiceError, match="there is no pose from .* send `confirmed` with them") as refused:
+        client.bench.answer(request.id, traces=doubtful)
+    assert refused.value.problem.status == 409
+
     answer = client.bench.answer(request.id, traces=hashes, operator="Ada", unit="m/s")
     assert (answer.state, answer.values, answer.readings) == ("counted", read.values, read.readings)
     assert answer.attachments == tuple(hashes)

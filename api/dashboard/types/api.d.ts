@@ -5,6 +5,7 @@ declare namespace Api {
     attachment: string;
     lag_s: number;
     match: number | null;
+    after_rest: boolean;
     times_s: Array<number>;
     heights_m: Array<number>;
     distances_m: Array<number>;
@@ -802,12 +803,14 @@ declare namespace Api {
     attachment: string;
     lag_s: number;
     match: number | null;
+    after_rest: boolean;
   }
   interface TracesRead {
     values: Array<number>;
     unit: string;
     readings: Array<Array<Array<number | null>>> | null;
     traces: Array<AlignedTrace>;
+    doubts: Array<string>;
   }
   interface TracesSpec {
     traces: Array<string>;
