@@ -20,13 +20,22 @@ COLORS = {"same": "green", "different": "bold red", "not computed": "yellow"}
 
 
 @app.command(rich_help_panel=KEEPING)
-def rerun(
+def rerun(  # noqa: PLR0913, PLR0917 - each is an option of the command
     file: Annotated[Path, typer.Argument(metavar="ARCHIVE", help="an archive of `gaplab export`")],
     verify: Annotated[
         bool, typer.Option("--verify", help="compute it on this machine, without a service, and compare every bit")
     ] = False,
     repetitions: Annotated[
         int | None, typer.Option(min=1, help="of each experiment to verify; left out: all", show_default=False)
+    ] = None,
+    experiment: Annotated[
+        str | None, typer.Option(help="name or id of the only experiment to verify", show_default=False)
+    ] = None,
+    repetition: Annotated[
+        int | None, typer.Option(min=0, help="number of the only repetition to verify, from 0", show_default=False)
+    ] = None,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.01, help="verify the first steps, until this time is over", show_default=False)
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")] = False,
     as_json: AsJson = False,
@@ -35,11 +44,12 @@ def rerun(
     """Submit the spec of an archive again, or verify its results on this machine."""
     from gaplab.services.plugins import folders
 
-    if repetitions and not verify:
-        raise typer.BadParameter("it limits what --verify computes; add --verify", param_hint="--repetitions")
+    parts = {"--repetitions": repetitions, "--experiment": experiment, "--repetition": repetition, "--minutes": minutes}
+    if not verify and (given := [name for name, value in parts.items() if value is not None]):
+        raise typer.BadParameter("it limits what --verify computes; add --verify", param_hint=given[0])
     folders.load()
     if verify:
-        _verify(file, repetitions, as_json=as_json)
+        _verify(file, (repetitions, experiment, repetition, minutes), as_json=as_json)
         return
     from gaplab.services.archives.rerunning import submitted_spec
 
@@ -50,8 +60,9 @@ def rerun(
     print_result(record, record.id, as_json=as_json)
 
 
-def _verify(file: Path, repetitions: int | None, *, as_json: bool) -> None:
-    from gaplab.services.archives.rerunning import verify as recompute  # pulls in the physics
+def _verify(file: Path, part: tuple[int | None, str | None, int | None, float | None], *, as_json: bool) -> None:
+    from gaplab.services.archives.rerunning import Part  # pulls in the physics
+    from gaplab.services.archives.rerunning import verify as recompute
 
     screen = console(stderr=as_json)
 
@@ -59,7 +70,7 @@ def _verify(file: Path, repetitions: int | None, *, as_json: bool) -> None:
         screen.print(_line(result), soft_wrap=True)
 
     with _opened(file) as source:
-        found = recompute(source, most=repetitions, computed=show)
+        found = recompute(source, Part(*part), computed=show)
     if as_json:
         print_json(found)
     else:

@@ -2,30 +2,29 @@
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from math import inf
 from multiprocessing import get_context
+from time import time
 from typing import IO, Any
 
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.reruns import Outcome, RepetitionRerun, RerunRead
+from gaplab.schemas.reruns import RepetitionRerun, RerunRead
 from gaplab.services.archives.reading import CheckedArchive, checked_archive
-from gaplab.services.archives.step_differences import difference
+from gaplab.services.archives.recomputing import Recorded, rerun, result_of
 from gaplab.services.core import robot_library
-from gaplab.services.core.errors import Conflict
-from gaplab.services.core.loop import repetition
+from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.core.types import Step
-from gaplab.services.engines import engines
 from gaplab.services.plugins import folders
 from gaplab.services.running import provenance
 from gaplab.services.running.versions import provenance as provenance_here
-from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.shortening import experiment_spec, study_spec
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import experiments, logs
 from gaplab.services.store.session import Session
 
@@ -34,24 +33,26 @@ NOT_RECORDED = "the archive does not say which software and machine computed it"
 
 
 @dataclass(frozen=True)
-class Recorded:
-    """A repetition as an archive has it.
+class Part:
+    """A part of an archive that is recomputed.
 
     Attributes:
-        experiment: id of its experiment.
-        name: name of its experiment.
-        number: number of the repetition, from 0.
-        spec: stored spec of the experiment.
-        log: steps of the repetition.
-        robots: texts of the robot files that the spec needs, for a process that does not know them.
+        most: repetitions of each experiment, from number 0; None: all.
+        experiment: name or id of the only experiment; None: all.
+        repetition: number of the only repetition; None: all.
+        minutes: time after which no further step is computed; None: until all are.
     """
 
-    experiment: str
-    name: str
-    number: int
-    spec: Mapping[str, Any]
-    log: tuple[Step, ...]
-    robots: tuple[str, ...] = ()
+    most: int | None = None
+    experiment: str | None = None
+    repetition: int | None = None
+    minutes: float | None = None
+
+    def repetitions(self, row: ExperimentRow, every: Sequence[RepetitionRow]) -> Sequence[RepetitionRow]:
+        """Return the repetitions of an experiment that belong to the part."""
+        if self.experiment not in {None, row.id, row.name}:
+            return ()
+        return [each for each in every[: self.most] if self.repetition in {None, each.number}]
 
 
 def submitted_spec(file: IO[bytes]) -> dict[str, Any]:
@@ -74,8 +75,8 @@ def submitted_spec(file: IO[bytes]) -> dict[str, Any]:
 
 def verify(
     file: IO[bytes],
+    part: Part = Part(),
     *,
-    most: int | None = None,
     cores: int | None = None,
     computed: Callable[[RepetitionRerun], None] = lambda _: None,
 ) -> RerunRead:
@@ -83,15 +84,16 @@ def verify(
 
     Args:
         file: the archive, seekable, at its beginning.
-        most: repetitions of each experiment to recompute, from number 0; left out: all.
+        part: what to recompute; left out: all.
         cores: processes that compute; left out: one for each core.
         computed: is called with each result, in the order of the archive.
 
     Raises:
         InvalidArchive: the file is damaged, or not an archive.
+        NotFound: it has no such experiment or repetition.
     """
     with checked_archive(file, datetime.now(UTC)) as checked, checked.store.reading() as session:
-        recorded = list(_recorded(session, checked, most))
+        recorded = list(_recorded(session, checked, part))
         versions = _other_versions(session, checked)
     results: list[RepetitionRerun] = []
     for result in rerun_all(recorded, cores or os.cpu_count()):
@@ -127,79 +129,25 @@ def _rerun_alone(recorded: Recorded) -> RepetitionRerun:
         with _pool(1) as process:
             return process.submit(rerun, recorded).result()
     except BrokenProcessPool:
-        return _result(recorded, "not computed", 0, "its process died: it was killed, or ran out of memory")
+        return result_of(recorded, "not computed", 0, "its process died: it was killed, or ran out of memory")
 
 
 def _pool(cores: int | None) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(cores, get_context("spawn"), folders.load)
 
 
-def rerun(recorded: Recorded) -> RepetitionRerun:
-    """Recompute a repetition, and compare it step by step until one differs.
-
-    Any error is the reason why the repetition is not computed, and ends no other one.
-    """
-    same, reason = 0, None
-    outcome: Outcome = "same"
-    try:
-        if (reason := _obstacle(recorded)) is not None:
-            outcome = "not computed"
-        else:
-            for stored, step in zip(recorded.log, _computed(recorded), strict=False):
-                if (found := difference(stored, step)) is not None:
-                    kind = type(stored).__name__.lower()
-                    outcome, reason = "different", f"step {same + 1} ({kind}, iteration {stored.iteration}): {found}"
-                    break
-                same += 1
-            else:
-                if same < len(recorded.log):
-                    outcome, reason = "different", f"it ends here after {same} steps"
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
-        outcome, reason = "not computed", f"{type(error).__name__}: {error}"
-    return _result(recorded, outcome, same, reason)
-
-
-def _result(recorded: Recorded, outcome: Outcome, steps: int, reason: str | None) -> RepetitionRerun:
-    return RepetitionRerun(
-        experiment=recorded.experiment,
-        name=recorded.name,
-        repetition=recorded.number,
-        outcome=outcome,
-        steps=steps,
-        stored_steps=len(recorded.log),
-        reason=reason,
-    )
-
-
-def _computed(recorded: Recorded) -> Iterator[Step]:
-    robot_library.learn(recorded.robots)
-    return repetition(setting(spec_of(recorded.spec), recorded.number))
-
-
-def _obstacle(recorded: Recorded) -> str | None:
-    """Return why a repetition cannot be computed here; None if it can."""
-    reality = recorded.spec["reality"]
-    if reality["kind"] == "physical":
-        return "reality is a robot on a bench, and a measurement cannot be repeated"
-    if any(value is None for value in reality["parameters"].values()):
-        return "the archive hides parameters of reality"
-    for name in {recorded.spec["engine"]["name"], reality["engine"]["name"]}:
-        if name not in engines:
-            return f"the engine {name!r} is not installed here"
-        if not engines[name].available():
-            return f"the engine {name!r} is not installed here: {engines[name].install}"
-        if not engines[name].repeatable:
-            return f"the engine {name!r} measures a robot, and a measurement cannot be repeated"
-    return None
-
-
-def _recorded(session: Session, checked: CheckedArchive, most: int | None) -> Iterator[Recorded]:
-    for row in experiments.get_experiments(session, list(checked.experiments)):
-        repetitions = experiments.repetitions_of(session, row.id)[:most]
+def _recorded(session: Session, checked: CheckedArchive, part: Part) -> Iterator[Recorded]:
+    until = inf if part.minutes is None else time() + 60.0 * part.minutes
+    rows = experiments.get_experiments(session, list(checked.experiments))
+    chosen = [(row, part.repetitions(row, experiments.repetitions_of(session, row.id))) for row in rows]
+    if not any(repetitions for _, repetitions in chosen):
+        names = ", ".join(row.name for row in rows)
+        raise NotFound(f"the archive has no repetition {part.repetition} of {part.experiment or 'any'}; it has {names}")
+    for row, repetitions in chosen:
         found = logs.logs(session, [each.id for each in repetitions])
         files = robot_library.needed_by(spec_of(row.spec).robot)
         for each in repetitions:
-            yield Recorded(row.id, row.name, each.number, row.spec, found[each.id], files)
+            yield Recorded(row.id, row.name, each.number, row.spec, found[each.id], files, until)
 
 
 def _other_versions(session: Session, checked: CheckedArchive) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives import export_experiment
-from gaplab.services.archives.rerunning import verify
+from gaplab.services.archives.rerunning import Part, verify
 from gaplab.services.bench import answering, attachments, corrections, doubts, taking
 from gaplab.services.bench.branches import list_branches
 from gaplab.services.bench.taking import RequestFilter
@@ -628,14 +628,20 @@ def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) 
         assert all(map(same, found, expected))
 
 
-def test_measurements_of_an_archive_are_not_computed_again_and_it_says_why(sqlite_store: Store) -> None:
-    experiment = submit_experiment(sqlite_store, bench())
-    finish(sqlite_store, lambda _: 0.5)
+def test_a_rerun_of_a_bench_takes_the_stored_answers(sqlite_store: Store) -> None:
+    experiment = submit_experiment(sqlite_store, bench(reality={"repeats": 2}, repetitions=2))
+    finish(sqlite_store, truth(bench()))
+    archive = exported(export_experiment(sqlite_store, experiment.id))
 
-    found = verify(BytesIO(exported(export_experiment(sqlite_store, experiment.id))), cores=1)
+    found = verify(BytesIO(archive), cores=1)
+    part = verify(BytesIO(archive), Part(experiment=experiment.name, repetition=1), cores=1)
+    none = verify(BytesIO(archive), Part(repetition=0, minutes=0.0), cores=1)
 
-    assert (found.same, found.different, found.not_computed) == (0, 0, 1)
-    assert found.repetitions[0].reason == "reality is a robot on a bench, and a measurement cannot be repeated"
+    assert (found.same, found.different, found.not_computed) == (2, 0, 0)
+    assert [each.repetition for each in part.repetitions] == [1]
+    assert (none.repetitions[0].outcome, none.repetitions[0].reason) == ("not computed", "the time was over")
+    with pytest.raises(NotFound, match=f"no repetition 7 of any; it has {experiment.name}"):
+        verify(BytesIO(archive), Part(repetition=7), cores=1)
 
 
 def test_a_deleted_experiment_leaves_no_requests(store: Store) -> None:

@@ -426,23 +426,34 @@ def test_an_answer_may_be_computed_from_traces(client: Client, store: Store, tmp
     assert again.values == pytest.approx(read.values, abs=0.02)
     assert again.values[0] == pytest.approx(again.values[1], abs=1e-6)
 
-    assert read.doubts == ()
-    holed = tmp_path / "holed.csv"
-    lines = (tmp_path / "a.csv").read_text().splitlines(keepends=True)
-    holed.write_text("".join([*lines[:250], *lines[350:]]))
-    doubtful = [client.bench.attach(holed).id, hashes[1]]
-    (doubt,) = client.bench.traces(request.id, doubtful).doubts
-    assert doubt.startswith("trace 1: there is no pose from ")
-    with pytest.raises(ServiceError, match="there is no pose from .* send `confirmed` with them") as refused:
-        client.bench.answer(request.id, traces=doubtful)
-    assert refused.value.problem.status == 409
-
     answer = client.bench.answer(request.id, traces=hashes, operator="Ada", unit="m/s")
     assert (answer.state, answer.values, answer.readings) == ("counted", read.values, read.readings)
     assert answer.attachments == tuple(hashes)
     assert [trace.lag_s for trace in answer.traces] == [trace.lag_s for trace in read.traces]
     assert client.bench.answer(request.id, traces=hashes, operator="Ada", unit="m/s").id == answer.id
     assert client.bench.request(request.id).answers == (answer,)
+
+
+def test_a_trace_with_a_gap_is_refused_unless_it_is_confirmed(client: Client, store: Store, tmp_path: Path) -> None:
+    physical = {"kind": "physical", "probes": "each"}
+    spec = SPEC | {"robot": "quadruped", "engine": "pybullet", "strategy": "random", "reality": physical}
+    experiment = client.submit(spec)
+    compute(store)
+    (request,) = client.bench.pending(experiment.id)
+    whole, _ = traces_of(request.genome, tmp_path)
+    assert client.bench.traces(request.id, [client.bench.attach(whole).id]).doubts == ()
+    lines = whole.read_text().splitlines(keepends=True)
+    whole.write_text("".join([*lines[:250], *lines[350:]]))
+    holed = [client.bench.attach(whole).id]
+
+    (doubt,) = client.bench.traces(request.id, holed).doubts
+    with pytest.raises(ServiceError, match="send `confirmed` with them") as refused:
+        client.bench.answer(request.id, traces=holed)
+    answer = client.bench.answer(request.id, traces=holed, confirmed=True)
+
+    assert doubt.startswith("trace 1: there is no pose from ")
+    assert doubt in str(refused.value)
+    assert (refused.value.problem.status, answer.state) == (409, "counted")
 
 
 @pytest.mark.usefixtures("computing")
