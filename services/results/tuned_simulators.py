@@ -25,7 +25,7 @@ class TunedSimulators:
         error: kind of error that tuning minimised.
         dimensions: the tunables.
         simulators: the best of each iteration of each repetition.
-        errors: squared errors by iteration and repetition, from the first sample on; None if the physics failed.
+        errors: squared errors by iteration and repetition; None if the physics failed. Iteration 0 only if it was tuned.
         samples: numbers of samples that the simulators were tuned on, by iteration and repetition.
         truth: the known parameters of reality; None as long as they are hidden, empty if reality has none.
         real_engine: the engine of reality, if it is not that of the simulators.
@@ -57,7 +57,8 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     samples: dict[int, dict[int, int]] = defaultdict(dict)
     for simulator in simulators:
         at = simulator.iteration
-        if count := measured.tuned_until(simulator.repetition, at):
+        count = measured.tuned_until(simulator.repetition, at)
+        if at or count:
             errors[at][simulator.repetition] = simulator.squared_error
             samples[at][simulator.repetition] = count
     real = spec.reality.engine
