@@ -25,7 +25,7 @@ class TunedSimulators:
         error: kind of error that tuning minimised.
         dimensions: the tunables.
         simulators: the best of each iteration of each repetition.
-        errors: squared errors by iteration and repetition; None if the physics failed. Iteration 0 only if it was tuned.
+        errors: squared errors by iteration and repetition, of iteration 0 only if it was tuned; None if physics failed.
         samples: numbers of samples that the simulators were tuned on, by iteration and repetition.
         truth: the known parameters of reality; None as long as they are hidden, empty if reality has none.
         real_engine: the engine of reality, if it is not that of the simulators.
