@@ -3,15 +3,18 @@
 Revision: 0002, after 0001.
 """
 
+from typing import Any
+
 import sqlalchemy as sa
 from alembic import op
+from sqlalchemy.types import TypeEngine
 
 revision = "0002"
 down_revision = "0001"
 branch_labels = None
 depends_on = None
 
-COLUMNS = (
+COLUMNS: tuple[tuple[str, str, TypeEngine[Any]], ...] = (
     ("answer", "doubts", sa.JSON()),
     ("simulator", "expected_error", sa.Double()),
     ("simulator", "surprise", sa.Double()),

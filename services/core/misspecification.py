@@ -8,7 +8,7 @@ says little, and a tilt that no simulator has says much.
 
 Intervals are widened by the root of the ratio of the mean squares, if it is above 1, and a little in any case. This
 scaled covariance (Birge's ratio) needs no model of what is missing. A sandwich would need more samples than a robot
-gives. `python -m benchmarks.coverage` measures what they cover.
+gives. `python -m docs.coverage` measures what they cover.
 
 Source: gaplab; Gelman, Meng and Stern 1996 for the check, Birge 1932 for the ratio.
 """

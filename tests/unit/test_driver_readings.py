@@ -23,8 +23,9 @@ class Task(SimpleNamespace):
     def note(self, value: float, readings: Any) -> None:
         self.noted.append((value, readings))
 
-    def tell(self, values: list[float], readings: Any) -> None:
+    def tell(self, values: list[float], readings: Any) -> Any:
         self.told.append((values, readings))
+        return SimpleNamespace(id="a1", doubts=("0.4 is 5 times what was expected",))
 
 
 class Driver:
@@ -80,11 +81,12 @@ def test_a_wrong_answer_is_refused_after_the_first_run(sensors: SensorsRead, ans
     ],
 )
 def test_what_fits_is_told_after_the_last_run(sensors: SensorsRead | None, answer: Any, told: Any) -> None:
-    task, driver = Task(sensors), Driver(answer)
+    task, driver, said = Task(sensors), Driver(answer), list[str]()
 
-    measure(task, driver, None, lambda sentence: None)  # type: ignore[arg-type]
+    measure(task, driver, None, said.append)  # type: ignore[arg-type]
 
     assert (driver.runs, task.told) == (2, told)
+    assert said[-1] == "doubtful: 0.4 is 5 times what was expected; correct a1, or confirm it"
 
 
 def test_a_repeat_of_a_journal_whose_readings_do_not_fit_is_measured_again() -> None:

@@ -1,6 +1,6 @@
 """How often 95 % intervals contain the truth, and what is called identified is right, also where the model is wrong.
 
-`python -m benchmarks.coverage --realities 24 --samples 5 15` draws realities of the quadruped in MuJoCo: between the
+`python -m docs.coverage --realities 24 --samples 5 15` draws realities of the quadruped in MuJoCo: between the
 bounds of the simulators, with a restitution at its bound, and with what no simulator has. Each is tuned on random
 samples with the noise of the sensors. It prints a row for each kind, as they end.
 """
@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from rich.console import Console
 
 from gaplab.schemas.misfit import Identification
 from gaplab.schemas.plugin import PluginRef
@@ -98,7 +99,8 @@ def main() -> None:
     given = parser.parse_args()
     for samples in given.samples:
         for kind in BEYOND:
-            print(row(kind, samples, range(given.first, given.first + given.realities)), flush=True)
+            told = row(kind, samples, range(given.first, given.first + given.realities))
+            Console().print(told, highlight=False, soft_wrap=True)
 
 
 if __name__ == "__main__":
