@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from gaplab.services.core.arrays import FloatArray
 
@@ -24,6 +23,8 @@ FARTHEST = 3.0
 
 def cutter(answers: FloatArray, noise: float) -> Callable[[FloatArray], FloatArray]:
     """Return what cuts answers `(…, r)` at `FARTHEST` deviations from the medians of these answers `(n, r)`."""
+    import scipy  # a process that never tunes starts without it
+
     middle = np.median(answers, axis=0)
     deviation = scipy.stats.median_abs_deviation(answers, axis=0, scale="normal")
     reach = FARTHEST * np.maximum(deviation, noise**0.5)

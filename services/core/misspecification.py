@@ -16,7 +16,6 @@ Source: gaplab; Gelman, Meng and Stern 1996 for the check, Birge 1932 for the ra
 from dataclasses import replace
 
 import numpy as np
-import scipy
 from numpy.random import Generator
 from numpy.typing import NDArray
 
@@ -64,6 +63,8 @@ def fit_of(best: Simulator, misfit: Misfit, space: Space, rng: Generator) -> Fit
     noise = misfit.noise
     if not noise:
         return None
+    import scipy  # a process that never tunes starts without it
+
     centre = (best.parameters - space.lower) / space.extent
     half = np.full(space.size, LEAST_HALF)
     if best.interval is not None:

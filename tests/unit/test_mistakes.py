@@ -12,7 +12,7 @@ from gaplab.schemas.spec import StudySpec
     [
         ({"strategies": []}, "strategies must have at least 1 item, not 0"),
         ({"iterations": "many"}, 'iterations must be a whole number, not "many"'),
-        ({"iterations": 0}, "iterations must be at least 1, not 0"),
+        ({"repetitions": 0}, "repetitions must be at least 1, not 0"),
         ({"iterations": 1.5}, "iterations must be a whole number, not 1.5"),
         ({"seed": -1}, "seed must be at least 0, not -1"),
         ({"name": ""}, "name must have at least 1 character, not 0"),
