@@ -221,7 +221,7 @@ def test_what_cannot_be_computed_says_why() -> None:
 
 @pytest.mark.parametrize(
     ("changes", "error"),
-    [({"engine": None}, "TypeError"), ({"robot": {"name": "quitter", "options": {}}}, "SystemExit")],
+    [({"engine": None}, "ValidationError"), ({"robot": {"name": "quitter", "options": {}}}, "SystemExit")],
 )
 def test_an_error_of_one_repetition_is_its_reason_and_ends_no_other(
     put: Callable[..., Path], changes: dict[str, object], error: str
