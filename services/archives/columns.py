@@ -87,10 +87,7 @@ COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
 }
 """Columns of exported tables that are left out, each with the reason."""
 
-ADDED: Mapping[str, frozenset[str]] = {
-    "answer": frozenset({"doubts"}),
-    "simulator": frozenset({"expected_error", "surprise", "interval_scale", "reading_errors"}),
-}
+ADDED = {"answer": frozenset({"doubts"}), "simulator": frozenset({"fit"})}
 """Columns that archives of earlier versions lack; they are null in their rows."""
 
 

@@ -71,8 +71,8 @@ class SimulatorRow(Base):
     """One tuned simulator; rank 0 is the best of its iteration.
 
     Its 95 % intervals, from `lower` to `upper`, and its share of the posterior are NULL unless the tuner gives them.
-    Its discrepancy from held-out samples is NULL unless it is the best, and there are some; its fit, in the four last
-    columns, unless it is the best, and the noise is known.
+    Its discrepancy from held-out samples is NULL unless it is the best, and there are some; its fit unless it is the
+    best, and the noise is known: expected error, surprise, scale of intervals, then the errors of readings.
     """
 
     __tablename__ = "simulator"
@@ -89,7 +89,4 @@ class SimulatorRow(Base):
     upper: Mapped[list[float] | None]
     weight: Mapped[float | None]
     held_out_error: Mapped[float | None]
-    expected_error: Mapped[float | None]
-    surprise: Mapped[float | None]
-    interval_scale: Mapped[float | None]
-    reading_errors: Mapped[list[float | None] | None]
+    fit: Mapped[list[float | None] | None]

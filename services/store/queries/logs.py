@@ -98,14 +98,15 @@ def _tuned(row: IterationRow, simulators: Sequence[SimulatorRow]) -> Tuned | Non
 def _simulator(row: SimulatorRow) -> Simulator:
     interval = None if row.lower is None or row.upper is None else frozen(list(zip(row.lower, row.upper, strict=True)))
     error = _or(inf, row.squared_error)
-    return Simulator(frozen(row.parameters), error, interval, row.weight, row.held_out_error, fit_of(row))
+    return Simulator(frozen(row.parameters), error, interval, row.weight, row.held_out_error, fit_of(row.fit))
 
 
-def fit_of(row: Any) -> Fit | None:  # noqa: ANN401 - a row of the table, or of a query with its columns
-    """Return the fit of a simulator; None if it is not known."""
-    if row.expected_error is None or row.surprise is None or row.interval_scale is None:
+def fit_of(stored: list[float | None] | None) -> Fit | None:
+    """Return the fit of a simulator from its column; None if it is not known."""
+    if stored is None or None in stored[:3]:
         return None
-    return Fit(row.expected_error, row.surprise, row.interval_scale, _readings(row.reading_errors))
+    numbers = _readings(stored)
+    return Fit(*numbers[:3].tolist(), numbers[3:])
 
 
 def _transferred(row: IterationRow) -> Transferred | None:

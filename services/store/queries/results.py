@@ -100,7 +100,7 @@ def page_of_simulators(
 def _simulator(
     repetition: int, row: SimulatorRow, tunables: Sequence[Mapping[str, Any]], samples: int, discrepancy: Discrepancy
 ) -> SimulatorRead:
-    names, fit = [each["name"] for each in tunables], fit_of(row)
+    names, fit = [each["name"] for each in tunables], fit_of(row.fit)
     pairs = intervals(row.parameters, row.lower, row.upper, fit, tunables)
     return SimulatorRead(
         repetition=repetition,
@@ -111,7 +111,7 @@ def _simulator(
         error=per_sample(row.squared_error, samples, discrepancy),
         intervals=None if pairs is None else dict(zip(names, map(tuple, pairs.tolist()), strict=True)),
         expected_error=None if fit is None else per_sample(fit.expected_error, samples, discrepancy),
-        surprise=row.surprise,
+        surprise=None if fit is None else fit.surprise,
         weight=row.weight,
         held_out_error=row.held_out_error,
     )

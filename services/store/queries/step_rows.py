@@ -21,9 +21,6 @@ _ITERATION, _MEASUREMENT, _SIMULATOR = (
 
 _ORDER: tuple[type[Step], ...] = (Selected, Measured, Tuned, Transferred, Probed)
 
-FIT = ("expected_error", "surprise", "interval_scale", "reading_errors")
-"""Columns of the fit of a simulator."""
-
 Row = dict[str, Any]
 Key = tuple[int, int]
 """Repetition's id, and number of an iteration."""
@@ -136,16 +133,14 @@ def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
             "upper": None if each.interval is None else vector(each.interval[:, 1]),
             "weight": each.weight,
             "held_out_error": each.held_out_error,
-            **_fit(each.fit),
+            "fit": each.fit and _fit(each.fit),
         }
         for rank, each in enumerate(step.simulators)
     ]
 
 
-def _fit(fit: Fit | None) -> dict[str, Any]:
-    """Return the columns of a fit; None in each without one."""
-    numbers = {name: getattr(fit, name, None) for name in FIT[:-1]}
-    return numbers | {"reading_errors": None if fit is None else _readings(fit.reading_errors)}
+def _fit(fit: Fit) -> list[float | None]:
+    return [*map(known, (fit.expected_error, fit.surprise, fit.interval_scale, *fit.reading_errors.tolist()))]
 
 
 def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, Any]:

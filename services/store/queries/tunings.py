@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import starmap
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -17,7 +16,6 @@ from gaplab.services.core.types import Fit
 from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries.logs import fit_of
 from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.queries.step_rows import FIT
 
 
 @dataclass(frozen=True)
@@ -49,15 +47,14 @@ class BestSimulator:
 def best_simulators(session: Session, experiment: str) -> tuple[BestSimulator, ...]:
     """Return the best simulator of every iteration of every repetition, ordered by repetition, then iteration."""
     row, found, probe = IterationRow, SimulatorRow, MeasurementRow
-    errors, fits = (found.squared_error, found.held_out_error), [getattr(found, name) for name in FIT]
-    columns = found.parameters, *errors, found.lower, found.upper, row.simulated_fitness, probe.fitness
+    errors = found.squared_error, found.held_out_error
+    columns = found.parameters, *errors, found.lower, found.upper, row.simulated_fitness, probe.fitness, found.fit
     best = (found.repetition_id == row.repetition_id) & (found.iteration == row.number) & (found.rank == 0)
     probed = (probe.repetition_id == row.repetition_id) & (probe.iteration == row.number)
-    query = of_experiments(row, [experiment], RepetitionRow.number, row.number, *columns, *fits)
+    query = of_experiments(row, [experiment], RepetitionRow.number, row.number, *columns)
     query = query.join(found, best).outerjoin(probe, probed & (probe.kind == MeasurementKind.PROBE))
     ordered = session.execute(query.order_by(RepetitionRow.number, row.number))
-    found_all: list[tuple[Any, ...]] = [(*each[: -len(FIT)], fit_of(each)) for each in ordered]
-    return tuple(starmap(BestSimulator, found_all))
+    return tuple(BestSimulator(*each, fit=fit_of(fit)) for *each, fit in ordered)
 
 
 def intervals(
