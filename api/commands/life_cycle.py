@@ -12,39 +12,24 @@ from gaplab.api.commands.json_output import print_result
 Total = typer.Option(min=1, help="new total; left out: unchanged", show_default=False)
 
 
-@app.command(rich_help_panel=LIFE)
-def pause(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Pause an experiment or a study once its current steps end, and free its cores."""
-    with connect(url) as client:
-        _print_state(client.pause(id), as_json=as_json)
+_VERBS = {
+    "pause": "Pause an experiment or a study once its current steps end, and free its cores.",
+    "resume": "Continue a paused experiment or study.",
+    "stop": "Complete an experiment or a study with its results so far, once its current steps end.",
+    "cancel": "Cancel an experiment, or the experiments of a study that have not ended; stored results are kept.",
+    "retry": "Queue the FAILED repetitions of an experiment or a study once more; they go on from their stored steps.",
+}
 
 
-@app.command(rich_help_panel=LIFE)
-def resume(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Continue a paused experiment or study."""
-    with connect(url) as client:
-        _print_state(client.resume(id), as_json=as_json)
+def _add(verb: str, told: str) -> None:
+    @app.command(verb, help=told, rich_help_panel=LIFE)
+    def ask(id: Id, as_json: AsJson = False, url: Url = None) -> None:
+        with connect(url) as client:
+            _print_state(getattr(client, verb)(id), as_json=as_json)
 
 
-@app.command(rich_help_panel=LIFE)
-def stop(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Complete an experiment or a study with its results so far, once its current steps end."""
-    with connect(url) as client:
-        _print_state(client.stop(id), as_json=as_json)
-
-
-@app.command(rich_help_panel=LIFE)
-def cancel(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Cancel an experiment, or the experiments of a study that have not ended; stored results are kept."""
-    with connect(url) as client:
-        _print_state(client.cancel(id), as_json=as_json)
-
-
-@app.command(rich_help_panel=LIFE)
-def retry(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Queue the FAILED repetitions of an experiment or a study once more; they go on from their stored steps."""
-    with connect(url) as client:
-        _print_state(client.retry(id), as_json=as_json)
+for _verb, _told in _VERBS.items():
+    _add(_verb, _told)
 
 
 @app.command(rich_help_panel=LIFE)

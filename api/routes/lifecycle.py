@@ -14,51 +14,62 @@ from gaplab.services.experiments import extension, lifecycle
 _experiment = APIRouter(prefix="/experiments/{id}", tags=["experiments"])
 _study = APIRouter(prefix="/studies/{id}", tags=["studies"])
 
-_PAUSED = "PAUSING, or PAUSED if no repetition is running"
-_RESUMED = "RUNNING or QUEUED; it continues where it was"
-_STOPPED = "STOPPING, or ended if no repetition is running"
-_CANCELLED = "CANCELLED; what is stored is kept"
-
-_RETRIED = "QUEUED again, or as before if it has not ended"
-
-
-@_experiment.post("/pause", summary="Pause an experiment", response_description=_PAUSED, responses=documented(404, 409))
-def pause_experiment(id: Id, store: StoreDep) -> ExperimentRead:
-    """Let running repetitions finish their step and free their cores, and start none until the experiment resumes."""
-    return lifecycle.ask_experiment(store, id, Verb.PAUSE)
-
-
-@_experiment.post(
-    "/resume", summary="Resume an experiment", response_description=_RESUMED, responses=documented(404, 409)
-)
-def resume_experiment(id: Id, store: StoreDep) -> ExperimentRead:
-    """Continue a paused experiment; the pause changes none of its numbers."""
-    return lifecycle.ask_experiment(store, id, Verb.RESUME)
-
-
-@_experiment.post("/stop", summary="Stop an experiment", response_description=_STOPPED, responses=documented(404, 409))
-def stop_experiment(id: Id, store: StoreDep) -> ExperimentRead:
-    """Let running repetitions finish their step, then complete the experiment with the results so far.
-
-    An experiment without a single point of its curve ends as CANCELLED.
-    """
-    return lifecycle.ask_experiment(store, id, Verb.STOP)
-
-
-@_experiment.post(
-    "/cancel", summary="Cancel an experiment", response_description=_CANCELLED, responses=documented(404, 409)
-)
-def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:
-    """Cancel an experiment at once; what is stored is kept. An experiment that has ended cannot be cancelled."""
-    return lifecycle.ask_experiment(store, id, Verb.CANCEL)
+_VERBS = {
+    Verb.PAUSE: (
+        "PAUSING, or PAUSED if no repetition is running",
+        "Let running repetitions finish their step and free their cores, and start none until the experiment resumes.",
+        "Pause every experiment of the study that can be paused.",
+    ),
+    Verb.RESUME: (
+        "RUNNING or QUEUED; it continues where it was",
+        "Continue a paused experiment; the pause changes none of its numbers.",
+        "Resume every paused experiment of the study.",
+    ),
+    Verb.STOP: (
+        "STOPPING, or ended if no repetition is running",
+        "Let running repetitions finish their step, then complete the experiment with the results so far.\n\n"
+        "An experiment without a single point of its curve ends as CANCELLED.",
+        "Stop every experiment of the study that has not ended, and keep the results so far.",
+    ),
+    Verb.CANCEL: (
+        "CANCELLED; what is stored is kept",
+        "Cancel an experiment at once; what is stored is kept. An experiment that has ended cannot be cancelled.",
+        "Cancel every experiment of the study that has not ended.",
+    ),
+    Verb.RETRY: (
+        "QUEUED again, or as before if it has not ended",
+        "Queue the repetitions that FAILED once more; each goes on from its stored steps.",
+        "Queue the FAILED repetitions of every experiment of the study once more.",
+    ),
+}
+"""The state after each verb, and what it does to an experiment and to a study."""
 
 
-@_experiment.post(
-    "/retry", summary="Retry an experiment", response_description=_RETRIED, responses=documented(404, 409)
-)
-def retry_experiment(id: Id, store: StoreDep) -> ExperimentRead:
-    """Queue the repetitions that FAILED once more; each goes on from its stored steps."""
-    return lifecycle.ask_experiment(store, id, Verb.RETRY)
+def _add(verb: Verb, returned: str, of_experiment: str, of_study: str) -> None:
+    def ask_experiment(id: Id, store: StoreDep) -> ExperimentRead:
+        return lifecycle.ask_experiment(store, id, verb)
+
+    def ask_study(id: Id, store: StoreDep) -> StudyRead:
+        return lifecycle.ask_study(store, id, verb)
+
+    for router_, endpoint, what, told in (
+        (_experiment, ask_experiment, "an experiment", of_experiment),
+        (_study, ask_study, "a study", of_study),
+    ):
+        router_.add_api_route(
+            f"/{verb}",
+            endpoint,
+            methods=["POST"],
+            name=f"{verb}_{what.split()[1]}",
+            summary=f"{verb.title()} {what}",
+            description=told,
+            response_description=returned,
+            responses=documented(404, 409),
+        )
+
+
+for _verb, _told in _VERBS.items():
+    _add(_verb, *_told)
 
 
 @_experiment.post(
@@ -94,36 +105,6 @@ def schedule_experiment(
 ) -> ExperimentRead:
     """Change its priority, or how many repetitions run at once. This changes no result and stops no repetition."""
     return lifecycle.schedule_experiment(store, id, change)
-
-
-@_study.post("/pause", summary="Pause a study", response_description=_PAUSED, responses=documented(404, 409))
-def pause_study(id: Id, store: StoreDep) -> StudyRead:
-    """Pause every experiment of the study that can be paused."""
-    return lifecycle.ask_study(store, id, Verb.PAUSE)
-
-
-@_study.post("/resume", summary="Resume a study", response_description=_RESUMED, responses=documented(404, 409))
-def resume_study(id: Id, store: StoreDep) -> StudyRead:
-    """Resume every paused experiment of the study."""
-    return lifecycle.ask_study(store, id, Verb.RESUME)
-
-
-@_study.post("/stop", summary="Stop a study", response_description=_STOPPED, responses=documented(404, 409))
-def stop_study(id: Id, store: StoreDep) -> StudyRead:
-    """Stop every experiment of the study that has not ended, and keep the results so far."""
-    return lifecycle.ask_study(store, id, Verb.STOP)
-
-
-@_study.post("/cancel", summary="Cancel a study", response_description=_CANCELLED, responses=documented(404, 409))
-def cancel_study(id: Id, store: StoreDep) -> StudyRead:
-    """Cancel every experiment of the study that has not ended."""
-    return lifecycle.ask_study(store, id, Verb.CANCEL)
-
-
-@_study.post("/retry", summary="Retry a study", response_description=_RETRIED, responses=documented(404, 409))
-def retry_study(id: Id, store: StoreDep) -> StudyRead:
-    """Queue the FAILED repetitions of every experiment of the study once more."""
-    return lifecycle.ask_study(store, id, Verb.RETRY)
 
 
 @_study.post(
