@@ -13,11 +13,12 @@ from gaplab.api.http.problems import Responses, documented
 from gaplab.api.http.security_headers import page
 from gaplab.api.routes.comparisons import MarginQuery
 from gaplab.schemas.reports import VerdictRead
-from gaplab.services.reports.blocks import Report
-from gaplab.services.reports.content import experiment_verdict, study_verdict
-from gaplab.services.reports.document import experiment_report, study_report
+from gaplab.services.experiments import reading
+from gaplab.services.reports.content import Subject, verdict_on
+from gaplab.services.reports.document import report_on
 from gaplab.services.reports.html import render_html
 from gaplab.services.reports.takehome import takehome_page, takehome_zip
+from gaplab.services.store.session import Store
 
 router = APIRouter(tags=["reports"])
 
@@ -64,9 +65,7 @@ def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]
     The verdict follows from rules that the report states: which strategies differ, and whether each curve still rises,
     or is flat since some iteration and not worth continuing.
     """
-    if query.format == "json":
-        return study_verdict(store, id, query.chosen())
-    return _answer(study_report(store, id, query.chosen()), query.format)
+    return _answer(store, reading.read_study(store, id), query)
 
 
 @router.get(
@@ -74,9 +73,7 @@ def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]
 )
 def report_experiment(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]) -> VerdictRead | Response:
     """Return verdict, curve, simulators, sensitivity, cost, settings and provenance in one document."""
-    if query.format == "json":
-        return experiment_verdict(store, id, query.chosen())
-    return _answer(experiment_report(store, id, query.chosen()), query.format)
+    return _answer(store, reading.read_experiment(store, id), query)
 
 
 @router.get(
@@ -98,11 +95,13 @@ def take_home(id: Id, store: StoreDep, query: Annotated[TakeHomeQuery, Query()])
     return answer
 
 
-def _answer(report: Report, format_: Literal["html", "pdf"]) -> Response:
-    at = datetime.now(UTC)
+def _answer(store: Store, subject: Subject, query: ReportQuery) -> VerdictRead | Response:
+    if query.format == "json":
+        return verdict_on(store, subject, query.chosen())
+    report, at = report_on(store, subject, query.chosen()), datetime.now(UTC)
     made = f"Made by gaplab {version('gaplab')} on {at:%Y-%m-%d at %H:%M} UTC, from what was stored by then."
-    name = f'inline; filename="gaplab-{report.id}-report.{format_}"'
-    if format_ == "html":
+    name = f'inline; filename="gaplab-{report.id}-report.{query.format}"'
+    if query.format == "html":
         answer: Response = page(in_turn(lambda: render_html(report, made)))
     else:
         from gaplab.services.reports.pdf import render_pdf  # its library takes as long to import as the web server

@@ -12,7 +12,7 @@ from gaplab.schemas.records import ExperimentRead, StudyRead, common_count
 from gaplab.schemas.reports import VerdictRead
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.errors import NotFound
-from gaplab.services.experiments import checks, reading
+from gaplab.services.experiments import checks
 from gaplab.services.reports.judged import Judged, judged_curves
 from gaplab.services.reports.verdict import judge
 from gaplab.services.results import curves as results
@@ -23,6 +23,8 @@ from gaplab.services.running import provenance
 from gaplab.services.specs.differences import SpecColumn, differences
 from gaplab.services.store.queries.costs import Work, work_of
 from gaplab.services.store.session import Store
+
+Subject = StudyRead | ExperimentRead
 
 
 @dataclass(frozen=True)
@@ -67,54 +69,16 @@ class Facts:
     leading: tuple[Judged, TunedSimulators] | None
 
 
-def study_verdict(store: Store, study_id: str, margin: Margin | None = None) -> VerdictRead:
-    """Return the verdict on a study.
-
-    Raises:
-        NotFound: no such study.
-    """
-    study = reading.read_study(store, study_id)
-    misfits = _misfits(store, study.experiments)
-    return _verdict(store, results.study_curves(store, study_id), study.experiments, misfits, margin)[0]
+def verdict_on(store: Store, subject: Subject, margin: Margin | None = None) -> VerdictRead:
+    """Return the verdict on a study or an experiment."""
+    experiments = _experiments(subject)
+    curves = results.curves(store, [experiment.id for experiment in experiments])
+    return _verdict(store, curves, experiments, _misfits(store, experiments), margin)[0]
 
 
-def experiment_verdict(store: Store, experiment_id: str, margin: Margin | None = None) -> VerdictRead:
-    """Return the verdict on an experiment.
-
-    Raises:
-        NotFound: no such experiment.
-    """
-    experiment = reading.read_experiment(store, experiment_id)
-    misfits = _misfits(store, [experiment])
-    return _verdict(store, results.curves(store, [experiment_id]), [experiment], misfits, margin)[0]
-
-
-def study_facts(store: Store, study_id: str, margin: Margin | None = None) -> Facts:
-    """Return the facts of a study.
-
-    Raises:
-        NotFound: no such study.
-    """
-    study = reading.read_study(store, study_id)
-    return _facts(store, study, study.experiments, margin)
-
-
-def experiment_facts(store: Store, experiment_id: str, margin: Margin | None = None) -> Facts:
-    """Return the facts of an experiment.
-
-    Raises:
-        NotFound: no such experiment.
-    """
-    experiment = reading.read_experiment(store, experiment_id)
-    return _facts(store, experiment, (experiment,), margin)
-
-
-def _facts(
-    store: Store,
-    subject: StudyRead | ExperimentRead,
-    experiments: tuple[ExperimentRead, ...],
-    margin: Margin | None,
-) -> Facts:
+def facts_of(store: Store, subject: Subject, margin: Margin | None = None) -> Facts:
+    """Return the facts of a study or an experiment."""
+    experiments = _experiments(subject)
     ids = [experiment.id for experiment in experiments]
     curves = results.curves(store, ids)
     misfits = _misfits(store, experiments)
@@ -141,6 +105,10 @@ def _facts(
         provenance={id_: provenance.read(store, id_) for id_ in ids},
         leading=_leading(store, judged),
     )
+
+
+def _experiments(subject: Subject) -> tuple[ExperimentRead, ...]:
+    return subject.experiments if isinstance(subject, StudyRead) else (subject,)
 
 
 def _misfits(store: Store, experiments: Sequence[ExperimentRead]) -> dict[str, MisfitRead]:

@@ -7,32 +7,16 @@ from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number_of, spoken
 from gaplab.services.reports import compared, simulator_tables, tables
 from gaplab.services.reports.blocks import Block, Bullets, Drawing, Paragraph, Report, Section
-from gaplab.services.reports.content import Facts, experiment_facts, study_facts
+from gaplab.services.reports.content import Facts, Subject, facts_of
 from gaplab.services.reports.reproduction import reproduction
 from gaplab.services.results.comparisons import Margin
 from gaplab.services.results.coordinates import simulator_coordinates
 from gaplab.services.store.session import Store
 
 
-def study_report(store: Store, study_id: str, margin: Margin | None = None) -> Report:
-    """Return the report on a study.
-
-    Raises:
-        NotFound: no such study.
-    """
-    return _report(store, study_facts(store, study_id, margin))
-
-
-def experiment_report(store: Store, experiment_id: str, margin: Margin | None = None) -> Report:
-    """Return the report on an experiment.
-
-    Raises:
-        NotFound: no such experiment.
-    """
-    return _report(store, experiment_facts(store, experiment_id, margin))
-
-
-def _report(store: Store, facts: Facts) -> Report:
+def report_on(store: Store, subject: Subject, margin: Margin | None = None) -> Report:
+    """Return the report on a study or an experiment."""
+    facts = facts_of(store, subject, margin)
     several = len(facts.experiments) > 1
     sections = [
         Section("Verdict", _verdict(facts.verdict)),

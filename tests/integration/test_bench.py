@@ -31,7 +31,7 @@ from gaplab.services.experiments.deletion import Deleter, delete_experiment
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.reading import list_samples, read_experiment
 from gaplab.services.experiments.submission import submit_experiment
-from gaplab.services.reports.content import experiment_verdict
+from gaplab.services.reports.content import verdict_on
 from gaplab.services.reports.outcome import outcome_of
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import tuned_simulators
@@ -548,7 +548,7 @@ def test_an_unlikely_number_stays_a_remark_until_a_person_confirms_or_corrects_i
     (warning,) = read_experiment(store, experiment.id).warnings
     assert warning.startswith("repetition 0, iteration 0: 31 is 1e+02 times the other repeats; ")
     assert f"gaplab decide {answer.id} this" in warning
-    assert any(warning in sentence for sentence in experiment_verdict(store, experiment.id).sentences)
+    assert any(warning in sentence for sentence in verdict_on(store, read_experiment(store, experiment.id)).sentences)
 
     decision = ConflictSpec(counts="this", reason="it flew")
     assert "confirmed" in corrections.decide(store, answer.id, decision, FREELY, dry_run=True).answer.words

@@ -19,7 +19,7 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import estimates, extension, listing, reading, submission
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.marks import Level
-from gaplab.services.reports.content import study_facts
+from gaplab.services.reports.content import facts_of
 from gaplab.services.results import comparisons, curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.toy import toy_iterations
@@ -96,7 +96,7 @@ def test_a_level_is_compared_with_every_number_and_can_be_the_best(sqlite_store:
     assert (pairs[fit, randomized].n_first, pairs[fit, randomized].n_second) == (2, 2)
     means = {each.id: each.fitness.mean for each in study.experiments if not each.direct}
     assert study.best.experiment == max(means, key=lambda id_: means[id_])
-    verdict = study_facts(sqlite_store, study.id).verdict
+    verdict = facts_of(sqlite_store, study).verdict
     assert any("domain_randomization" in each or "Domain randomization" in each for each in verdict.sentences)
 
 

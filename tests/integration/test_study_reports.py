@@ -18,8 +18,8 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.types import Probed
 from gaplab.services.experiments import extension, lifecycle, listing, reading, submission
 from gaplab.services.reports.blocks import Code, Paragraph
-from gaplab.services.reports.content import study_verdict
-from gaplab.services.reports.document import study_report
+from gaplab.services.reports.content import verdict_on
+from gaplab.services.reports.document import report_on
 from gaplab.services.reports.pdf import render_pdf
 from gaplab.services.running import execution
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
@@ -139,7 +139,7 @@ def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
     compared = [pair for pair in pairs if {pair["first"], pair["second"]} <= learned]
     differing = [pair for pair in compared if pair["trusted"]["p_holm"] < 0.05]
 
-    verdict = study_verdict(published, study)
+    verdict = verdict_on(published, reading.read_study(published, study))
 
     assert verdict.evaluations == 3
     assert 0 < len(differing) < len(compared)
@@ -161,11 +161,12 @@ def test_the_verdict_on_two_strategies(sqlite_store: Store, ahead: float, headli
     for claim in execution.claim(sqlite_store, "test", limit=16):
         record(sqlite_store, claim, [0.2, 0.5, 0.6, 0.7, 0.7 + ahead * (claim.experiment_id == first)], spread=0.02)
 
-    assert study_verdict(sqlite_store, made.id).headline.replace("\xa0", " ").startswith(headline)
+    verdict = verdict_on(sqlite_store, reading.read_study(sqlite_store, made.id))
+    assert verdict.headline.replace("\xa0", " ").startswith(headline)
 
 
 def test_the_verdict_tells_the_share_of_direct(published: Store, study: str) -> None:
-    sentences = study_verdict(published, study).sentences
+    sentences = verdict_on(published, reading.read_study(published, study)).sentences
 
     assert any("Share of the fitness of Direct" in sentence and "%" in sentence for sentence in sentences)
 
@@ -189,7 +190,7 @@ def test_only_a_margin_turns_no_significance_into_no_difference(reader: TestClie
 def test_a_study_without_results_has_no_verdict(sqlite_store: Store) -> None:
     made = submission.submit_study(sqlite_store, StudySpec.model_validate({"robot": "toy_function", "budget": "smoke"}))
 
-    assert study_verdict(sqlite_store, made.id).headline == "There are no results yet."
+    assert verdict_on(sqlite_store, made).headline == "There are no results yet."
 
 
 def test_the_page_needs_no_other_file_and_no_script(reader: TestClient, study: str) -> None:
@@ -218,7 +219,7 @@ def test_a_name_cannot_become_markup(sqlite_store: Store, api: TestClient) -> No
 
 @pytest.mark.release
 def test_the_same_report_is_the_same_pdf(published: Store, study: str) -> None:
-    report, at = study_report(published, study), datetime(2026, 1, 1, tzinfo=UTC)
+    report, at = report_on(published, reading.read_study(published, study)), datetime(2026, 1, 1, tzinfo=UTC)
 
     first, second = (render_pdf(report, "made", at) for _ in range(2))
 
@@ -264,7 +265,7 @@ def test_the_spec_in_a_report_gives_the_same_experiments(published: Store, study
 
 def how_to_reproduce(store: Store, study: str) -> tuple[list[str], list[str]]:
     """Return the specs and the sentences of the report's section."""
-    blocks = study_report(store, study).sections[-1].blocks
+    blocks = report_on(store, reading.read_study(store, study)).sections[-1].blocks
     return (
         [block.text for block in blocks if isinstance(block, Code)],
         [block.text for block in blocks if isinstance(block, Paragraph)],
