@@ -31,7 +31,7 @@ DeleterDep = Annotated[Deleter, Depends(_deleter)]
 @_experiment.get("/notes", summary="Read an experiment's notes as HTML", responses=documented(404))
 def read_experiment_notes(id: Id, store: StoreDep) -> NotesRead:
     """Return the notes as HTML that is safe on a page: rendered Markdown, without scripts, images or its own HTML."""
-    return notes.experiment_notes(store, id)
+    return notes.read(store, "experiment", id)
 
 
 @_experiment.post(
@@ -64,7 +64,7 @@ def delete_experiment(id: Id, store: StoreDep, deleter: DeleterDep) -> DeletionR
 @_study.get("/notes", summary="Read a study's notes as HTML", responses=documented(404))
 def read_study_notes(id: Id, store: StoreDep) -> NotesRead:
     """Return the notes as HTML that is safe on a page: rendered Markdown, without scripts, images or its own HTML."""
-    return notes.study_notes(store, id)
+    return notes.read(store, "study", id)
 
 
 @_study.post("/archive", summary="Archive a study", response_description=_ARCHIVED, responses=documented(404, 409))

@@ -26,37 +26,37 @@ Spec = Annotated[WebhookSpec, Body(openapi_examples=WebhookSpec.EXAMPLES)]
 @_experiment.get("", summary="Read an experiment's webhook", responses=documented(404))
 def read_experiment_webhook(id: Id, store: StoreDep) -> WebhookRead:
     """Return the host that is told when the experiment has ended, without the rest of the address."""
-    return webhooks.experiment_webhook(store, id)
+    return webhooks.read(store, "experiment", id)
 
 
 @_experiment.put("", summary="Set an experiment's webhook", responses=documented(404, 409, 413, 415, 422))
 def set_experiment_webhook(id: Id, spec: Spec, store: StoreDep, hosts: HostsDep) -> WebhookRead:
     """Send a POST to this address when the experiment has ended; `GAPLAB_NOTIFY_HOSTS` lists the permitted hosts."""
-    return webhooks.set_experiment_webhook(store, id, spec, hosts)
+    return webhooks.set_webhook(store, "experiment", id, spec, hosts)
 
 
 @_experiment.delete("", summary="Remove an experiment's webhook", responses=documented(404))
 def drop_experiment_webhook(id: Id, store: StoreDep, hosts: HostsDep) -> WebhookRead:
     """Tell no webhook of its own when the experiment has ended."""
-    return webhooks.set_experiment_webhook(store, id, None, hosts)
+    return webhooks.set_webhook(store, "experiment", id, None, hosts)
 
 
 @_study.get("", summary="Read a study's webhook", responses=documented(404))
 def read_study_webhook(id: Id, store: StoreDep) -> WebhookRead:
     """Return the host that is told when all experiments of the study have ended, without the rest of the address."""
-    return webhooks.study_webhook(store, id)
+    return webhooks.read(store, "study", id)
 
 
 @_study.put("", summary="Set a study's webhook", responses=documented(404, 409, 413, 415, 422))
 def set_study_webhook(id: Id, spec: Spec, store: StoreDep, hosts: HostsDep) -> WebhookRead:
     """Send a POST to this address when all experiments of the study have ended, as `GAPLAB_NOTIFY_HOSTS` permits."""
-    return webhooks.set_study_webhook(store, id, spec, hosts)
+    return webhooks.set_webhook(store, "study", id, spec, hosts)
 
 
 @_study.delete("", summary="Remove a study's webhook", responses=documented(404))
 def drop_study_webhook(id: Id, store: StoreDep, hosts: HostsDep) -> WebhookRead:
     """Tell no webhook of its own when the study has ended."""
-    return webhooks.set_study_webhook(store, id, None, hosts)
+    return webhooks.set_webhook(store, "study", id, None, hosts)
 
 
 router = APIRouter()

@@ -15,30 +15,20 @@ from markdown_it.token import Token
 from markdown_it.utils import OptionsDict
 
 from gaplab.schemas.keeping import NotesRead
-from gaplab.services.store.queries.experiments import get_experiment, get_study
+from gaplab.services.store.queries.experiments import Noun, get
 from gaplab.services.store.session import Session, snapshot
 
 _SCHEMES = {"http", "https", "mailto"}
 
 
 @snapshot
-def experiment_notes(session: Session, experiment_id: str) -> NotesRead:
-    """Return the notes of an experiment as HTML.
+def read(session: Session, noun: Noun, id_: str) -> NotesRead:
+    """Return the notes of an experiment or a study as HTML.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: there is none with this id.
     """
-    return NotesRead(html=render(get_experiment(session, experiment_id).notes or ""))
-
-
-@snapshot
-def study_notes(session: Session, study_id: str) -> NotesRead:
-    """Return the notes of a study as HTML.
-
-    Raises:
-        NotFound: no such study.
-    """
-    return NotesRead(html=render(get_study(session, study_id).notes or ""))
+    return NotesRead(html=render(get(session, noun, id_).notes or ""))
 
 
 def render(notes: str) -> str:

@@ -8,7 +8,7 @@ from sqlalchemy import update
 from gaplab.schemas.notifications import WebhookRead, WebhookSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.store.models import ExperimentRow, StudyRow
-from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, lock
+from gaplab.services.store.queries.experiments import Noun, experiments_of, get, lock
 from gaplab.services.store.session import Session, snapshot, transaction
 
 _USUAL = {"http": 80, "https": 443}
@@ -19,49 +19,34 @@ NONE_PERMITTED = (
 
 
 @transaction
-def set_experiment_webhook(
-    session: Session, experiment_id: str, spec: WebhookSpec | None, hosts: Collection[str]
+def set_webhook(
+    session: Session, noun: Noun, id_: str, spec: WebhookSpec | None, hosts: Collection[str]
 ) -> WebhookRead:
-    """Tell a webhook when an experiment has ended; None tells none any more.
+    """Tell a webhook when an experiment, or all experiments of a study, have ended; None tells none any more.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: there is none with this id.
         InvalidSpec: the address is not permitted.
-        Conflict: the experiment has ended, so nothing would be sent.
+        Conflict: they have ended, so nothing would be sent.
     """
-    return _set(session, get_experiment(session, experiment_id), spec, hosts)
-
-
-@transaction
-def set_study_webhook(session: Session, study_id: str, spec: WebhookSpec | None, hosts: Collection[str]) -> WebhookRead:
-    """Tell a webhook when all experiments of a study have ended; None tells none any more.
-
-    Raises:
-        NotFound: no such study.
-        InvalidSpec: the address is not permitted.
-        Conflict: all of its experiments have ended, so nothing would be sent.
-    """
-    return _set(session, get_study(session, study_id), spec, hosts)
+    row, url = get(session, noun, id_), spec.url if spec else None
+    if url is not None and (why := refusal(url, hosts)):
+        raise InvalidSpec([Violation("/url", None, why, sorted(hosts))])  # without the address, which may be secret
+    if url is not None and _has_ended(session, row):
+        raise Conflict(f"{row.name!r} ({row.id}) has ended, so nothing would be sent: extend it first")
+    table = type(row)
+    session.execute(update(table).where(table.id == row.id).values(webhook=url))
+    return _view(url)
 
 
 @snapshot
-def experiment_webhook(session: Session, experiment_id: str) -> WebhookRead:
-    """Return the host of an experiment's webhook.
+def read(session: Session, noun: Noun, id_: str) -> WebhookRead:
+    """Return the host of the webhook of an experiment or a study.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: there is none with this id.
     """
-    return _view(get_experiment(session, experiment_id).webhook)
-
-
-@snapshot
-def study_webhook(session: Session, study_id: str) -> WebhookRead:
-    """Return the host of a study's webhook.
-
-    Raises:
-        NotFound: no such study.
-    """
-    return _view(get_study(session, study_id).webhook)
+    return _view(get(session, noun, id_).webhook)
 
 
 def refusal(url: str, hosts: Collection[str]) -> str | None:
@@ -84,19 +69,6 @@ def refusal(url: str, hosts: Collection[str]) -> str | None:
     if not {host, with_port} & set(hosts):
         return f"the host {host!r} is not permitted; permitted: {', '.join(sorted(hosts))} (GAPLAB_NOTIFY_HOSTS)"
     return None
-
-
-def _set(
-    session: Session, row: ExperimentRow | StudyRow, spec: WebhookSpec | None, hosts: Collection[str]
-) -> WebhookRead:
-    url = spec.url if spec else None
-    if url is not None and (why := refusal(url, hosts)):
-        raise InvalidSpec([Violation("/url", None, why, sorted(hosts))])  # without the address, which may be secret
-    if url is not None and _has_ended(session, row):
-        raise Conflict(f"{row.name!r} ({row.id}) has ended, so nothing would be sent: extend it first")
-    table = type(row)
-    session.execute(update(table).where(table.id == row.id).values(webhook=url))
-    return _view(url)
 
 
 def _has_ended(session: Session, row: ExperimentRow | StudyRow) -> bool:

@@ -32,7 +32,7 @@ from gaplab.services.experiments.deletion import Deleter, delete_experiment
 from gaplab.services.experiments.extension import extend_experiment
 from gaplab.services.notifications import delivery, outbox
 from gaplab.services.notifications.courier import Courier, courier
-from gaplab.services.notifications.webhooks import refusal, set_experiment_webhook, set_study_webhook
+from gaplab.services.notifications.webhooks import refusal, set_webhook
 from gaplab.services.running import execution
 from gaplab.services.settings import Notify
 from gaplab.services.store.clock import moment
@@ -317,8 +317,8 @@ def test_a_webhook_of_ones_own_is_told_of_that_alone(store: Store, receiver: Rec
     bob = begun(store, hosts=hosts)
     mine, other = (submission.submit_experiment(store, toy()).id for _ in range(2))
     study = submission.submit_study(store, StudySpec.model_validate(STUDY))
-    shown = set_experiment_webhook(store, mine, WebhookSpec(url=f"{receiver.url}/secret"), {hosts})
-    set_study_webhook(store, study.id, WebhookSpec(url=receiver.url), {hosts})
+    shown = set_webhook(store, "experiment", mine, WebhookSpec(url=f"{receiver.url}/secret"), {hosts})
+    set_webhook(store, "study", study.id, WebhookSpec(url=receiver.url), {hosts})
 
     for id_ in (mine, other):
         cancel(store, id_)
@@ -332,7 +332,7 @@ def test_a_webhook_of_ones_own_is_told_of_that_alone(store: Store, receiver: Rec
 def test_a_webhook_is_not_told_once_its_host_is_no_longer_permitted(store: Store, receiver: Receiver) -> None:
     hosts = receiver.url.removeprefix("http://")
     made = submission.submit_experiment(store, toy()).id
-    set_experiment_webhook(store, made, WebhookSpec(url=receiver.url), {hosts})
+    set_webhook(store, "experiment", made, WebhookSpec(url=receiver.url), {hosts})
     bob = begun(store, hosts="hooks.example.org")
     cancel(store, made)
 
@@ -422,11 +422,11 @@ def test_without_listed_hosts_a_webhook_is_refused_with_the_setting(sqlite_store
 def test_no_notification_changes_a_spec_or_is_shown_with_its_address(sqlite_store: Store) -> None:
     made = submission.submit_experiment(sqlite_store, toy())
     hosts = {"hooks.example.org"}
-    set_experiment_webhook(sqlite_store, made.id, WebhookSpec(url="https://hooks.example.org/T0/secret"), hosts)
+    set_webhook(sqlite_store, "experiment", made.id, WebhookSpec(url="https://hooks.example.org/T0/secret"), hosts)
 
     assert reading.read_experiment(sqlite_store, made.id) == made
     with pytest.raises(InvalidSpec):
-        set_experiment_webhook(sqlite_store, made.id, WebhookSpec(url="https://other.example/"), hosts)
+        set_webhook(sqlite_store, "experiment", made.id, WebhookSpec(url="https://other.example/"), hosts)
 
 
 def test_the_courier_works_in_the_background_until_it_is_stopped(sqlite_store: Store, receiver: Receiver) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from secrets import choice
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from sqlalchemy import event, insert, select
 from sqlalchemy.orm import Session
@@ -19,6 +19,8 @@ from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
 
 R = TypeVar("R", ExperimentRow, StudyRow)
+
+Noun = Literal["experiment", "study"]
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
@@ -131,6 +133,15 @@ def get_study(session: Session, study_id: str) -> StudyRow:
         NotFound: there is none.
     """
     return _get(session, StudyRow, "study", study_id)
+
+
+def get(session: Session, noun: Noun, id_: str) -> ExperimentRow | StudyRow:
+    """Return the experiment or the study with this id.
+
+    Raises:
+        NotFound: there is none.
+    """
+    return get_study(session, id_) if noun == "study" else get_experiment(session, id_)
 
 
 def was_deleted(session: Session, id_: str) -> bool:
