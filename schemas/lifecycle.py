@@ -55,10 +55,6 @@ class State(StrEnum):
         """Return whether computing has ended; `extend` may restart it."""
         return self in ENDS
 
-    def may_become(self, other: "State") -> bool:
-        """Return whether `MOVES` permits the move to the other state."""
-        return other in MOVES[self]
-
 
 class Verb(StrEnum):
     """Requests that change the state of an experiment."""

@@ -18,6 +18,7 @@ from gaplab.api.http.dependencies import (
     created,
 )
 from gaplab.api.http.problems import Responses, documented
+from gaplab.api.routes.studies import RecordFilter
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.misfit import MisfitRead
@@ -32,7 +33,6 @@ from gaplab.schemas.records import (
 )
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import editing, listing, reading, submission
-from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.experiments.views import with_sensors
 from gaplab.services.results.misfit import misfit, misfit_csv
 
@@ -56,27 +56,12 @@ class MisfitQuery(Parameters):
     format: Literal["json", "csv"] = "json"
 
 
-class ExperimentFilter(Paging):
+class ExperimentFilter(RecordFilter):
     """The experiments to list, and their order."""
 
     study: Id | None = Field(default=None, description="only experiments of this study")
     alone: bool = Field(default=False, description="only experiments without a study")
     state: State | None = Field(default=None, description="only experiments in this state")
-    strategy: str | None = Field(
-        default=None, max_length=100, pattern=r"^\w+$", description="only experiments with this strategy"
-    )
-    text: str | None = Field(
-        default=None, max_length=200, description="only experiments whose name, id, notes or tags contain this text"
-    )
-    q: str | None = Field(
-        default=None,
-        max_length=1_000,
-        description="query, like `strategy = informative and fitness > 0.5`, or words; archived ones are left out "
-        "unless it mentions `archived`",
-    )
-    sort: Literal["created_at", "-created_at", "name", "-name", "strategy", "-strategy", "state", "-state"] = Field(
-        default="-created_at", description="field to sort by; a minus reverses the order"
-    )
 
 
 class SampleFilter(Paging):
@@ -125,8 +110,7 @@ def submit_experiment(
 )
 def list_experiments(store: StoreDep, query: Annotated[ExperimentFilter, Query()]) -> Page[ExperimentRead]:
     """List experiments, by default the newest first. A cursor is valid only for the list that returned it."""
-    wanted = ListFilter(**query.model_dump(exclude={"limit", "cursor"}))
-    return listing.list_experiments(store, wanted, limit=query.limit, cursor=query.cursor)
+    return listing.list_experiments(store, query.wanted(), limit=query.limit, cursor=query.cursor)
 
 
 @router.get(

@@ -12,29 +12,40 @@ from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Page, StudyRead
 from gaplab.schemas.spec import StudySpec
+from gaplab.schemas.views import Order
 from gaplab.services.experiments import editing, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
 
-class StudyFilter(Paging):
-    """The studies to list, and their order."""
+class RecordFilter(Paging):
+    """The studies or experiments to list, and their order."""
 
-    state: State | None = Field(
-        default=None, description="only studies in this state, which follows from their experiments"
-    )
     strategy: str | None = Field(
-        default=None, max_length=100, pattern=r"^\w+$", description="only studies with this strategy"
+        default=None, max_length=100, pattern=r"^\w+$", description="only those with this strategy"
     )
     text: str | None = Field(
-        default=None, max_length=200, description="only studies whose name, id, notes or tags contain this text"
+        default=None, max_length=200, description="only those whose name, id, notes or tags contain this text"
     )
     q: str | None = Field(
         default=None,
         max_length=1_000,
         description="query, like `strategy = informative and fitness > 0.5`, or words; archived ones are left out "
         "unless it mentions `archived`",
+    )
+    sort: Order = Field(default="-created_at", description="field to sort by; a minus reverses the order")
+
+    def wanted(self) -> ListFilter:
+        """Return the selection and the order for the service."""
+        return ListFilter(**self.model_dump(exclude={"limit", "cursor"}))
+
+
+class StudyFilter(RecordFilter):
+    """The studies to list, and their order."""
+
+    state: State | None = Field(
+        default=None, description="only studies in this state, which follows from their experiments"
     )
     sort: Literal["created_at", "-created_at", "name", "-name"] = Field(
         default="-created_at", description="field to sort by; a minus reverses the order"
@@ -64,8 +75,7 @@ def submit_study(
 @router.get("", summary="List the studies", response_description="The newest first", responses=documented(422))
 def list_studies(store: StoreDep, query: Annotated[StudyFilter, Query()]) -> Page[StudyRead]:
     """List studies, by default the newest first. A cursor is valid only for the list that returned it."""
-    wanted = ListFilter(**query.model_dump(exclude={"limit", "cursor"}))
-    return listing.list_studies(store, wanted, limit=query.limit, cursor=query.cursor)
+    return listing.list_studies(store, query.wanted(), limit=query.limit, cursor=query.cursor)
 
 
 @router.get(

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
-from gaplab.schemas.lifecycle import State
+from gaplab.schemas.lifecycle import MOVES, State
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
@@ -212,7 +212,7 @@ def drives(evidence: Any) -> Iterator[Any]:
 
 def _of_state(move: Any, winners: Any) -> Iterator[Any]:
     claimed = _claims(move)
-    if move.was != move.state and not State(move.was).may_become(State(move.state)):
+    if move.was != move.state and State(move.state) not in MOVES[State(move.was)]:
         yield f"from {move.was} to {move.state}"
     if move.epoch != move.epoch_was + claimed:
         yield f"from epoch {move.epoch_was} to {move.epoch}"
