@@ -87,11 +87,10 @@ class BestRead(FitnessRead):
     name: Name
 
 
-class ExperimentRead(Frozen):
-    """An experiment with its resolved spec. Reality's parameters are null until it and its study have ended."""
+class Kept(Frozen):
+    """What people name, describe, tag and archive."""
 
     id: Id
-    study: Id | None = None
     name: Name
     notes: str | None = Field(
         default=None, description="Markdown by people; `/notes` has it as HTML", examples=["the bounds were *too wide*"]
@@ -101,6 +100,12 @@ class ExperimentRead(Frozen):
     archived_at: Moment | None = Field(
         default=None, description="time since which lists leave it out; null: they do not"
     )
+
+
+class ExperimentRead(Kept):
+    """An experiment with its resolved spec. Reality's parameters are null until it and its study have ended."""
+
+    study: Id | None = None
     strategy: Name
     direct: bool = Field(
         default=False,
@@ -147,19 +152,9 @@ class ExperimentRead(Frozen):
     ended_at: Moment | None = None
 
 
-class StudyRead(Frozen):
+class StudyRead(Kept):
     """A study; its state combines those of its experiments."""
 
-    id: Id
-    name: Name
-    notes: str | None = Field(
-        default=None, description="Markdown by people; `/notes` has it as HTML", examples=["the bounds were *too wide*"]
-    )
-    tags: tuple[str, ...] = Field(default=(), description="tags by people", examples=[("gait", "paper")])
-    edits: int = Field(default=0, description="number of changes to the name, notes or tags")
-    archived_at: Moment | None = Field(
-        default=None, description="time since which lists leave it out; null: they do not"
-    )
     state: State
     caveat: str | None = Field(
         default=None,
