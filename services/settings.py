@@ -149,7 +149,6 @@ class Limits(_Environment):
 
 
 def _command_line(text: str) -> str:
-    """Return the text, if it can be split into a program and its arguments."""
     if not shlex.split(text):
         raise ValueError("it names no program")
     return text

@@ -77,7 +77,6 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
 
 @contextmanager
 def _started(cores: int | None) -> Iterator[None]:
-    """Start a Ray for as long as the context lasts."""
     with ray_folder() as folder:
         try:
             _start(cores, folder)
@@ -93,7 +92,6 @@ def _started(cores: int | None) -> Iterator[None]:
 
 @contextmanager
 def _joined(address: str) -> Iterator[None]:
-    """Join a Ray for as long as the context lasts."""
     try:
         _join(address)
         yield

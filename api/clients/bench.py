@@ -239,7 +239,6 @@ class Bench:
 
 
 def _body(values: Sequence[float] | None, details: Details) -> dict[str, Any]:
-    """Return an answer or a correction as it is sent."""
     body = _without_none({"values": None if values is None else numbers_of(values, "/values")} | details)
     return body | {"readings": readings_of(body["readings"])} if "readings" in body else body
 

@@ -17,8 +17,6 @@ FORMATS = ("svg", "png", "pdf", "html", "json")
 
 
 class _Paths(BaseModel):
-    """The paths in the service's OpenAPI document."""
-
     paths: dict[str, Any]
 
 

@@ -148,7 +148,6 @@ def _repeats(sample: SampleRead) -> int:
 
 
 def _tuned(simulator: SimulatorRead) -> dict[str, float]:
-    """Return the tunables of a simulator by column, and what its tuner says of them."""
     found = dict(simulator.parameters)
     for name, (lower, upper) in (simulator.intervals or {}).items():
         found |= {f"{name}_lower": lower, f"{name}_upper": upper}

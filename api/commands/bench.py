@@ -184,12 +184,10 @@ def reopen(id: RequestId, as_json: AsJson = False, url: Url = None) -> None:
 
 
 def _given(**details: str | None) -> Details:
-    """Return the details of an answer that were given."""
     return cast("Details", {name: each for name, each in details.items() if each})
 
 
 def _words_of(found: TracesRead) -> str:
-    """Return what traces say, and how well their clocks were aligned."""
     lines = [
         f"{value:.6g} {found.unit}; the motion begins at {trace.lag_s:.3f} s"
         + ("" if trace.match is None else f" ({'after rest, ' if trace.after_rest else ''}match {trace.match:.2f})")
@@ -199,7 +197,6 @@ def _words_of(found: TracesRead) -> str:
 
 
 def _one(read: Callable[[str], RequestRead], id: str) -> RequestRead | None:
-    """Return the request with this id; None if there is none."""
     try:
         return read(id)
     except ServiceError as error:

@@ -44,7 +44,6 @@ def _tables(pairs: Sequence[Comparison]) -> Iterator[Table | str]:
 
 
 def _summaries(pairs: Sequence[Comparison]) -> tuple[list[str], list[Summary]]:
-    """Return the names of the experiments, and their summaries."""
     found = {pair.first: (pair.first_name, pair.summary_first) for pair in pairs}
     found |= {pair.second: (pair.second_name, pair.summary_second) for pair in pairs}
     return [name for name, _ in found.values()], [one for _, one in found.values()]

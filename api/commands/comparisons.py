@@ -62,7 +62,6 @@ def compare(
 
 
 def _range(text: str | None) -> tuple[int | None, int | None]:
-    """Return the first and the last number of a range like "3-10" or "5"."""
     if text is None:
         return None, None
     first, _, last = text.partition("-")

@@ -100,7 +100,6 @@ def _run_study(name: str, spec: dict[str, Any], client: Client, folder: Path, co
 
 
 def _submitted(name: str, spec: dict[str, Any], client: Client, console: Console) -> StudyRead:
-    """Submit a study, in the version that this machine computes in time if its size depends on the machine."""
     if name == SIZED:
         client.wait(client.submit(demo_size.trial(spec), yes=True).id, progress=False)
         sized = demo_size.sized(spec, client.estimate)

@@ -142,12 +142,10 @@ def _show_experiment(client: Client, experiment: ExperimentRead, *, as_json: boo
 
 
 def _verdict(found: TunableVerdict) -> str:
-    """Return the verdict on a tunable, and what would help."""
     return f"{found.sentence}; would help: {'; '.join(found.helps)}" if found.helps else found.sentence
 
 
 def _software(use: ProvenanceUse) -> str:
-    """Return the versions that computed a part of an experiment."""
     found = use.provenance
     commit = f", commit {found.commit[:8]}{' and changes' if found.dirty else ''}" if found.commit else ""
     engines = ", ".join(f"{name} ({library})" for name, library in found.engines.items())

@@ -96,7 +96,6 @@ def _written(
 
 
 def _robot_file(spec: ResolvedSpec, robot: "Robot") -> "RobotFile":
-    """Return the robot of an experiment as a file, with the experiment's controller and task."""
     from gaplab.services.core.robot_files import RobotFile
     from gaplab.services.core.robot_library import robot_file
 

@@ -52,30 +52,25 @@ def _plausible(text: str) -> str:
 
 
 def _caller(request: Request) -> Caller:
-    """Return the caller that `gaplab.api.http.access` authenticated."""
     caller: Caller = request.state.caller
     return caller
 
 
 def _rollout_process(request: Request) -> RolloutProcess:
-    """Return the app's process for replays and predictions."""
     process: RolloutProcess = request.app.state.rollout_process
     return process
 
 
 def _drawing_process(request: Request) -> RolloutProcess:
-    """Return the app's process that draws videos."""
     process: RolloutProcess = request.app.state.drawing_process
     return process
 
 
 def _limited(request: Request) -> Admission:
-    """Return the token of the caller, and the limits that apply."""
     return Admission(_caller(request).token, request.app.state.limits)
 
 
 def _admission(admitted: Annotated[Admission, Depends(_limited)], key: IdempotencyKey = None) -> Admission:
-    """Return the token, the limits and the idempotency key of the request."""
     return replace(admitted, key=key)
 
 

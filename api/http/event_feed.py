@@ -140,6 +140,5 @@ class EventFeed:
             self._wake()
 
     def _wake(self) -> None:
-        """Wake all waiting streams once."""
         news, self._news = self._news, asyncio.Event()
         news.set()

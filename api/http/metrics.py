@@ -77,8 +77,6 @@ class RequestCounter:
 
 
 class _ProcessCollector(Collector):
-    """The metrics of this process, except requests."""
-
     def __init__(self, store: Store, feed: EventFeed) -> None:
         self._store = store
         self._feed = feed

@@ -107,7 +107,6 @@ def _unknown_field(place: str, path: Sequence[str | int], value: object, request
 
 
 def _fields(request: Request, path: Sequence[str | int]) -> tuple[str, ...]:
-    """Return the fields of the model at this place of the body."""
     annotation: Any = request.scope["route"].body_field.field_info.annotation
     for part in path:
         models = _models(annotation)

@@ -51,7 +51,6 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
 
 @contextmanager
 def _kept_supervisor(settings: Settings) -> Iterator[SupervisorProcess]:
-    """Keep a supervisor for as long as the context lasts."""
     store = Store(settings.database_url)
     supervisor = SupervisorProcess(environment_of(settings), silence=Silence.of(settings), store=store)
     supervisor.start()

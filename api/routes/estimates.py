@@ -22,7 +22,6 @@ _RESPONSES: Responses = documented(413, 415, 422)
 
 
 def _estimate(store: StoreDep, request: Request) -> Estimate:
-    """Return the function that estimates a spec under the limits and with the cores of this service."""
     state = request.app.state
     return partial(estimates.estimate, store, limits=state.limits, cores=state.cores)
 

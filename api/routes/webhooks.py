@@ -14,7 +14,6 @@ _study = APIRouter(prefix="/studies/{id}/webhook", tags=["studies"])
 
 
 def _hosts(request: Request) -> frozenset[str]:
-    """Return the hosts that the owner of the service permits."""
     hosts: frozenset[str] = request.app.state.notify.permitted_hosts
     return hosts
 

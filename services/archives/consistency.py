@@ -53,7 +53,6 @@ def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
 
 
 def _learn_robots(opened: OpenedArchive) -> None:
-    """Check and remember the robot files of an archive, which its specs name."""
     for row in opened.rows("robot"):
         try:
             file = read_robot_file(row["text"])

@@ -189,7 +189,6 @@ def _with_content(checked: CheckedArchive, rows: Iterable[Row]) -> Iterator[Row]
 
 
 def _owner(table: str, row: Row) -> str:
-    """Return the id of the experiment that a row belongs to."""
     owner: str = row["id"] if table == "experiment" else row.get(EXPERIMENT) or row["experiment_id"]
     return owner
 
@@ -204,7 +203,6 @@ def _resting(state: State) -> State:
 
 
 def _renamed(table: str, row: Row, studies: Mapping[str, str], experiments: Mapping[str, str]) -> Row:
-    """Return the row with the ids that it has in the service."""
     if table == "study":
         return row | {"id": studies.get(row["id"], row["id"])}
     if table == "experiment":

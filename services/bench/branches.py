@@ -163,7 +163,6 @@ def _remove(session: Session, repetition: int, closed: Sequence[Step]) -> None:
 
 
 def _whole(closed: Sequence[Step]) -> set[int]:
-    """Return the iterations of which no step is kept."""
     return {step.iteration for step in closed if isinstance(step, Selected) or position(step) == 0}
 
 
@@ -190,7 +189,6 @@ def _count_down(session: Session, repetition: int, place: int, closed: Sequence[
 
 
 def _seconds_of(session: Session, repetition: int, closed: Sequence[Step]) -> dict[int, float]:
-    """Return the seconds of the closed steps by iteration."""
     row, whole, rollouts = IterationRow, _whole(closed), Counter[int]()
     for step in closed:
         rollouts[step.iteration] += int(_cost(step).rollouts)

@@ -101,8 +101,6 @@ def lets_nan_never_win(plugin: Plugin) -> None:
 
 
 def _spoilt(bad: float) -> Callable[[FloatArray], FloatArray]:
-    """Return a transformation that replaces fitness near the summit."""
-
     def spoil(fitness: FloatArray) -> FloatArray:
         return np.where(fitness > -0.05, bad, fitness)
 

@@ -112,7 +112,6 @@ def flattened(value: Any, prefix: str = "") -> dict[str, Any]:  # noqa: ANN401 -
 
 
 def _field(place: str) -> str:
-    """Return a place without the numbers of items."""
     return ".".join(part for part in place.split(".") if not part.isdigit())
 
 

@@ -74,7 +74,6 @@ def tuned(
 def _tuned(
     tuner: Tuner, physics: Physics, ensemble: int, seed: int = 0, evaluations: int = EVALUATIONS
 ) -> Sequence[Simulator]:
-    """Return the simulators that a tuner finds, with arrays as the loop stores them."""
     answers = Answers(physics.fitness, sense=physics.sense)
     misfit = Misfit(answers, samples(), Readings(), TIMES_S if Readings.senses else NO_READINGS)
     optimizer = SteadyState().diverse(ensemble) if ensemble > 1 else SteadyState()
@@ -156,7 +155,6 @@ def repeats_itself(plugin: Plugin) -> None:
 
 
 def _numbers(tuner: Tuner, seed: int) -> FloatArray:
-    """Return all numbers of seven simulators as one vector."""
     found = _tuned(tuner, Physics(), 7, seed)
     arrays = [array for each in found for array in (each.parameters, each.interval) if array is not None]
     scalars = [number for each in found for number in (each.squared_error, each.weight) if number is not None]

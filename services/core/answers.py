@@ -159,7 +159,6 @@ class Answers:
         return answers
 
     def _sensed(self, genomes: Genomes, block: Parameters) -> Outcomes:
-        """Return the outcomes of the genomes in one block of simulators."""
         keys = _keys(genomes, block, _SENSED)
         answers = {key: self._ahead.pop(key) for key in dict.fromkeys(keys) if key in self._ahead}
         missing = [index for index, key in enumerate(keys) if key not in answers]
@@ -174,7 +173,6 @@ class Answers:
     def _computed(
         self, compute: Simulate, genomes: Genomes, parameters: Parameters, keys: list[bytes]
     ) -> Iterator[Answer]:
-        """Yield the answers of the simulation, call by call."""
         done = 0
         while done < len(genomes):
             count = self._recorder.genomes_per_call(len(parameters)) if self._recorder else len(genomes)

@@ -77,8 +77,6 @@ class _Level:
 
 
 class _Parts:
-    """The colliding shapes of some bodies, as arrays."""
-
     def __init__(self, world: World, bodies: Sequence[Body]) -> None:
         places = {body.name: place for place, body in enumerate(world.bodies)}
         by_body = [[part for part in body.parts if part.collides] for body in bodies]

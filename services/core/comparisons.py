@@ -167,7 +167,6 @@ def _compared(
 
 
 def _groups(first: FloatArray, second: FloatArray) -> dict[str, Any]:
-    """Return the fields of `Groups` for two groups of finite values."""
     student, welch, mann_whitney = compare(first, second)
     return {
         "n_first": len(first),
@@ -193,7 +192,6 @@ def _streams(one: Compared, other: Compared) -> str:
 
 
 def _corrected(pairs: Sequence[G], names: Sequence[str]) -> list[G]:
-    """Return pairs whose tests have Holm's corrected p, test by test."""
     columns = zip(*(corrected([getattr(pair, name) for pair in pairs]) for name in names), strict=True)
     return [
         pair.model_copy(update=dict(zip(names, tests, strict=True))) for pair, tests in zip(pairs, columns, strict=True)

@@ -98,7 +98,6 @@ def _verdict(
 
 
 def _doubted(found: TunableVerdict) -> TunableVerdict:
-    """Return the verdict where no simulator reproduces the samples."""
     if found.verdict not in {Identification.IDENTIFIED, Identification.PARTLY}:
         return found
     sentence = found.sentence.replace(found.verdict.value, "doubtful, for no simulator reproduces the samples", 1)

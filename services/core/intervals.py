@@ -65,7 +65,6 @@ def improvement(first: FloatArray, second: FloatArray, *, paired: bool, interval
 
 @lru_cache(maxsize=_KEPT)
 def _ends_of_middle(values: bytes) -> Ends:
-    """Return the interval of the interquartile mean."""
     return _ends((np.frombuffer(values),), _interquartile_mean)
 
 

@@ -141,7 +141,6 @@ def _shares(found: Sequence[FloatArray], prior: FloatArray) -> list[float | None
 
 
 def _distribution(values: Sequence[float] | FloatArray) -> dict[str, float | int | None]:
-    """Return statistics over the finite values."""
     there = np.asarray(values, dtype=np.float64)
     there = there[np.isfinite(there)]
     with np.errstate(over="ignore", invalid="ignore"):

@@ -65,8 +65,6 @@ P = TypeVar("P", bound=Plugin)
 
 @dataclass(frozen=True)
 class _Found(Generic[P]):
-    """The plug-ins of one kind by name, and those that specs cannot use."""
-
     usable: dict[str, type[P]]
     unusable: dict[str, Unusable]
 
@@ -209,7 +207,6 @@ def _by_name(unusable: Iterable[Unusable], usable: Container[str]) -> dict[str, 
 
 
 def _entry(named: tuple[str, Unusable]) -> PluginRead:
-    """Return the catalogue's entry of an unusable plug-in."""
     name, found = named
     source = f"{found.file} of GAPLAB_PLUGINS"
     return PluginRead(name=name, summary="", source=source, options={}, available=False, note=found.why)

@@ -123,7 +123,6 @@ def safety(rollouts: Sequence[Extremes], limits: LimitsSpec | None, engine: str)
 
 
 def _beyond(ran: Sequence[Extremes], limits: LimitsSpec | None) -> list[str]:
-    """Return a sentence for each limit that a rollout exceeds."""
     found = []
     for limit in LIMITS:
         permitted = getattr(limits, limit.name, None)

@@ -144,7 +144,6 @@ def _column(name: str, robot: Robot) -> SampleColumn | None:
 
 
 def _absent(columns: Sequence[SampleColumn], robot: Robot) -> Iterator[str]:
-    """Yield the names of columns that a table must have."""
     genes = {column.place for column in columns if column.kind == "gene"}
     values = {column.place for column in columns if column.kind == "value"}
     read = {column.place for column in columns if column.kind == "reading"}
@@ -242,7 +241,6 @@ def _names(robot: Robot) -> list[str]:
 
 
 def _told(robot: Robot) -> str:
-    """Return the columns of a robot's table in words."""
     genes = "gene_0" if robot.space.size == 1 else f"gene_0 to gene_{robot.space.size - 1}"
     sensors = robot.sensors
     read = f", SENSOR@TIME for {', '.join(sensors.names)} at {', '.join(sensors.times)} s"

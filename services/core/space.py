@@ -98,5 +98,4 @@ class Space:
 
 
 def _brief(value: object) -> str:
-    """Return the shape of an array, else a short representation."""
     return f"an array of shape {value.shape}" if isinstance(value, np.ndarray) else f"{value!r:.100}"

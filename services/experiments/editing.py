@@ -73,7 +73,6 @@ def _edit(
 
 
 def _texts(edit: Edit) -> dict[str, Any]:
-    """Return the new name and notes, as they are stored."""
     changes = edit.model_dump(exclude_unset=True, include={"name", "notes"})
     return {name: storable(value) if value is not None else None for name, value in changes.items()}
 

@@ -106,7 +106,6 @@ def _key(spec: ResolvedSpec) -> Key:
 
 
 def _engine(spec: ResolvedSpec) -> PluginRef:
-    """Return the engine that computes the experiment."""
     return (spec.reality.engine or spec.engine) if is_direct(spec) else spec.engine
 
 

@@ -85,7 +85,6 @@ def _spec(experiment: ExperimentRow) -> ResolvedSpec:
 
 
 def _enlarged(spec: ResolvedSpec, extension: ExtensionSpec) -> ResolvedSpec:
-    """Return a spec with totals of at least those of the extension."""
     totals = extension.model_dump(exclude_none=True, exclude=None if takes_samples(spec) else {"iterations"})
     return spec.model_copy(update={name: max(total, getattr(spec, name)) for name, total in totals.items()})
 

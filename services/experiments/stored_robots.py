@@ -40,7 +40,6 @@ def add_robot(store: Store, text: str | bytes) -> RobotRead:
 
 
 def _checked(text: str | bytes) -> RobotFile:
-    """Return the robot of a file that can be stored."""
     file = read_robot_file(text)
     if file.name in robots:
         message = f"gaplab has a robot {file.name!r} already; choose another name"

@@ -38,5 +38,4 @@ def of_study(session: Session, event: EventRow, row: StudyRow) -> Notification:
 
 
 def _counted(states: list[str]) -> str:
-    """Return how many experiments are in each state."""
     return ", ".join(f"{states.count(state)} {state}" for state in sorted(set(states)))

@@ -106,7 +106,6 @@ def _files() -> Iterator[tuple[str, Path]]:
 
 
 def _top(file: str) -> str:
-    """Return the name of the module, or of the package, that a file belongs to."""
     return file.partition("/")[0].removesuffix(".py")
 
 

@@ -74,7 +74,6 @@ def _is_plugin(found: object) -> TypeGuard[type[Plugin]]:
 
 
 def _why_no_module(suffix: str) -> str:
-    """Return why a file with this ending is no plug-in."""
     if suffix in IMPORTED:
         return TO_IMPORT
     return NOT_A_ROBOT if suffix in OTHERS else NOT_PYTHON

@@ -164,7 +164,6 @@ def _faces(pen: ImageDraw.ImageDraw, solid: Solid, body: Polyhedron, camera: Cam
 
 
 def _ends(length_m: float) -> FloatArray:
-    """Return the centres of the balls that a capsule along z spans, `(2, 3)`."""
     return np.array([[0.0, 0.0, -length_m / 2], [0.0, 0.0, length_m / 2]])
 
 

@@ -141,7 +141,6 @@ def _sensed(
 
 
 def _values(sensors: Sensors, readings: FloatArray) -> tuple[tuple[float | None, ...], ...]:
-    """Return the values of each sensor, a row each; None where a sensor failed."""
     rows = _rounded(sensors.values(readings).T, 6).tolist()
     return tuple(tuple(None if np.isnan(value) else value for value in row) for row in rows)
 
@@ -174,7 +173,6 @@ def _shown(robot: Robot, engine: str, world: World, recording: Recording, record
 
 
 def _framing(*worlds: ReplayWorld | None) -> Framing:
-    """Return the framing of the first world with a motion, at its start."""
     for world in worlds:
         if world is not None and world.positions_m:
             positions = np.array(world.positions_m[0]).reshape(-1, 3)

@@ -171,7 +171,6 @@ def _reach(solid: Solid) -> tuple[float, float]:
 
 
 def _from_z(away: FloatArray) -> Orientation:
-    """Return the smallest rotation of the z axis onto the line of a vector, as a quaternion x, y, z, w."""
     x, y, z = (away if away[2] >= 0 else -away) / np.linalg.norm(away)
     rotation = np.array([-y, x, 0.0, 1.0 + z])
     rotation = rotation / np.linalg.norm(rotation) + 0.0

@@ -76,7 +76,6 @@ def film(replay: bytes, kind: VideoFormat, width_px: int) -> bytes:
 
 
 def _mp4(drawn: Iterable[Image.Image], size: tuple[int, int]) -> bytes:
-    """Return H.264 in MP4, which browsers and presentations play."""
     try:
         import av
     except ImportError as error:

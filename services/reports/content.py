@@ -132,7 +132,6 @@ def _verdict(
 
 
 def _over_all(store: Store, ids: Sequence[str], count: int | None) -> tuple[Comparison, ...]:
-    """Return the comparisons over all numbers of real-world evaluations up to a count."""
     if count is None or count < 2 or len(ids) < 2:
         return ()
     return compare(store, ids, from_evaluations=1, to_evaluations=count)

@@ -122,7 +122,6 @@ def provenance(facts: Facts) -> tuple[Grid, ...]:
 
 
 def _of_software(repetitions: int) -> str:
-    """Return the caption of the versions that were the last to compute so many repetitions."""
     last = f"the last to compute {number_of('repetition', repetitions)}" if repetitions else "of earlier steps"
     return f"Software and machine, {last}"
 

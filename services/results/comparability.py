@@ -32,7 +32,6 @@ def warnings(first: ExperimentRow, second: ExperimentRow, hidden: Set[str]) -> I
 
 
 def _both(first: str, second: str) -> str:
-    """Return two names in brackets; nothing if only options differ."""
     return f" ({first}; {second})" if first != second else ""
 
 

@@ -106,7 +106,6 @@ def _truth(found: _Stored, genes: FloatArray) -> FloatArray | None:
 
 
 def _approximations(found: _Stored, simulators: Sequence[SimulatorRead], genes: FloatArray) -> FloatArray:
-    """Return the fitness of each gene in each simulator, `(simulators, genes)`."""
     if not simulators:
         return np.empty((0, len(genes)))
     edits = edits_of(ref.name for ref in found.spec.tunables)
@@ -115,7 +114,6 @@ def _approximations(found: _Stored, simulators: Sequence[SimulatorRead], genes: 
 
 
 def _limits(found: _Stored, truth: FloatArray | None, genes: FloatArray) -> tuple[float, float]:
-    """Return the range of the truth, the best simulator of each iteration, and all measurements."""
     best = _approximations(found, [each for each in found.simulators if each.rank == 0], genes)
     values = [*best.ravel().tolist(), *([] if truth is None else truth.tolist())]
     values += [each.fitness for each in found.measured if each.fitness is not None]

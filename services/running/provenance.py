@@ -220,6 +220,5 @@ def _external(under: Provenance, plugin: str) -> str:
 
 
 def _engines(spec: Mapping[str, Any]) -> set[str]:
-    """Return the names of the simulators' engine and of reality's engine."""
     chosen = (spec["engine"], spec["reality"]["engine"])
     return {ref["name"] for ref in chosen if ref}

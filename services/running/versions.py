@@ -151,7 +151,6 @@ def _git(*command: str) -> str | None:
 
 
 def _processor() -> str:
-    """Return the kind of the processor, as Linux names it; elsewhere, as Python does."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

@@ -77,7 +77,6 @@ def in_words(path: Path) -> str:
 
 
 def _settings(stored: Mapping[str, Any]) -> Iterator[tuple[Path, tuple[str, Any]]]:
-    """Yield the path, the pointer and the value of each setting."""
     spec = spec_of(stored).model_dump(mode="json", exclude=NO_SETTINGS)
     spec["reality"]["parameters"] = stored["reality"]["parameters"]
     tunables = spec.pop("tunables")
@@ -97,7 +96,6 @@ def _leaves(path: Path, pointer: str, value: Any) -> Iterator[tuple[Path, tuple[
 
 
 def _pointers(table: Iterable[Mapping[Path, tuple[str, Any]]]) -> dict[Path, str]:
-    """Return the pointer of each setting in the first spec that has it."""
     found: dict[Path, str] = {}
     for settings in table:
         for path, (pointer, _) in settings.items():

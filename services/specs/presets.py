@@ -73,6 +73,5 @@ def preset_options(preset: Preset, kind: type[Plugin]) -> Mapping[str, Any]:
 
 
 def _with(preset: Preset, ref: PluginRef, registry: Registry[Any]) -> PluginRef:
-    """Return a plug-in with the options that a preset sets, under those that are given."""
     options = preset_options(preset, registry[ref.name]) if ref.name in registry else {}
     return PluginRef(name=ref.name, options={**options, **ref.options})

@@ -176,7 +176,6 @@ def takes_samples(spec: ExperimentSpec) -> bool:
 
 
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
-    """Return the engine if it is installed and can run the robot."""
     engine, _ = engines.check(ref, pointer)
     able = [name for name, each in engines.items() if runs(each, robot.world)]
     if ref.name not in able:
@@ -190,7 +189,6 @@ def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
 
 
 def _label(strategy: Strategy, preset: Preset) -> str:
-    """Return the name of the strategy with all options that differ from those of the preset."""
     kind = type(strategy)
     defaults = kind.Options(**preset_options(preset, kind)).model_dump(mode="json", by_alias=True)
     chosen = strategy.options.model_dump(mode="json", by_alias=True)
@@ -199,7 +197,6 @@ def _label(strategy: Strategy, preset: Preset) -> str:
 
 
 def _budget(spec: ExperimentSpec, preset: Preset) -> ResolvedBudget:
-    """Return the budget with every number."""
     return ResolvedBudget(
         preset=spec.budget.preset,
         controller_evaluations=spec.budget.controller_evaluations or preset.controller_evaluations,

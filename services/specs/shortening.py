@@ -136,14 +136,12 @@ def _paths(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str |
 
 
 def _without_nulls(spec: Spec) -> Spec:
-    """Return the spec without the fields of samples that are null."""
     reality = spec["reality"]
     samples = [{name: item for name, item in each.items() if item is not None} for each in reality["samples"]]
     return {**spec, "reality": {**reality, "samples": samples}}
 
 
 def _without(value: Any, path: Sequence[str | int]) -> Any:  # noqa: ANN401 - JSON
-    """Return JSON without the field at a path; None if it has none."""
     (key, *rest), has = path, isinstance(value, list) or (isinstance(value, dict) and path[0] in value)
     if not has:
         return None
@@ -158,7 +156,6 @@ def _without(value: Any, path: Sequence[str | int]) -> Any:  # noqa: ANN401 - JS
 
 
 def _bare(value: Any) -> Any:  # noqa: ANN401 - JSON
-    """Return JSON with a bare name in place of each object that has only that."""
     if isinstance(value, list):
         return [_bare(item) for item in value]
     if not isinstance(value, dict):

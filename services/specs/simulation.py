@@ -111,7 +111,6 @@ class Simulation:
 
 
 def _disturbed(world: World, motions: Sequence[Motion | Loop], genomes: Genomes) -> Sequence[Motion | Loop]:
-    """Return the motions of genomes with the noise of a world."""
     if world.noise == QUIET:
         return motions
     return [disturbed(world, motion, genome) for motion, genome in zip(motions, genomes, strict=True)]
@@ -143,5 +142,4 @@ def _places(all_s: FloatArray, times_s: FloatArray) -> Places:
 
 
 def _at(seen: Trajectory, places: Places) -> Trajectory:
-    """Return the observations at some places of a trajectory."""
     return Trajectory(seen.times_s[places], seen.positions_m[..., places, :], seen.orientations[..., places, :])

@@ -118,7 +118,6 @@ def _range_violations(tunable: Tunable, value: float, pointer: str) -> Iterator[
 
 
 def _place_violations(tunable: Tunable, robot: Robot, engine: type[Engine], pointer: str) -> Iterator[Violation]:
-    """Yield that the robot lacks what a tunable edits, or that the engine ignores it."""
     name = label_of(tunable)
     if (lack := tunable.lack(robot.world)) is not None:
         why, permitted = lack
@@ -164,7 +163,6 @@ def reality_violations(
 
 
 def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Violation]:
-    """Yield settings that have no sense where reality is a robot on a bench."""
     reality = spec.reality
     if strategy.in_reality:
         message = f"{strategy.name} evolves in reality itself, in thousands of evaluations of the physical robot"

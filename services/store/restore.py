@@ -83,7 +83,6 @@ def _place(url: str, source: Path) -> Path:
 
 
 def _postgres_line(url: URL, source: Path) -> str:
-    """Return the command line that restores a dump, without the password."""
     given = {"host": url.host or url.query.get("host"), "port": url.port or url.query.get("port")}
     server = "".join(f"--{name}={shlex.quote(str(value))} " for name, value in given.items() if value)
     owner = url.username or "gaplab"

@@ -163,7 +163,6 @@ def _open_lock(lock: Path, file: Path) -> int:
 
 
 def _closed(lock: Path, file: Path) -> str:
-    """Return the sentence about a lock that another user created."""
     owner = (file if file.exists() else file.parent).stat()
     return (
         f"this user may not open {lock}, the lock of the database: "

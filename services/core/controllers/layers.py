@@ -17,7 +17,6 @@ SPEED_SCALE, TURNING_SCALE = 10.0, 5.0
 
 
 def _listed(value: object) -> object:
-    """Return the names of a text, which commas separate."""
     return [name.strip() for name in value.split(",") if name.strip()] if isinstance(value, str) else value
 
 

@@ -18,7 +18,6 @@ BASE = ("dynamic_friction",)
 
 
 def _names(value: object) -> object:
-    """Return the names of a text, which commas separate."""
     return separated(value) if isinstance(value, str) else value
 
 

@@ -101,7 +101,6 @@ class Weighted(Diverse):
         return search(score, parameters=np.vstack([asked.models, asked.nearby, asked.aside]), senses=senses)
 
     def _asked(self, belief: Belief, rng: Generator) -> "_Asked":
-        """Return the simulators in which each controller is evaluated."""
         options, models = self.options, belief.parameters[: self._compared(self.ensemble)]
         steps = options.perturbation * rng.choice([-1.0, 1.0], models.shape)
         nearby = moved(models, steps, belief.tunables) if options.reliability_weight else models[:0]

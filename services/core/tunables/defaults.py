@@ -50,7 +50,6 @@ def _response(world: World) -> tuple[str, ...]:
 
 
 def _mass(body: str) -> str:
-    """Return the label of a body's mass."""
     return f"mass({_pattern(body)})"
 
 

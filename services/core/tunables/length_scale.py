@@ -89,7 +89,6 @@ def _times(vector: Vector, factor: float) -> Vector:
 
 
 def _sized(shape: Shape, factor: float) -> Shape:
-    """Return a shape of other dimensions."""
     match shape:
         case Box(size_m=size):
             return Box(_times(size, factor))

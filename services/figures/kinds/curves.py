@@ -95,7 +95,6 @@ def curves_figure(
 
 
 def _drawable(curve: Curve) -> Curve:
-    """Return the curve without values too large to compute with."""
     points, best = tuple(map(_drawable_point, curve.points)), tuple(map(drawable, curve.best_of))
     return curve.model_copy(update={"points": points, "best_of": best})
 
@@ -185,7 +184,6 @@ def _limits(marks: Sequence[Mark]) -> tuple[float, float]:
 def _caption(
     lines: Sequence[_Placed], levels: Sequence[_Placed], band: str, against: CostAxis | None, *, each: bool
 ) -> str:
-    """Return the caption: n, the bands, the thin lines, the axis, the baseline."""
     counts = [point.n for one in lines for _, _, point in one.points]
     bands = f"; bands: {band}" if any(point.sd is not None for one in lines for _, _, point in one.points) else ""
     parts = [f"Mean over {number_of('repetition', *counts)}{bands}."] if counts else []

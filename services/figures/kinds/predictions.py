@@ -56,7 +56,6 @@ def predictions_figure(
 
 
 def _pairs(items: Sequence[Prediction]) -> tuple[list[str], dict[str, list[Pair]]]:
-    """Return the hover texts of the complete samples, and their pairs before and after tuning."""
     told, drawn = list[str](), {BEFORE: list[Pair](), AFTER: list[Pair]()}
     for each in items:
         before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))

@@ -107,7 +107,6 @@ def summed(*, squares: bool) -> str:
 def _per_sample(
     errors: Mapping[int, Errors], samples: Mapping[int, Counts], kind: ErrorKind
 ) -> dict[int, dict[int, Number]]:
-    """Return the errors per sample, where the number of samples is known."""
     return {
         at: {
             repetition: None if value is None else kind.per_sample(value / samples[at][repetition])

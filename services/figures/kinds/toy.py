@@ -66,7 +66,6 @@ def _samples(toy: ToyIteration) -> list[Mark]:
 
 
 def _transfer(toy: ToyIteration) -> list[Mark]:
-    """Return the arrow from the simulated to the real fitness of the transferred gene, and its points."""
     if toy.transfer is None:
         return []
     gene, simulated, real = toy.transfer.gene, toy.transfer.simulated, toy.transfer.real
@@ -110,7 +109,6 @@ def _told(toy: ToyIteration) -> str:
 
 
 def _transfer_in_words(toy: ToyIteration) -> tuple[str, str, str]:
-    """Return the gene and its fitness in simulation and in reality; empty if missing."""
     transfer = toy.transfer
     return (number(transfer.gene), number(transfer.simulated), number(transfer.real)) if transfer else ("", "", "")
 

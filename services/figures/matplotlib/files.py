@@ -154,7 +154,6 @@ def _set_up(axes: "Axes", x: Axis, y: Axis, *, labelled: bool) -> None:
 
 
 def _fit_side_by_side(axis: Any, of: Axis) -> bool:  # noqa: ANN401 - XAxis or YAxis
-    """Return whether the widest words of an axis fit between two ticks."""
     between_in = FREE * axis.get_figure().get_figwidth() / max(1, len(of.ticks))
     return bool(max(width_in(words, SIZE_PT) for _, words in of.ticks) < between_in)
 

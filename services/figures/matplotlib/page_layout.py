@@ -146,7 +146,6 @@ def _legend_in(names: list[str], columns: int) -> float:
 
 
 def _names(figure: FigureDefinition) -> list[str]:
-    """Return the names in the legend."""
     marks = [mark for mark in figure.marks if not isinstance(mark, Label | Arrow | Polylines)]
     named = [each.name for each in marks if each.name and not (isinstance(each, Line) and each.faint)]
     return list(dict.fromkeys(map(legend_name, named)))

@@ -54,7 +54,6 @@ def _resource(package: str, *path: str) -> str:
 
 
 def _on_white(layout: dict[str, Any]) -> dict[str, Any]:
-    """Return the layout with the colours and the font of a white page."""
     axes = {
         name: AXIS | each | {"title": AXIS["title"] | each["title"]}
         for name, each in layout.items()
@@ -64,7 +63,6 @@ def _on_white(layout: dict[str, Any]) -> dict[str, Any]:
 
 
 def _script(value: object) -> str:
-    """Return the value as JSON that is safe inside a script element."""
     return json.dumps(value, allow_nan=False).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 

@@ -170,7 +170,6 @@ def _named(name: str, look: Style) -> Trace:
 
 
 def _quiet(trace: Trace) -> Trace:
-    """Return the trace without a legend entry and without hover texts."""
     return trace | {"showlegend": False, "hoverinfo": "skip"}
 
 

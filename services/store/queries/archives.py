@@ -96,7 +96,6 @@ def _queries(session: Session, name: str, columns: Sequence[str], owners: Sequen
 
 
 def _with_ids(session: Session, rows: Sequence[Row]) -> list[Row]:
-    """Return the rows with the ids of their repetitions in this database."""
     model = RepetitionRow
     owners = {row[EXPERIMENT] for row in rows}
     found = session.execute(select(model.experiment_id, model.number, model.id).where(model.experiment_id.in_(owners)))
@@ -109,14 +108,12 @@ def _with_ids(session: Session, rows: Sequence[Row]) -> list[Row]:
 
 
 def _provenances(columns: Sequence[str], experiments: Sequence[str]) -> Select[Any]:
-    """Return the query for provenances, which experiments share."""
     table, use = Base.metadata.tables["provenance"], ExperimentProvenanceRow
     used = select(use.provenance_id).where(use.experiment_id.in_(experiments))
     return select(*(table.c[each] for each in columns)).where(table.c.id.in_(used)).order_by(table.c.id)
 
 
 def _robots(columns: Sequence[str], experiments: Sequence[str]) -> Select[Any]:
-    """Return the query for robot files, which experiments share."""
     table, hash_ = RobotRow.__table__, ExperimentRow.spec["robot"]["options"]["sha256"].as_string()
     used = select(hash_).where(ExperimentRow.id.in_(experiments), hash_.is_not(None))
     return select(*(table.c[each] for each in columns)).where(table.c.sha256.in_(used)).order_by(table.c.sha256)

@@ -162,7 +162,6 @@ def _readings(values: FloatArray) -> list[float | None] | None:
 
 
 def _opens_iteration(step: Step) -> bool:
-    """Return whether the step is the first of its iteration."""
     return isinstance(step, Selected) or (isinstance(step, Tuned) and step.iteration == 0)
 
 
