@@ -21,9 +21,6 @@ The tallies in `repetition` (steps, rollouts, seconds) are updated in the transa
 So progress is a sum over repetitions, and reads no results.
 """
 
-from gaplab.services.store.models.access import IdempotencyRow as IdempotencyRow
-from gaplab.services.store.models.access import TokenRow as TokenRow
-from gaplab.services.store.models.attempts import AttemptRow as AttemptRow
 from gaplab.services.store.models.base import REVISION as REVISION
 from gaplab.services.store.models.base import Base as Base
 from gaplab.services.store.models.base import Number as Number
@@ -32,22 +29,25 @@ from gaplab.services.store.models.bench import AnswerRow as AnswerRow
 from gaplab.services.store.models.bench import AttachmentRow as AttachmentRow
 from gaplab.services.store.models.bench import BranchRow as BranchRow
 from gaplab.services.store.models.bench import RequestRow as RequestRow
-from gaplab.services.store.models.checkpoints import CheckpointRow as CheckpointRow
-from gaplab.services.store.models.events import EventCounterRow as EventCounterRow
-from gaplab.services.store.models.events import EventRow as EventRow
 from gaplab.services.store.models.experiments import ExperimentRow as ExperimentRow
 from gaplab.services.store.models.experiments import RepetitionRow as RepetitionRow
 from gaplab.services.store.models.experiments import StudyRow as StudyRow
-from gaplab.services.store.models.leased import LeasedRow as LeasedRow
-from gaplab.services.store.models.lists import DeletionRow as DeletionRow
-from gaplab.services.store.models.lists import ViewRow as ViewRow
-from gaplab.services.store.models.notifications import NotificationRow as NotificationRow
-from gaplab.services.store.models.notifications import NotifierRow as NotifierRow
 from gaplab.services.store.models.provenance import ExperimentProvenanceRow as ExperimentProvenanceRow
 from gaplab.services.store.models.provenance import ProvenanceRow as ProvenanceRow
+from gaplab.services.store.models.provenance import RobotRow as RobotRow
 from gaplab.services.store.models.provenance import SupervisorRow as SupervisorRow
 from gaplab.services.store.models.results import IterationRow as IterationRow
 from gaplab.services.store.models.results import MeasurementRow as MeasurementRow
 from gaplab.services.store.models.results import SimulatorRow as SimulatorRow
-from gaplab.services.store.models.robots import RobotRow as RobotRow
-from gaplab.services.store.models.sensitivity import SensitivityRow as SensitivityRow
+from gaplab.services.store.models.service import DeletionRow as DeletionRow
+from gaplab.services.store.models.service import EventCounterRow as EventCounterRow
+from gaplab.services.store.models.service import EventRow as EventRow
+from gaplab.services.store.models.service import IdempotencyRow as IdempotencyRow
+from gaplab.services.store.models.service import NotificationRow as NotificationRow
+from gaplab.services.store.models.service import NotifierRow as NotifierRow
+from gaplab.services.store.models.service import TokenRow as TokenRow
+from gaplab.services.store.models.service import ViewRow as ViewRow
+from gaplab.services.store.models.work import AttemptRow as AttemptRow
+from gaplab.services.store.models.work import CheckpointRow as CheckpointRow
+from gaplab.services.store.models.work import LeasedRow as LeasedRow
+from gaplab.services.store.models.work import SensitivityRow as SensitivityRow

@@ -10,7 +10,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.resolved import SPEC_VERSION
 from gaplab.services.store.clock import now
 from gaplab.services.store.models.base import Base, Reason
-from gaplab.services.store.models.leased import LeasedRow
+from gaplab.services.store.models.work import LeasedRow
 
 
 class StudyRow(Base):
