@@ -1,10 +1,10 @@
-"""Archives: their manifest, and the result of an import."""
+"""Archives: their manifest, the result of an import, and what is the same when they are computed again."""
 
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id
+from gaplab.schemas.base import Frozen, Id, Name
 
 FORMAT = 1
 """Version of the archive format: exports write it, and imports refuse a later one."""
@@ -48,3 +48,28 @@ class ImportRead(Frozen):
     called_off: tuple[str, ...] = Field(
         default=(), description="ids of experiments that had not ended: they are CANCELLED here, and never run"
     )
+
+
+Outcome = Literal["same", "different", "not computed"]
+
+
+class RepetitionRerun(Frozen):
+    """One repetition of an archive, computed again."""
+
+    experiment: Id
+    name: Name
+    repetition: int
+    outcome: Outcome
+    steps: int = Field(description="steps with the same bits, up to the first that differs")
+    stored_steps: int = Field(description="steps in the archive")
+    reason: str | None = Field(default=None, description="first difference, or why it was not computed")
+
+
+class RerunRead(Frozen):
+    """An archive, computed again."""
+
+    same: int
+    different: int
+    not_computed: int
+    other_versions: tuple[str, ...] = Field(description="software and machines that differ from those of the archive")
+    repetitions: tuple[RepetitionRerun, ...]

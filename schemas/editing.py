@@ -1,10 +1,10 @@
-"""Changes to a submitted study or experiment."""
+"""Changes to a submitted study or experiment, its rendered notes, and what was deleted."""
 
 from typing import Annotated, ClassVar
 
 from pydantic import AfterValidator, Field, model_validator
 
-from gaplab.schemas.base import Examples, Frozen, Label, Tag
+from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Name, Tag
 
 MOST_TAGS = 20
 """Tags of one study or experiment."""
@@ -41,3 +41,21 @@ class Edit(Frozen):
         if "tags" in self.model_fields_set and (self.add_tags or self.remove_tags):
             raise ValueError("give either all tags, or tags to add and to remove")
         return self
+
+
+class NotesRead(Frozen):
+    """Notes as HTML."""
+
+    html: str = Field(
+        description="the notes, rendered: without scripts, images or HTML of their own",
+        examples=["<p>the bounds were <em>too wide</em></p>"],
+    )
+
+
+class DeletionRead(Frozen):
+    """A deleted study or experiment."""
+
+    id: Id
+    name: Name
+    study: Id | None = Field(default=None, description="study of a deleted experiment")
+    deleted_at: Moment

@@ -4,7 +4,7 @@ Every missing field has a default, and the defaults are the paper's. A *resolved
 service stores, so a later change of a default changes no stored experiment.
 """
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -225,3 +225,14 @@ class StudySpec(SharedSettings, Schedule):
     direct_repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
         default=None, description="repetitions of `direct`; default: `repetitions`"
     )
+
+
+class SpecRead(Frozen):
+    """The spec of a study or an experiment: what a person would submit, and what was stored."""
+
+    spec: dict[str, Any] | None = Field(
+        description="the shortest spec that gives the same; null if no single spec gives all experiments",
+        examples=[{"strategies": ["simulated_fit", "random"], "engine": "mujoco", "budget": "smoke"}],
+    )
+    resolved: tuple[dict[str, Any], ...] = Field(default=(), description="the complete spec of each experiment")
+    remarks: tuple[str, ...] = Field(default=(), description="what the spec lacks, in words")

@@ -2,7 +2,7 @@
 
 from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.predictions import Prediction
+from gaplab.schemas.replays import Prediction
 from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_figure
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure

@@ -10,7 +10,7 @@ import ray
 
 from gaplab.services.core.errors import Conflict, StoreUnavailable
 from gaplab.services.running import execution
-from gaplab.services.running.silences import Silences
+from gaplab.services.running.leases import Silences
 from gaplab.services.specs.blame import describe
 from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.store.lease import Claim, Failure

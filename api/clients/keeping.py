@@ -7,7 +7,7 @@ import httpx2
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.errors import ServiceError
 from gaplab.api.clients.records import Record, Records, path_of
-from gaplab.schemas.keeping import DeletionRead
+from gaplab.schemas.editing import DeletionRead
 from gaplab.schemas.notifications import WebhookRead
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.views import Order, Shown, ViewRead

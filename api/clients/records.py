@@ -10,7 +10,7 @@ from gaplab.api.clients.errors import ServiceError
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import AttemptRead, ExperimentRead, Page, RepetitionRead, StudyRead
-from gaplab.schemas.submitted import SpecRead
+from gaplab.schemas.spec import SpecRead
 
 Record: TypeAlias = ExperimentRead | StudyRead
 

@@ -8,8 +8,8 @@ from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.frames import frame, pandas_library
 from gaplab.api.clients.results import Results
 from gaplab.schemas.curves import CurvePoint
-from gaplab.schemas.predictions import Prediction, Predictions
 from gaplab.schemas.records import ExperimentRead, Page, SampleRead, SensorsRead, SimulatorRead
+from gaplab.schemas.replays import Prediction, Predictions
 
 if TYPE_CHECKING:
     import pandas

@@ -13,7 +13,7 @@ from gaplab.api.commands.app import KEEPING, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.submission import submit_confirmed
-from gaplab.schemas.reruns import RepetitionRerun, RerunRead
+from gaplab.schemas.archives import RepetitionRerun, RerunRead
 from gaplab.services.core.errors import InvalidArchive
 
 COLORS = {"same": "green", "different": "bold red", "not computed": "yellow"}

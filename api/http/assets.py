@@ -1,6 +1,7 @@
 """Static files: compressed once, and not sent again to a browser that has them."""
 
 import gzip
+import re
 from functools import lru_cache
 from hashlib import blake2b
 from os import PathLike
@@ -73,3 +74,28 @@ def _version_of_now(folder: str) -> str:
 @lru_cache(maxsize=256)
 def _compressed(path: str, etag: str) -> bytes:  # noqa: ARG001 - the key of this version of the file
     return gzip.compress(Path(path).read_bytes(), compresslevel=9, mtime=0)
+
+
+_IMPORTED = re.compile(r'^(?:import|export)\s(?:[^"\';]*?\sfrom\s+)?"(\.{1,2}/[^"]+)"', re.MULTILINE)
+
+
+def modules_of(folder: Path, script: str) -> tuple[str, ...]:
+    """Return the paths of a script and of what it imports statically, directly or not.
+
+    A browser learns what a module imports only when it has the module, so each level of imports would wait for the
+    level above.
+
+    Args:
+        folder: folder of the scripts.
+        script: path in the folder, with slashes, as are those returned.
+    """
+    found: dict[str, None] = {}
+    waiting = [script]
+    while waiting:
+        path = waiting.pop(0)
+        if path not in found:
+            found[path] = None
+            file = folder / path
+            imported = _IMPORTED.findall(file.read_text(encoding="utf-8"))
+            waiting += [(file.parent / each).resolve().relative_to(folder.resolve()).as_posix() for each in imported]
+    return tuple(found)

@@ -9,8 +9,7 @@ from typing import Final
 from fastapi import FastAPI
 from fastapi.responses import HTMLResponse
 
-from gaplab.api.http.assets import Assets, version_of
-from gaplab.api.http.modules import modules_of
+from gaplab.api.http.assets import Assets, modules_of, version_of
 from gaplab.api.http.security_headers import page
 
 FILES: Final = Path(__file__).parents[1] / "dashboard"

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends
 from gaplab.api.http.dependencies import CallerDep, Id, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.access import Role
-from gaplab.schemas.keeping import DeletionRead, NotesRead
+from gaplab.schemas.editing import DeletionRead, NotesRead
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.services.experiments import archiving, deletion, notes
 from gaplab.services.experiments.deletion import Deleter

@@ -7,8 +7,7 @@ from pydantic import Field
 
 from gaplab.api.http.dependencies import DrawingProcessDep, Id, Parameters, RolloutProcessDep, StoreDep
 from gaplab.api.http.problems import documented
-from gaplab.schemas.predictions import Predictions
-from gaplab.schemas.replays import ControllerKind, Replay
+from gaplab.schemas.replays import ControllerKind, Predictions, Replay
 from gaplab.services.replay import predictions, replays
 from gaplab.services.replay.rollout import LAST, ReplayChoice
 from gaplab.services.replay.video import VideoFormat, replay_video

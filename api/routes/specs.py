@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query
 
 from gaplab.api.http.dependencies import CallerDep, Id, Revealing, StoreDep
 from gaplab.api.http.problems import Responses, documented
-from gaplab.schemas.submitted import SpecRead
+from gaplab.schemas.spec import SpecRead
 from gaplab.services.experiments import reading
 
 _experiment = APIRouter(prefix="/experiments/{id}", tags=["experiments"])

@@ -13,8 +13,8 @@ from multiprocessing import get_context
 from time import time
 from typing import IO, Any
 
+from gaplab.schemas.archives import RepetitionRerun, RerunRead
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.reruns import RepetitionRerun, RerunRead
 from gaplab.services.archives.reading import CheckedArchive, checked_archive
 from gaplab.services.archives.recomputing import Recorded, rerun, result_of
 from gaplab.services.core import robot_library

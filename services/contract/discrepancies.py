@@ -4,8 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from gaplab.services.contract.descriptions import is_described
-from gaplab.services.contract.repetition import check_repeats
+from gaplab.services.contract.promises import check_repeats, is_described
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Outcomes, frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 

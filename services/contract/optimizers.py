@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gaplab.services.contract.repetition import check_repeats
+from gaplab.services.contract.promises import check_repeats
 from gaplab.services.core.arrays import FloatArray, Genomes, frozen
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.search import Question, maximise

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from gaplab.services.contract import motions, ratings
-from gaplab.services.contract.repetition import check_repeats
+from gaplab.services.contract.promises import check_repeats
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Genomes, frozen
 from gaplab.services.core.motions import Loop
 from gaplab.services.core.robots.base import Robot

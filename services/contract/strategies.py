@@ -8,8 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from gaplab.services.contract.descriptions import is_described
-from gaplab.services.contract.repetition import check_repeats
+from gaplab.services.contract.promises import check_repeats, is_described
 from gaplab.services.core.arrays import (
     NO_READINGS,
     Fitnesses,

@@ -1,6 +1,6 @@
 """The contract of a task."""
 
-from gaplab.services.contract import descriptions, ratings
+from gaplab.services.contract import promises, ratings
 from gaplab.services.core.tasks.base import Task
 
 Plugin = type[Task]
@@ -8,7 +8,7 @@ Plugin = type[Task]
 
 def is_described(plugin: Plugin) -> None:
     """Has a unit, and a docstring of its own whose first line is a sentence."""
-    descriptions.is_described(plugin)
+    promises.is_described(plugin)
     assert getattr(plugin, "unit", ""), "it has no unit"
 
 

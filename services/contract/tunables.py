@@ -6,7 +6,7 @@ from dataclasses import asdict
 from math import isclose
 from typing import Any
 
-from gaplab.services.contract import descriptions
+from gaplab.services.contract import promises
 from gaplab.services.contract.controllers import arm
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.quadruped import Quadruped
@@ -95,7 +95,7 @@ def has_bounds_that_mean_something(plugin: Plugin) -> None:
 
 def is_described(plugin: Plugin) -> None:
     """Has a docstring of its own whose first line is a sentence, and the details of every tunable."""
-    descriptions.is_described(plugin)
+    promises.is_described(plugin)
     details = plugin.describe().details
     assert set(details) == DETAILS, f"its details are {sorted(details)}"
 

@@ -1,15 +1,16 @@
 """Faults of external plug-ins: why specs cannot use a class."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from gaplab.schemas.base import Frozen
+from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
 from gaplab.schemas.plugin import LONGEST_NAME
-from gaplab.services.core.plugin_options import option_violation
+from gaplab.services.core.errors import Violation, unknown_name
 from gaplab.services.core.unusable_plugins import quoted
 
 SETS_OF_OPTIONS = ("published", "lean")
@@ -86,3 +87,24 @@ def _create(plugin: type[Any], kind: str) -> None:
         plugin.example()
     elif kind != "engine":
         plugin(plugin.Options())
+
+
+def given_names(options: type[BaseModel]) -> list[str]:
+    """Return the names of the options, as specs have them."""
+    return [field.alias or name for name, field in options.model_fields.items()]
+
+
+def option_violation(name: str, options: type[BaseModel], error: Mapping[str, Any], pointer: str = "") -> Violation:
+    """Return the violation of an option that the model refuses.
+
+    Args:
+        name: the plug-in's name.
+        options: model of its options.
+        error: an item of `ValidationError.errors()`.
+        pointer: place of the options in the spec.
+    """
+    place = pointer_to(error["loc"])
+    if error["type"] == "extra_forbidden":
+        kind = f"option of {name!r}"
+        return unknown_name(pointer + place, kind, str(error["loc"][-1]), given_names(options) or ["none"])
+    return Violation(pointer + place, error["input"], sentence(error), permitted_by(error))

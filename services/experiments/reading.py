@@ -13,7 +13,7 @@ from gaplab.schemas.records import (
     SimulatorRead,
     StudyRead,
 )
-from gaplab.schemas.submitted import SpecRead
+from gaplab.schemas.spec import SpecRead
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
 from gaplab.services.specs.shortening import experiment_spec, study_spec

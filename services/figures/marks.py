@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gaplab.services.figures.axes import Axis as Axis
-from gaplab.services.figures.checks import Number as Number
-from gaplab.services.figures.checks import check_numbers
+from gaplab.services.figures.axes import Number as Number
+from gaplab.services.figures.axes import check_numbers
 from gaplab.services.figures.style import INK, Style
 
 Numbers = tuple[Number, ...]

@@ -6,7 +6,7 @@ from time import monotonic
 
 import numpy as np
 
-from gaplab.schemas.predictions import Prediction, Predictions
+from gaplab.schemas.replays import Prediction, Predictions
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess

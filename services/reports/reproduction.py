@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from gaplab.schemas.submitted import SpecRead
+from gaplab.schemas.spec import SpecRead
 from gaplab.services.reports.blocks import Block, Code, Paragraph
 from gaplab.services.reports.content import Facts
 from gaplab.services.specs.shortening import experiment_spec, study_spec

@@ -1,18 +1,19 @@
 """Comparisons of stored experiments, computed by the core."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.records import common_count
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.comparisons import Compared, compare_all
 from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.fitness import fitness_of
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments
-from gaplab.services.results.comparability import warnings
 from gaplab.services.results.curves import recorded_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
@@ -127,3 +128,38 @@ def _in_units(session: Session, rows: Sequence[ExperimentRow], margin: Margin) -
 
 def _direct(rows: Sequence[ExperimentRow]) -> list[ExperimentRow]:
     return [row for row in rows if is_direct(spec_of(row.spec))]
+
+
+def warnings(first: ExperimentRow, second: ExperimentRow, hidden: Set[str]) -> Iterator[str]:
+    """Yield why two experiments should not be compared: other robots, other tasks, or other realities.
+
+    Args:
+        first: an experiment.
+        second: another one.
+        hidden: ids of the experiments whose parameters of reality may not be shown yet.
+    """
+    one, other = spec_of(first.spec), spec_of(second.spec)
+    if one.robot != other.robot:
+        robots = _both(label_of(one.robot), label_of(other.robot))
+        yield f"different robots{robots}: their fitness does not mean the same"
+    elif one.task != other.task:
+        tasks = _both(one.task.name if one.task else "its own", other.task.name if other.task else "its own")
+        yield f"different tasks{tasks}: their fitness does not mean the same"
+    if first.study_id is not None and first.study_id == second.study_id:
+        return
+    if _setup(one) == _setup(other) and not hidden.isdisjoint((first.id, second.id)):
+        yield "realities are hidden until the experiments have ended, so they may be different"
+    elif _reality(one) != _reality(other):
+        yield "different realities: a difference may come from the reality, not from the strategy"
+
+
+def _both(first: str, second: str) -> str:
+    return f" ({first}; {second})" if first != second else ""
+
+
+def _setup(spec: ResolvedSpec) -> tuple[object, ...]:
+    return spec.reality.kind, spec.reality.engine, spec.reality.bench, sorted(spec.reality.parameters)
+
+
+def _reality(spec: ResolvedSpec) -> tuple[object, ...]:
+    return *_setup(spec), sorted(spec.reality.parameters.items())

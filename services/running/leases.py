@@ -7,9 +7,10 @@ answer, and drops the work. Work that was lost is queued again, and fails after 
 All use cases raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import timedelta
+from datetime import datetime, timedelta
+from time import monotonic
 from typing import Any, ClassVar, Generic, TypeVar
 
 from sqlalchemy import ColumnElement, false, func, select, tuple_, update
@@ -17,12 +18,40 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.services.experiments.states import move
-from gaplab.services.running.silences import Silences
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.lease import Lease
 from gaplab.services.store.models import LeasedRow
 from gaplab.services.store.session import Store
 from gaplab.services.store.statements import storable
+
+
+class Silences:
+    """The heartbeats that one supervisor has seen, and since when each has stayed the same.
+
+    A time in the database says too little about hardware: if somebody sets the database's clock, every lease seems to
+    have expired, and a second worker would move a robot that the first still moves. So a supervisor waits until a
+    heartbeat has not changed for a whole lease of its own monotonic clock.
+
+    Args:
+        clock: returns seconds, and is never set.
+    """
+
+    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
+        self._clock = clock
+        self._since: dict[int, tuple[datetime, float]] = {}
+
+    def longer_than(self, seconds: float, beats: Mapping[int, datetime]) -> dict[int, datetime]:
+        """Return the heartbeats that have stayed the same for longer than this.
+
+        Args:
+            seconds: of this process's clock.
+            beats: time of the last heartbeat by repetition; repetitions that are missing are forgotten.
+        """
+        present = self._clock()
+        unchanged = {id_: since for id_, since in self._since.items() if since[0] == beats.get(id_)}
+        self._since = {id_: unchanged.get(id_, (beat, present)) for id_, beat in beats.items()}
+        return {id_: beat for id_, (beat, since) in self._since.items() if present - since > seconds}
+
 
 STALE_AFTER_S = 30.0
 

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.schemas.submitted import SpecRead
+from gaplab.schemas.spec import ExperimentSpec, SpecRead, StudySpec
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples

@@ -8,8 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.api.http.assets import version_of
-from gaplab.api.http.modules import modules_of
+from gaplab.api.http.assets import modules_of, version_of
 from gaplab.api.routes.dashboard import FILES
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.plugins.catalogue import catalogue

@@ -27,8 +27,7 @@ from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, lifecycle, reading, submission
 from gaplab.services.running import execution, repetition_leases, sensitivity
 from gaplab.services.running.execution import Failure
-from gaplab.services.running.leases import MAX_LOSSES
-from gaplab.services.running.silences import Silences
+from gaplab.services.running.leases import MAX_LOSSES, Silences
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.clock import moment

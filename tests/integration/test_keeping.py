@@ -13,8 +13,8 @@ from sqlalchemy import func, select, update
 
 from gaplab.api.app import create_app
 from gaplab.schemas.access import Role
+from gaplab.schemas.editing import DeletionRead
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.keeping import DeletionRead
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec

@@ -15,9 +15,8 @@ from gaplab.api.app import create_app
 from gaplab.arithmetic import chosen, has_avx2
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import export_study
-from gaplab.services.archives.recomputing import Recorded, rerun
+from gaplab.services.archives.recomputing import Recorded, difference, rerun
 from gaplab.services.archives.rerunning import rerun_all, submitted_spec
-from gaplab.services.archives.step_differences import difference
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition

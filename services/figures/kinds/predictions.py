@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import dist, sqrt
 
-from gaplab.schemas.predictions import Prediction
+from gaplab.schemas.replays import Prediction
 from gaplab.services.figures.marks import Axis, Diagonal, FigureDefinition, Panel, Points, Table
 from gaplab.services.figures.style import INK, Style, style_of
 from gaplab.services.figures.words import drawable, heading, limits, number, number_of, printable, with_unit

@@ -1,7 +1,7 @@
-"""What the contracts of all kinds ask of repetition: a resumed repetition asks a new plug-in, and gets the same."""
+"""What the contracts of all kinds ask: a description, and that a new plug-in answers as one that was used."""
 
 from collections.abc import Callable, Mapping
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -28,3 +28,10 @@ def check_repeats(make: Callable[[], P], questions: Mapping[str, Callable[[P], F
     for name, ask in [*questions.items(), *questions.items()]:
         same = np.array_equal(ask(used), answers[name], equal_nan=True)
         assert same, f"{name} differs when it is asked again: {advice}"
+
+
+def is_described(plugin: type[Any]) -> None:
+    """Has a docstring of its own, whose first line is a sentence."""
+    assert (plugin.__doc__ or "").strip(), "it has no docstring of its own; say in a sentence what it does"
+    summary = plugin.describe().summary
+    assert summary.endswith("."), f"its summary in the catalogue is {summary!r}; end it with a full stop"
