@@ -4,7 +4,7 @@ from sqlalchemy import select
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.store.models import ExperimentRow
-from gaplab.services.store.queries import supervisors
+from gaplab.services.store.queries import totals
 from gaplab.services.store.session import Session, snapshot
 
 RECENTLY_S = 600.0
@@ -22,7 +22,7 @@ def warnings(session: Session, silent_s: float) -> tuple[str, ...]:
         session: of any transaction.
         silent_s: seconds without a heartbeat after which a supervisor counts as lost.
     """
-    ages = supervisors.ages(session)
+    ages = totals.ages(session)
     found = []
     if ages and min(ages) > silent_s:
         found.append(

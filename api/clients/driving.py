@@ -10,9 +10,8 @@ from typing import Any
 
 from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.deliveries import PAUSE_S, Deliveries, log
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
-from gaplab.api.clients.journal import Journal
+from gaplab.api.clients.journal import PAUSE_S, Deliveries, Journal, log
 from gaplab.api.clients.motions import DriverMotion, motion_of
 from gaplab.api.clients.records import Records
 from gaplab.schemas.measurements import AnswerRead, RequestRead, RequestState

@@ -12,8 +12,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import StoreUnavailable
-from gaplab.services.results import totals
-from gaplab.services.results.totals import Totals
+from gaplab.services.store.queries.totals import Totals, totals
 from gaplab.services.store.session import Store
 
 CACHED_S = 5.0
@@ -127,6 +126,7 @@ class _StoreCollector(Collector):
 
     def _read(self) -> Totals | None:
         try:
-            return totals.read(self._store)
+            with self._store.reading() as session:
+                return totals(session)
         except StoreUnavailable:
             return None

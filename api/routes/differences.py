@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from gaplab.api.http.dependencies import Id, Parameters, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.differences import SpecDiff
-from gaplab.services.experiments.differences import read_differences
+from gaplab.services.experiments.reading import read_differences
 
 router = APIRouter(tags=["curves"])
 

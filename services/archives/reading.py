@@ -22,8 +22,7 @@ from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.measurements import RequestState
 from gaplab.services.archives.checking import Row
 from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, columns_of
-from gaplab.services.archives.consistency import check_attachments, check_row, checked_experiments
-from gaplab.services.archives.logs import check_logs
+from gaplab.services.archives.consistency import check_attachments, check_logs, check_row, checked_experiments
 from gaplab.services.archives.opening import OpenedArchive, ParquetConverter, convert_apart, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.core.stored_specs import spec_of

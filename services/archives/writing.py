@@ -18,7 +18,7 @@ from gaplab.services.archives.columns import EXPORTED, columns_of
 from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, Row, file_member_of, member_of, write
 from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
-from gaplab.services.results.zip_entries import entry_of
+from gaplab.services.results.files import entry_of
 from gaplab.services.specs.shortening import experiment_spec, study_spec
 from gaplab.services.store.models import REVISION, ExperimentRow
 from gaplab.services.store.queries import archives, attachments, experiments

@@ -15,7 +15,7 @@ from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts
-from gaplab.services.store.queries import costs, supervisors
+from gaplab.services.store.queries import costs, totals
 from gaplab.services.store.session import Session, Store
 
 LATEST = 100
@@ -44,7 +44,7 @@ def estimate(
     check_extent(resolved, limits)
     with store.reading() as session:
         measured = _measured(costs.latest(session, LATEST))
-        working = sum(age < SILENT_S for age in supervisors.ages(session))
+        working = sum(age < SILENT_S for age in totals.ages(session))
     found = tuple(_experiment(each, _cost(each, measured)) for each in resolved)
     total = sum(each.core_seconds for each in found)
     shared = min(cores, len(resolved) * (spec.max_parallel or cores))

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.records import (
     AttemptRead,
     ExperimentRead,
@@ -16,12 +17,13 @@ from gaplab.schemas.records import (
 from gaplab.schemas.spec import SpecRead
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
+from gaplab.services.specs.differences import SpecColumn, differences
 from gaplab.services.specs.shortening import experiment_spec, study_spec
 from gaplab.services.store.cursor import next_cursor
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import attempts, results
 from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, repetitions_of
-from gaplab.services.store.session import Session, snapshot
+from gaplab.services.store.session import Session, Store, snapshot
 from gaplab.services.store.stored_specs import without_truth
 
 
@@ -137,3 +139,23 @@ def list_attempts(session: Session, experiment_id: str, repetition: int) -> tupl
     """
     secret = bool(hidden(session, [get_experiment(session, experiment_id)]))
     return attempts.attempts_of(session, experiment_id, repetition, secret=secret)
+
+
+def read_differences(store: Store, studies: Sequence[str], experiments: Sequence[str]) -> SpecDiff:
+    """Return the settings that differ between studies and experiments, or within a single study.
+
+    Raises:
+        NotFound: one of them does not exist.
+        InvalidSpec: there is only one experiment to compare.
+    """
+    loaded = [read_study(store, id) for id in studies]
+    columns = [
+        SpecColumn(study.id, study.name, tuple(experiment.spec for experiment in study.experiments)) for study in loaded
+    ]
+    if len(loaded) == 1 and not experiments:
+        columns = [_column(experiment) for experiment in loaded[0].experiments]
+    return differences([*columns, *(_column(read_experiment(store, id)) for id in experiments)])
+
+
+def _column(experiment: ExperimentRead) -> SpecColumn:
+    return SpecColumn(experiment.id, experiment.name, (experiment.spec,))

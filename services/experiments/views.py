@@ -13,8 +13,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.fitness import best_of, fitness_of
 from gaplab.services.experiments.hiding import hidden
-from gaplab.services.experiments.progress import caveat_of, mean_best, progress_of, study_caveat_of
-from gaplab.services.experiments.time_left import Span
+from gaplab.services.experiments.progress import Span, caveat_of, mean_best, progress_of, study_caveat_of
 from gaplab.services.plugins.refusals import tells_unavailable
 from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.robots import sensors

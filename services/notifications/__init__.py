@@ -1,5 +1,5 @@
 """Notifications: who asked to be told that work has ended is told, by a webhook or a command of the service's owner.
 
-`outbox` finds what has ended in the events and keeps what is left to send, `messages` has the words, `delivery` sends,
+`outbox` finds what has ended in the events and keeps what is left to send, with its words; `delivery` sends,
 and `courier` does all of it in the background of the API. A message is delivered at least once, and has an id.
 """

@@ -11,8 +11,8 @@ from datetime import datetime, timedelta
 from sqlalchemy import func, select
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.notifications import Channel, Notification
-from gaplab.services.notifications import messages
+from gaplab.schemas.notifications import Channel, EndedExperiment, Notification
+from gaplab.services.experiments.views import state_of
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import (
     DeletionRow,
@@ -143,13 +143,13 @@ def _of_end(
         if not experiment.state.ended or not _is_last_end(session, event, [experiment.id]):
             return
         told = [*(channels if experiment.study_id is None else ()), *([Channel.OWN] if experiment.webhook else [])]
-        message = messages.of_experiment(event, experiment)
+        message = _of_experiment(event, experiment)
         yield from (_row(event, message, channel, present) for channel in told)
     of = experiment or deleted
     study = session.get(StudyRow, of.study_id) if of and of.study_id else None
     if study is not None and _ended_with(session, event, study):
         told = [*channels, *([Channel.OWN] if study.webhook else [])]
-        message = messages.of_study(session, event, study)
+        message = _of_study(session, event, study)
         yield from (_row(event, message, channel, present) for channel in told)
 
 
@@ -177,3 +177,35 @@ def _row(event: EventRow, message: Notification, channel: Channel, present: date
         message=message.model_dump(mode="json"),
         next_at=present,
     )
+
+
+def _of_experiment(event: EventRow, row: ExperimentRow) -> Notification:
+    return Notification(
+        id=f"{event.number}-{row.id}",
+        kind="experiment",
+        subject=row.id,
+        name=row.name,
+        state=row.state,
+        text=f"The experiment {row.name} is {row.state}.",
+        experiments=(EndedExperiment(id=row.id, name=row.name, state=row.state),),
+        ended_at=event.at,
+    )
+
+
+def _of_study(session: Session, event: EventRow, row: StudyRow) -> Notification:
+    experiments = experiments_of(session, [row.id])
+    state = state_of([experiment.state for experiment in experiments])
+    return Notification(
+        id=f"{event.number}-{row.id}",
+        kind="study",
+        subject=row.id,
+        name=row.name,
+        state=state,
+        text=f"The study {row.name} is {state}: {_counted([each.state.value for each in experiments])}.",
+        experiments=tuple(EndedExperiment(id=each.id, name=each.name, state=each.state) for each in experiments),
+        ended_at=event.at,
+    )
+
+
+def _counted(states: list[str]) -> str:
+    return ", ".join(f"{states.count(state)} {state}" for state in sorted(set(states)))

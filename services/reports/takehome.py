@@ -16,7 +16,7 @@ from gaplab.services.reports.html import render_html
 from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
 from gaplab.services.reports.outcome_page import outcome_report, verdict_sentences
 from gaplab.services.reports.reproduction import spec_text, submitted
-from gaplab.services.results.zip_entries import entry_of
+from gaplab.services.results.files import entry_of
 from gaplab.services.store.session import Store
 
 MOTIONS: dict[motions.MotionFormat, str] = {"csv": "motion.csv", "json": "motion.json", "ros2": "motion.ros2.yaml"}

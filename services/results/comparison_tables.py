@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from gaplab.schemas.comparison_columns import COLUMNS, UNPAIRED, row, shown_tests
 from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
-from gaplab.services.results.texts import cell
+from gaplab.services.results.files import cell
 
 NAMES = {
     "student": "Student",

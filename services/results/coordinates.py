@@ -7,7 +7,7 @@ from gaplab.schemas.records import ExperimentRead
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.experiments import reading
-from gaplab.services.experiments.differences import read_differences
+from gaplab.services.experiments.reading import read_differences
 from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_figure
 from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import distinct_names, printable, spoken, with_unit

@@ -10,7 +10,7 @@ from gaplab.schemas.curves import Curve
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import best_of_searches, curve_points
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.results.texts import cell
+from gaplab.services.results.files import cell
 from gaplab.services.specs.resolution import is_direct
 from gaplab.services.specs.robots import unit
 from gaplab.services.store.models import ExperimentRow

@@ -25,7 +25,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_experiment, export_study, import_archive
 from gaplab.services.archives import reading as importing
 from gaplab.services.archives.columns import EXPORTED
-from gaplab.services.archives.logs import check_logs
+from gaplab.services.archives.consistency import check_logs
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.loop import repetition

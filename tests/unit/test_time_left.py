@@ -7,7 +7,7 @@ import pytest
 
 from gaplab.api.clients.progress.text import span
 from gaplab.schemas.records import TimeLeft
-from gaplab.services.experiments.time_left import busy_s, interval
+from gaplab.services.experiments.progress import busy_s, interval
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 

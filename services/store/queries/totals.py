@@ -6,8 +6,18 @@ from sqlalchemy import case, func, select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
-from gaplab.services.store.models import ExperimentRow, RepetitionRow
-from gaplab.services.store.queries.supervisors import ages
+from gaplab.services.store.clock import moment
+from gaplab.services.store.models import ExperimentRow, RepetitionRow, SupervisorRow
+
+
+def ages(session: Session) -> tuple[float, ...]:
+    """Return the seconds since each supervisor's last heartbeat, without those that shut down in order.
+
+    A heartbeat from the future was sent before the clock was set back. It counts as old as it is far away.
+    """
+    present = moment(session)
+    beats = session.scalars(select(SupervisorRow.heartbeat_at))
+    return tuple(abs((present - beat).total_seconds()) for beat in beats)
 
 
 @dataclass(frozen=True)
