@@ -6,7 +6,7 @@ import httpx2
 
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.errors import ServiceError
-from gaplab.api.clients.records import Record, Records, path_of
+from gaplab.api.clients.records import Records, path_of
 from gaplab.schemas.editing import DeletionRead
 from gaplab.schemas.notifications import WebhookRead
 from gaplab.schemas.records import ExperimentRead, StudyRead
@@ -30,11 +30,11 @@ class Keeping:
 
     def archive(self, id: str) -> ExperimentRead | StudyRead:
         """Leave a study or an experiment that has ended out of lists, and return it."""
-        return self._apply(id, "archive")
+        return self._records.apply(id, "archive")
 
     def unarchive(self, id: str) -> ExperimentRead | StudyRead:
         """List an archived study or experiment again, and return it."""
-        return self._apply(id, "unarchive")
+        return self._records.apply(id, "unarchive")
 
     def delete(self, id: str) -> DeletionRead:
         """Delete a study or an experiment that has ended, with its results, for good; twice is the same as once."""
@@ -75,10 +75,6 @@ class Keeping:
     def delete_view(self, name: str) -> ViewRead:
         """Delete a saved view, and return it."""
         return self._connection.change(ViewRead, "DELETE", _path(name))
-
-    def _apply(self, id: str, verb: str) -> Record:
-        record = self._records.find(id)
-        return self._connection.change(type(record), "POST", f"{path_of(record)}/{verb}")
 
 
 def _path(view: str) -> str:

@@ -1,7 +1,7 @@
 """Requests that change the state or the size of experiments and studies."""
 
 from gaplab.api.clients.connection import CONFIRMED, Connection, segment
-from gaplab.api.clients.records import Record, Records, path_of
+from gaplab.api.clients.records import Records
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
 
@@ -15,23 +15,23 @@ class LifeCycle:
 
     def pause(self, id: str) -> ExperimentRead | StudyRead:
         """Pause a study or an experiment once its current steps end."""
-        return self._apply(id, Verb.PAUSE)
+        return self._records.apply(id, Verb.PAUSE)
 
     def resume(self, id: str) -> ExperimentRead | StudyRead:
         """Continue a paused study or experiment."""
-        return self._apply(id, Verb.RESUME)
+        return self._records.apply(id, Verb.RESUME)
 
     def stop(self, id: str) -> ExperimentRead | StudyRead:
         """Complete a study or an experiment with its results so far, once its current steps end."""
-        return self._apply(id, Verb.STOP)
+        return self._records.apply(id, Verb.STOP)
 
     def cancel(self, id: str) -> ExperimentRead | StudyRead:
         """Cancel a study or an experiment at once."""
-        return self._apply(id, Verb.CANCEL)
+        return self._records.apply(id, Verb.CANCEL)
 
     def retry(self, id: str) -> ExperimentRead | StudyRead:
         """Queue the FAILED repetitions of a study or an experiment once more, from their stored steps."""
-        return self._apply(id, Verb.RETRY)
+        return self._records.apply(id, Verb.RETRY)
 
     def extend(
         self, id: str, *, iterations: int | None = None, repetitions: int | None = None, yes: bool = False
@@ -46,7 +46,7 @@ class LifeCycle:
         """
         totals = {"iterations": iterations, "repetitions": repetitions}
         given = {name: total for name, total in totals.items() if total is not None}
-        return self._apply(id, Verb.EXTEND, given, CONFIRMED if yes else "")
+        return self._records.apply(id, Verb.EXTEND, given, CONFIRMED if yes else "")
 
     def schedule(self, id: str, **changes: int | None) -> ExperimentRead:
         """Change the `priority` or `max_parallel` of an experiment."""
@@ -55,7 +55,3 @@ class LifeCycle:
     def accept_versions(self, id: str) -> ExperimentRead:
         """Let an experiment continue under other versions of engines or plug-ins than it started with."""
         return self._connection.change(ExperimentRead, "POST", f"/experiments/{segment(id)}/accept-versions")
-
-    def _apply(self, id: str, verb: Verb, body: dict[str, int] | None = None, query: str = "") -> Record:
-        record = self._records.find(id)
-        return self._connection.change(type(record), "POST", f"{path_of(record)}/{verb}{query}", json=body)

@@ -89,6 +89,11 @@ class Records:
         headers = {"If-Match": "*"}
         return self._connection.change(type(record), "PATCH", path_of(record), json=body, headers=headers)
 
+    def apply(self, id: str, verb: str, body: Mapping[str, int] | None = None, query: str = "") -> Record:
+        """Send a verb to a study or an experiment, and return it."""
+        record = self.find(id)
+        return self._connection.change(type(record), "POST", f"{path_of(record)}/{verb}{query}", json=body)
+
     def reveal(self, id: str) -> ExperimentRead:
         """Return an experiment with reality's parameters, even before it ends; needs the token of an admin."""
         return self._connection.get(ExperimentRead, f"/experiments/{segment(id)}", reveal="true")

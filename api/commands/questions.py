@@ -41,12 +41,7 @@ def confirmed(doubts: Sequence[str]) -> bool:
     with keyboard() as ask:
         if not doubts or ask is None:
             return False
-        try:
-            answer = ask("Send it all the same? [y/N] ")
-        except (KeyboardInterrupt, EOFError):
-            answer = ""
-        if not is_yes(answer):
-            raise CommandError("nothing was sent", Exit.INTERRUPTED)
+        _demand(ask, "Send it all the same?", "nothing was sent")
         return True
 
 
@@ -59,9 +54,13 @@ def demand_yes(what: str) -> None:
     with keyboard() as ask:
         if ask is None:
             raise CommandError(f"to delete {what} for good without a terminal, add --yes", Exit.USAGE)
-        try:
-            answer = ask(f"Delete {what} for good? [y/N] ")
-        except (KeyboardInterrupt, EOFError):
-            answer = ""
-        if not is_yes(answer):
-            raise CommandError("nothing was deleted", Exit.INTERRUPTED)
+        _demand(ask, f"Delete {what} for good?", "nothing was deleted")
+
+
+def _demand(ask: Ask, question: str, otherwise: str) -> None:
+    try:
+        answer = ask(f"{question} [y/N] ")
+    except (KeyboardInterrupt, EOFError):
+        answer = ""
+    if not is_yes(answer):
+        raise CommandError(otherwise, Exit.INTERRUPTED)
