@@ -3,17 +3,19 @@
 import json
 import logging
 from collections.abc import Mapping, Sequence
+from html import escape
 from http import HTTPStatus
+from string import Template
 from typing import Any
 from uuid import uuid4
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import Response
+from fastapi.responses import HTMLResponse, Response
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
-from gaplab.api.http.lost import asks_for_a_page, lost
+from gaplab.api.http.security_headers import page
 from gaplab.api.http.violations import MOST_ERRORS, explain, finite, without_consequences
 from gaplab.schemas.problems import Problem, SpecError
 from gaplab.services.core.errors import (
@@ -208,3 +210,37 @@ def _of_bug(request: Request, error: Exception) -> Response:
         kind, title, cause = "plugin-failed", "A plug-in failed", f": {raised(error)}"
     detail = f"{title}{cause}; the log of the service has the details under incident {incident}."
     return response(problem(500, kind, title, detail))
+
+
+_PAGE = Template("""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>$title · gaplab</title>
+<style>body { font: 1rem/1.5 system-ui, sans-serif; max-width: 40rem; margin: 4rem auto; padding: 0 1rem; }</style>
+</head>
+<body>
+<main>
+<h1>$title</h1>
+<p>$detail</p>
+<p><a href="$root/">To the experiments</a> · <a href="$root/docs">The addresses of the API</a></p>
+</main>
+</body>
+</html>
+""")
+
+
+def asks_for_a_page(request: Request) -> bool:
+    """Return whether a browser wants to show the answer as a page."""
+    return request.method == "GET" and "text/html" in request.headers.get("accept", "")
+
+
+def lost(request: Request, problem: Problem) -> HTMLResponse:
+    """Return the problem as a page with ways out of it."""
+    root = escape(request.scope.get("root_path", ""))
+    html = _PAGE.substitute(title=escape(problem.title), detail=escape(problem.detail), root=root)
+    answer = page(html)
+    answer.status_code = problem.status
+    return answer

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gaplab.services.contract.motions import check_targets, numbers
-from gaplab.services.contract.promises import is_described
+from gaplab.services.contract.promises import check_targets, is_described, numbers
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.controllers.base import Controller
 from gaplab.services.core.motions import Loop

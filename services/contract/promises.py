@@ -1,11 +1,15 @@
-"""What the contracts of all kinds ask: a description, and that a new plug-in answers as one that was used."""
+"""What the contracts of several kinds ask: a description, repeated answers, motions, and ratings of them."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.arrays import FloatArray, Genome, Genomes, frozen
+from gaplab.services.core.motions import Loop, Motion, Trajectory
+from gaplab.services.core.observations import names
+from gaplab.services.core.sensors import Sensors
+from gaplab.services.core.world import World
 
 P = TypeVar("P")
 
@@ -35,3 +39,161 @@ def is_described(plugin: type[Any]) -> None:
     assert (plugin.__doc__ or "").strip(), "it has no docstring of its own; say in a sentence what it does"
     summary = plugin.describe().summary
     assert summary.endswith("."), f"its summary in the catalogue is {summary!r}; end it with a full stop"
+
+
+CALLS = 12
+"""Calls of `act` whose numbers are compared."""
+
+
+class Moves(Protocol):
+    """A controller or a robot."""
+
+    def motion(self, genome: Genome) -> Motion | Loop:
+        """Return the motion that the genome `(g,)` describes."""
+        ...
+
+
+def check_targets(motion: Motion, actuators: int) -> None:
+    """Check that a motion has finite targets for each actuator, at times that ascend from 0.
+
+    Raises:
+        AssertionError: it has not.
+    """
+    expected = (len(motion.times_s), actuators)
+    assert np.shape(motion.targets) == expected, f"targets have the shape {np.shape(motion.targets)}, not {expected}"
+    assert np.isfinite(motion.targets).all(), "targets are not finite"
+    assert motion.times_s[0] == 0.0, f"times_s begin at {motion.times_s[0]}, not at 0"
+    assert np.all(np.diff(motion.times_s) > 0), "times_s do not ascend"
+
+
+def numbers(mover: Moves, world: World, genomes: Genomes) -> FloatArray:
+    """Return the numbers of each genome, `(k, n, ...)`: targets; of a loop also memories, of a few calls.
+
+    Raises:
+        AssertionError: `act` returns targets or memories of another shape.
+    """
+    loops = [mover.motion(genome) for genome in genomes]
+    if not isinstance(loops[0], Loop):
+        return np.array([[each.targets for each in loops if not isinstance(each, Loop)]])
+    first = loops[0]
+    count = len(names(world, first.senses))
+    memories = np.array([each.memory for each in loops if isinstance(each, Loop)])
+    found = []
+    for tick in range(CALLS):
+        observations = np.array([_seen(genome, tick, count) for genome in genomes])
+        targets, memories = first.act(genomes, observations, memories, tick * first.period_s)
+        expected = (len(genomes), len(world.actuators))
+        assert np.shape(targets) == expected, f"act returned targets of shape {np.shape(targets)}, not {expected}"
+        assert np.shape(memories) == (len(genomes), len(first.memory)), f"act returned {np.shape(memories)} as memories"
+        found.append(np.hstack([targets, memories]))
+    return np.array(found)
+
+
+def _seen(genome: Genome, tick: int, count: int) -> FloatArray:
+    """Return some observations `(count,)` that belong to a genome and a call."""
+    return np.random.default_rng([tick, *np.frombuffer(genome.tobytes(), dtype=np.uint32)]).normal(size=count)
+
+
+LATE_S = 1e-9
+"""Rounding by which the last reading may be later than the end of a rollout."""
+
+
+class Rates(Protocol):
+    """A task or a robot."""
+
+    @property
+    def sensors(self) -> Sensors:
+        """Return its sensors."""
+        ...
+
+    def fitness(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(...)`: the fitness of each trajectory."""
+        ...
+
+    def sense(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(..., r, s)`: what the sensors say."""
+        ...
+
+
+def check_times(observe_s: FloatArray, sensors: Sensors) -> None:
+    """Check that a rollout is observed at times that ascend, the last of them above 0, and is sensed within them.
+
+    Raises:
+        AssertionError: it is not, or times are no arrays of float64.
+    """
+    _check_seconds("observe_s", observe_s)
+    _check_seconds("sensors.times_s", sensors.times_s)
+    assert len(observe_s), "observe_s is empty"
+    assert observe_s[-1] > 0, f"observe_s ends at {observe_s[-1]}; a rollout lasts longer than 0 s"
+    read, end_s = sensors.times_s, observe_s[-1]
+    within = not len(read) or read[-1] <= end_s + LATE_S
+    assert within, f"its sensors are read at {read.tolist()}, but a rollout ends at {end_s} s"
+
+
+def _check_seconds(name: str, times_s: FloatArray) -> None:
+    """Check that times are an array of float64 that ascends from 0 or later."""
+    example = "an array of float64, in seconds, such as np.array([0.0, 2.0])"
+    found = f"an array of {times_s.dtype}" if isinstance(times_s, np.ndarray) else f"a {type(times_s).__name__}"
+    assert found == "an array of float64", f"{name} is {found}; it must be {example}"
+    assert times_s.ndim == 1, f"{name} has the shape {times_s.shape}; it must be {example}"
+    assert np.isfinite(times_s).all(), f"{name} is not finite: {times_s.tolist()}"
+    assert not len(times_s) or times_s[0] >= 0, f"{name} begins at {times_s[0]} s, before the rollout"
+    assert np.all(np.diff(times_s) > 0), f"{name} does not ascend: {times_s.tolist()}"
+
+
+def check_rates_many(rates: Rates, observe_s: FloatArray) -> None:
+    """Check that the fitness of many trajectories at once is that of each.
+
+    Raises:
+        AssertionError: it is not.
+    """
+    many = trajectories(observe_s)
+    together = np.asarray(rates.fitness(many))
+    one_by_one = [[float(rates.fitness(_one(many, row, column))) for column in range(5)] for row in range(4)]
+    assert together.shape == (4, 5), f"its fitness of (4, 5) trajectories has the shape {together.shape}"
+    assert np.allclose(together, one_by_one), "its fitness of many trajectories differs from that of each"
+
+
+def check_failed_physics(rates: Rates, observe_s: FloatArray) -> None:
+    """Check that the fitness of a trajectory of nan is nan.
+
+    Raises:
+        AssertionError: it is not.
+    """
+    count = len(observe_s)
+    nothing = Trajectory(frozen(observe_s), frozen(np.full((count, 3), np.nan)), frozen(np.full((count, 4), np.nan)))
+    fitness = float(rates.fitness(nothing))
+    assert np.isnan(fitness), f"its fitness of a trajectory of nan is {fitness}"
+
+
+def check_sensors(rates: Rates) -> None:
+    """Check that each sensor has a unit and a noise, and is read at each of its times, many trajectories as each.
+
+    Raises:
+        AssertionError: it has not, or is not.
+    """
+    sensors = rates.sensors
+    noises = np.asarray(sensors.noises)
+    assert len(sensors.units) == len(noises) == len(sensors.names), "its sensors lack units or noises"
+    assert np.all(noises > 0), f"noises must be above 0, and are {noises.tolist()}"
+    periods = np.asarray(sensors.periods)
+    assert len(periods) in {0, len(noises)}, "its sensors lack periods"
+    assert np.all(periods >= 0), f"periods must be 0 or above, and are {periods.tolist()}"
+    many = trajectories(sensors.times_s)
+    values = np.asarray(rates.sense(many))
+    expected = (4, 5, len(sensors.times_s), len(sensors.names))
+    assert values.shape == expected, f"its readings have the shape {values.shape}, not {expected}"
+    assert np.allclose(values[2, 3], rates.sense(_one(many, 2, 3))), "its readings of many differ from those of each"
+
+
+def trajectories(times_s: FloatArray) -> Trajectory:
+    """Return `(4, 5)` trajectories at times `(t,)`, read-only."""
+    rng = np.random.default_rng(0)
+    positions_m = rng.normal(size=(4, 5, len(times_s), 3))
+    turns = rng.normal(size=(4, 5, len(times_s), 4))
+    orientations = turns / np.linalg.norm(turns, axis=-1, keepdims=True)
+    return Trajectory(frozen(times_s), frozen(positions_m), frozen(orientations))
+
+
+def _one(many: Trajectory, row: int, column: int) -> Trajectory:
+    return Trajectory(many.times_s, many.positions_m[row, column], many.orientations[row, column])

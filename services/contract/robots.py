@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from gaplab.services.contract import motions, ratings
+from gaplab.services.contract import promises
 from gaplab.services.contract.promises import check_repeats
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Genomes, frozen
 from gaplab.services.core.motions import Loop
@@ -38,10 +38,10 @@ def drives_every_actuator(plugin: Plugin) -> None:
         motion = robot.motion(genome)
         assert np.array_equal(motion.observe_s, observe_s), "observe_s differs between genomes"
         if isinstance(motion, Loop):
-            finite = np.isfinite(motions.numbers(robot, robot.world, genome[None])).all()
+            finite = np.isfinite(promises.numbers(robot, robot.world, genome[None])).all()
             assert finite, "targets or memories are not finite"
         else:
-            motions.check_targets(motion, len(robot.world.actuators) or 1)
+            promises.check_targets(motion, len(robot.world.actuators) or 1)
 
 
 def repeats_itself(plugin: Plugin) -> None:
@@ -57,19 +57,19 @@ def repeats_itself(plugin: Plugin) -> None:
 def observes_at_times_that_ascend(plugin: Plugin) -> None:
     """Observes at times that ascend, in arrays of float64, the last of them above 0; its sensors are read within."""
     robot = plugin.example()
-    ratings.check_times(_observe_s(robot), robot.sensors)
+    promises.check_times(_observe_s(robot), robot.sensors)
 
 
 def rates_many_trajectories_as_each(plugin: Plugin) -> None:
     """Returns for many trajectories at once the fitness of each."""
     robot = plugin.example()
-    ratings.check_rates_many(robot, _observe_s(robot))
+    promises.check_rates_many(robot, _observe_s(robot))
 
 
 def has_no_fitness_of_failed_physics(plugin: Plugin) -> None:
     """Returns nan for a trajectory of nan."""
     robot = plugin.example()
-    ratings.check_failed_physics(robot, _observe_s(robot))
+    promises.check_failed_physics(robot, _observe_s(robot))
 
 
 def reads_its_sensors(plugin: Plugin) -> None:
@@ -78,7 +78,7 @@ def reads_its_sensors(plugin: Plugin) -> None:
     if robot.sensors.size:
         can = plugin.sense is not Robot.sense or hasattr(robot, "_task")
         assert can, "it has sensors, but neither a task nor a `sense` that reads them"
-        ratings.check_sensors(robot)
+        promises.check_sensors(robot)
 
 
 def _genomes(robot: Robot) -> Genomes:
@@ -95,7 +95,7 @@ def _moved(robot: Robot, genome: Genome) -> FloatArray:
     """Return all numbers of a motion as one vector: times of observation, then times and targets, or those of calls."""
     motion = robot.motion(genome)
     times_s = NO_READINGS if isinstance(motion, Loop) else motion.times_s
-    found = motions.numbers(robot, robot.world, genome[None])
+    found = promises.numbers(robot, robot.world, genome[None])
     return np.concatenate([np.ravel(each) for each in (motion.observe_s, times_s, found)])
 
 

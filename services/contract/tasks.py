@@ -1,6 +1,6 @@
 """The contract of a task."""
 
-from gaplab.services.contract import promises, ratings
+from gaplab.services.contract import promises
 from gaplab.services.core.tasks.base import Task
 
 Plugin = type[Task]
@@ -15,19 +15,19 @@ def is_described(plugin: Plugin) -> None:
 def observes_at_times_that_ascend(plugin: Plugin) -> None:
     """Observes at times that ascend, in arrays of float64, the last of them above 0; its sensors are read within."""
     task = plugin()
-    ratings.check_times(task.observe_s, task.sensors)
+    promises.check_times(task.observe_s, task.sensors)
 
 
 def rates_many_trajectories_as_each(plugin: Plugin) -> None:
     """Returns for many trajectories at once the fitness of each."""
     task = plugin()
-    ratings.check_rates_many(task, task.observe_s)
+    promises.check_rates_many(task, task.observe_s)
 
 
 def has_no_fitness_of_failed_physics(plugin: Plugin) -> None:
     """Returns nan for a trajectory of nan."""
     task = plugin()
-    ratings.check_failed_physics(task, task.observe_s)
+    promises.check_failed_physics(task, task.observe_s)
 
 
 def reads_its_sensors(plugin: Plugin) -> None:
@@ -35,7 +35,7 @@ def reads_its_sensors(plugin: Plugin) -> None:
     task = plugin()
     if task.sensors.size:
         assert plugin.sense is not Task.sense, "it has sensors, but no `sense` that reads them"
-        ratings.check_sensors(task)
+        promises.check_sensors(task)
 
 
 CHECKS = (

@@ -15,7 +15,7 @@ from gaplab.services.store.atomic_files import PRIVATE, replacing
 from gaplab.services.store.backup import copy_checked
 from gaplab.services.store.engine import parse
 from gaplab.services.store.models import REVISION
-from gaplab.services.store.revisions import is_later
+from gaplab.services.store.models.base import is_later
 from gaplab.services.store.sqlite_file import COMPANIONS, file_of, unused
 
 PG_RESTORE = (

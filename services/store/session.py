@@ -19,8 +19,8 @@ from gaplab.services.store import database_errors
 from gaplab.services.store.engine import HASTENS, WRITES, open_engine
 from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION, Base
+from gaplab.services.store.models.base import other_schema
 from gaplab.services.store.queries import events, robots
-from gaplab.services.store.revisions import other_schema
 from gaplab.services.store.sqlite_file import create, file_of
 
 P = ParamSpec("P")

@@ -1,5 +1,6 @@
-"""The base of all tables."""
+"""The base of all tables, and their revision."""
 
+from collections.abc import Sequence
 from datetime import datetime
 from enum import StrEnum
 from typing import Any, ClassVar
@@ -78,3 +79,14 @@ class Base(DeclarativeBase):
         RequestState: _words(RequestState, "state"),
         AnswerState: _words(AnswerState, "state"),
     }
+
+
+def is_later(found: Sequence[str]) -> bool:
+    """Return whether a database at these revisions is of a later version of gaplab."""
+    return bool(found) and all(revision > REVISION for revision in found)
+
+
+def other_schema(found: Sequence[str]) -> str:
+    """Return the sentence about a database at other revisions than this version's, with what to do."""
+    what = "use the version of gaplab that it is of" if is_later(found) else "run `python -m migrations`"
+    return f"the database is at revision {', '.join(found) or 'none'}, this version needs {REVISION}: {what}"
