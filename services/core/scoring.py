@@ -117,11 +117,6 @@ def weights_of(simulators: Sequence[Simulator], floor: float) -> FloatArray:
     return simulator_weights(np.array([each.squared_error for each in simulators]), floor)
 
 
-def effective_size(weights: FloatArray) -> float:
-    """Return the number of equal weights that would be as concentrated as these weights `(m,)`: (Σw)²/Σw²."""
-    return float(weights.sum() ** 2 / (weights**2).sum())
-
-
 def _weighty(fitnesses: Fitnesses, weights: FloatArray) -> Fitnesses:
     """Return the fitnesses, with 0 for simulators of weight 0, because 0 times nan would be nan."""
     return fitnesses if np.all(weights > 0) else np.where(weights > 0, fitnesses, 0.0)

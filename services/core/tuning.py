@@ -7,7 +7,7 @@ import numpy as np
 
 from gaplab.services.core import repeats
 from gaplab.services.core.answers import Answers, Following, nothing
-from gaplab.services.core.arrays import NO_READINGS, Fitnesses, FloatArray, Genomes, Outcomes, Parameters, frozen
+from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
@@ -55,18 +55,6 @@ def sound(simulator: Simulator, space: Space, source: str) -> Simulator:
         )
     except (TypeError, ValueError) as error:
         raise PluginBroken(f"{source} returned a simulator whose error, interval or weight is no number") from error
-
-
-def squared_errors(fitnesses: Fitnesses, measured: FloatArray) -> FloatArray:
-    """Return Σ (f_sim − f_real)² over samples for each simulator, `(m,)`; inf where the physics failed on one.
-
-    Source: paper, section 2: the denominator of f(sim).
-
-    Args:
-        fitnesses: `(n, m)` of n samples in m simulators.
-        measured: `(n,)` fitnesses in reality.
-    """
-    return summed((fitnesses - measured[:, None]) ** 2)
 
 
 class Misfit:

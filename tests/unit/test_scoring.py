@@ -6,7 +6,6 @@ import pytest
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.scoring import (
     NO_FLOOR,
-    effective_size,
     scaled_uniqueness_penalty,
     simulator_weights,
     uniqueness_penalty,
@@ -102,11 +101,6 @@ def test_the_floor_is_a_share_of_the_scale_or_the_noise_of_readings(
 def test_without_a_floor_a_perfect_simulator_takes_all_the_weight() -> None:
     np.testing.assert_allclose(simulator_weights(np.array([0.0, 1e-6, np.inf]), NO_FLOOR), [1.0, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(simulator_weights(np.zeros(4), NO_FLOOR), np.full(4, 0.25))
-
-
-def test_the_effective_size_is_that_of_equal_weights() -> None:
-    assert effective_size(np.full(20, 0.05)) == pytest.approx(20)
-    assert effective_size(np.array([2.0, 2.0, 0.0, 0.0])) == pytest.approx(2)
 
 
 def test_weights_are_the_simulators_fitnesses_normalised() -> None:
