@@ -23,7 +23,6 @@ from gaplab.api.clients.errors import ServiceError
 from gaplab.api.clients.progress.text import counts
 from gaplab.api.commands import demo_size, tables
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.findings import findings
 from gaplab.api.process.local_service import start_service
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
@@ -114,8 +113,8 @@ def _show(name: str, study: StudyRead, client: Client, folder: Path, console: Co
     curves = client.curves([study.id])
     console.print(f"\nFitness in reality ({curves[0].unit}), mean±SD, by number of real-world evaluations")
     console.print(tables.curves(curves), *tables.baselines(curves))
-    for line in findings(client, curves):
-        console.print(escape(line))
+    for sentence in client.verdict(study.id).sentences:
+        console.print(escape(sentence))
     for suffix in ("html", "svg"):
         client.figure(study.id).save(folder / f"{name}.{suffix}")
     _print(f"Figure: {folder / name}.html and .svg", console)
