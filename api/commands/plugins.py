@@ -13,7 +13,7 @@ from gaplab.api.commands.exit_codes import Exit
 from gaplab.api.commands.json_output import print_json, print_result
 
 if TYPE_CHECKING:
-    from gaplab.services.contract.files import CheckedPlugin
+    from gaplab.services.contract.checks import CheckedPlugin
 
 Kind = Literal["strategy", "robot", "controller", "task", "engine", "tunable", "optimizer", "discrepancy", "tuner"]
 
@@ -32,7 +32,7 @@ def new(
     as_json: AsJson = False,
 ) -> None:
     """Write a plug-in that runs, to change into your own."""
-    from gaplab.services.contract.files import write_skeleton
+    from gaplab.services.contract.checks import write_skeleton
     from gaplab.services.core.external_plugins import named_folders
     from gaplab.services.plugins import folders
 
@@ -50,7 +50,7 @@ def check(
     as_json: AsJson = False,
 ) -> None:
     """Check whether the plug-ins in a file keep the contract of their kind."""
-    from gaplab.services.contract.files import check_file
+    from gaplab.services.contract.checks import check_file
     from gaplab.services.plugins import folders
 
     folders.find()

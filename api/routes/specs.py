@@ -21,13 +21,13 @@ _RESPONSES: Responses = documented(404, 422)
 @_study.get("/spec", summary="Read a study's spec", response_description=_AGAIN, responses=_RESPONSES)
 def read_study_spec(id: Id, store: StoreDep, caller: CallerDep, query: RevealingQuery) -> SpecRead:
     """Return the shortest spec that gives the same study, and the complete spec of each experiment."""
-    return reading.read_study_spec(store, id, reveal=query.permitted(caller))
+    return reading.read_spec(store, "study", id, reveal=query.permitted(caller))
 
 
 @_experiment.get("/spec", summary="Read an experiment's spec", response_description=_AGAIN, responses=_RESPONSES)
 def read_experiment_spec(id: Id, store: StoreDep, caller: CallerDep, query: RevealingQuery) -> SpecRead:
     """Return the shortest spec that gives the same experiment, and the complete one."""
-    return reading.read_experiment_spec(store, id, reveal=query.permitted(caller))
+    return reading.read_spec(store, "experiment", id, reveal=query.permitted(caller))
 
 
 router = APIRouter()

@@ -1,8 +1,11 @@
-"""Checks of plug-ins, by kind, and their results."""
+"""Checks of plug-ins by kind, their results for a file, and skeletons to begin with."""
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.resources import files
 from inspect import getdoc
+from keyword import iskeyword
 from pathlib import Path
 from traceback import walk_tb
 from typing import Any
@@ -18,6 +21,10 @@ from gaplab.services.contract import (
     tunables,
     tuners,
 )
+from gaplab.services.core import external_plugins
+from gaplab.services.core.errors import GaplabError
+from gaplab.services.plugins.external import REGISTRIES
+from gaplab.services.plugins.ignored import NO_CLASS, why_no_plugin
 
 Check = Callable[[type[Any]], None]
 
@@ -73,3 +80,119 @@ def _reason(error: BaseException) -> str:
     told = f"{type(error).__name__}: {message} ({Path(frame.f_code.co_filename).name}, line {line})"
     changes = isinstance(error, ValueError) and "read-only" in message
     return f"{told}: it changes an array that it was given; change a copy" if changes else told
+
+
+KINDS = tuple(CHECKS)
+
+_IMPORT = re.compile(r"^(?:from \S+ )?import (.+)$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class CheckedPlugin:
+    """A plug-in that was checked.
+
+    Attributes:
+        kind: its kind.
+        name: its name in specs.
+        results: the result of each check; empty if it cannot be used.
+        unusable: why it cannot be used; None if it can.
+    """
+
+    kind: str
+    name: str
+    results: tuple[Result, ...] = ()
+    unusable: str | None = None
+
+    @property
+    def passes(self) -> bool:
+        """Whether the plug-in keeps the whole contract."""
+        return self.unusable is None and all(result.reason is None for result in self.results)
+
+
+def write_skeleton(kind: str, name: str, folder: Path) -> Path:
+    """Write a plug-in that runs into a new file of a folder, and return the file.
+
+    Args:
+        kind: one of `KINDS`.
+        name: name in specs, and of the file.
+        folder: is created if absent.
+
+    Raises:
+        GaplabError: the name is not permitted, or the kind has a plug-in of this name.
+        FileExistsError: the file exists.
+    """
+    _check_name(kind, name)
+    file = folder / f"{name}.py"
+    if file.exists():
+        raise FileExistsError(17, "the file exists; choose another name or folder", str(file))
+    if name in REGISTRIES[kind]:
+        raise GaplabError(f"there is a {kind} called {name!r} already; choose another name")
+    template = files("gaplab.services.contract").joinpath("skeletons", f"{kind}.txt").read_text("utf-8")
+    class_name = _class_name(name)
+    if class_name in re.findall(r"\w+", " ".join(_IMPORT.findall(template))):
+        class_name += kind.capitalize()
+    folder.mkdir(parents=True, exist_ok=True)
+    with file.open("x", encoding="utf-8") as target:
+        target.write(template.replace("{class}", class_name).replace("{name}", name))
+    return file
+
+
+def _check_name(kind: str, name: str) -> None:
+    """Refuse a name that no module can have, or whose class no module can have."""
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or iskeyword(name):
+        raise GaplabError(f"{name!r} cannot be the name of a plug-in; use small letters, digits and _, like my_{kind}")
+    if iskeyword(class_name := _class_name(name)):
+        why = f"its class would be {class_name}, a word of Python"
+        raise GaplabError(f"{name!r} cannot be the name of a plug-in, since {why}; use another, like my_{kind}")
+
+
+def _class_name(name: str) -> str:
+    return "".join(part.capitalize() for part in name.split("_"))
+
+
+def check_file(file: Path) -> Iterator[CheckedPlugin]:
+    """Import a file, and yield each of its plug-ins, checked.
+
+    The file can import others of its folder and of the plug-in folders. Outside the plug-in folders, no other file is
+    imported.
+
+    Args:
+        file: a module, or the folder of a package, or its `__init__.py`.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        GaplabError: it has no plug-in; the message says why.
+    """
+    if not file.exists():
+        raise FileNotFoundError(2, "there is no such file", str(file))
+    path = file.absolute().parent if file.name == "__init__.py" else file.absolute()
+    module = f"{path.name}/" if path.is_dir() else path.name
+    others = external_plugins.folders()
+    if path.parent in others:
+        external_plugins.set_folders(others)
+    else:
+        external_plugins.set_folders((path.parent, *others), only=path.name.removesuffix(".py"))
+    found = False
+    for kind, registry in REGISTRIES.items():
+        own = [plugin for plugin in registry.values() if (external_plugins.file_of(plugin) or "").startswith(module)]
+        for plugin in own:
+            found = True
+            yield CheckedPlugin(kind, plugin.name, tuple(results(kind, plugin)))
+    for name, refused_kind, why in _unusable(module):
+        found = True
+        yield CheckedPlugin(refused_kind or "plug-in", name, unusable=why)
+    if not found:
+        raise GaplabError(f"{file} has no plug-in; {_needed(path)}")
+
+
+def _needed(path: Path) -> str:
+    """Return what a file without a plug-in lacks."""
+    if (why := why_no_plugin(path)) != NO_CLASS:
+        return why
+    return f"it needs a class of one of {', '.join(kind.capitalize() for kind in KINDS)} from gaplab.plugins"
+
+
+def _unusable(module: str) -> list[tuple[str, str | None, str]]:
+    """Return name, kind and reason of each plug-in of a file that cannot be used, once."""
+    all_ = [each for registry in REGISTRIES.values() for each in registry.refused if each.file.startswith(module)]
+    return list({(each.name, each.why): (each.name, each.kind, each.why) for each in all_}.values())

@@ -20,9 +20,16 @@ from gaplab.services.experiments.views import view_experiments, view_repetition,
 from gaplab.services.specs.differences import SpecColumn, differences
 from gaplab.services.specs.shortening import experiment_spec, study_spec
 from gaplab.services.store.cursor import next_cursor
-from gaplab.services.store.models import ExperimentRow
+from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import attempts, results
-from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, repetitions_of
+from gaplab.services.store.queries.experiments import (
+    Noun,
+    experiments_of,
+    get,
+    get_experiment,
+    get_study,
+    repetitions_of,
+)
 from gaplab.services.store.session import Session, Store, snapshot
 from gaplab.services.store.stored_specs import without_truth
 
@@ -48,24 +55,16 @@ def read_study(session: Session, study_id: str, *, reveal: bool = False) -> Stud
 
 
 @snapshot
-def read_experiment_spec(session: Session, experiment_id: str, *, reveal: bool = False) -> SpecRead:
-    """Return the spec of an experiment; `reveal` includes hidden parameters of reality.
+def read_spec(session: Session, noun: Noun, id_: str, *, reveal: bool = False) -> SpecRead:
+    """Return the spec of an experiment or a study; `reveal` includes hidden parameters of reality.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: there is none with this id.
     """
-    return experiment_spec(*_shown_specs(session, [get_experiment(session, experiment_id)], reveal=reveal))
-
-
-@snapshot
-def read_study_spec(session: Session, study_id: str, *, reveal: bool = False) -> SpecRead:
-    """Return the spec of a study; `reveal` includes hidden parameters of reality.
-
-    Raises:
-        NotFound: no such study.
-    """
-    study = get_study(session, study_id)
-    return study_spec(study.name, _shown_specs(session, experiments_of(session, [study.id]), reveal=reveal))
+    row = get(session, noun, id_)
+    if isinstance(row, StudyRow):
+        return study_spec(row.name, _shown_specs(session, experiments_of(session, [row.id]), reveal=reveal))
+    return experiment_spec(*_shown_specs(session, [row], reveal=reveal))
 
 
 def _shown_specs(session: Session, rows: Sequence[ExperimentRow], *, reveal: bool) -> list[dict[str, Any]]:

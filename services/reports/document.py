@@ -5,7 +5,7 @@ from gaplab.services.core.comparisons import POOLED
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number_of, spoken
-from gaplab.services.reports import compared, simulator_tables, tables
+from gaplab.services.reports import compared, tables
 from gaplab.services.reports.blocks import Block, Bullets, Drawing, Paragraph, Report, Section
 from gaplab.services.reports.content import Facts, Subject, facts_of
 from gaplab.services.reports.reproduction import reproduction
@@ -80,8 +80,8 @@ def _simulators(store: Store, facts: Facts) -> tuple[Block, ...]:
     )
     error = squared_error_figure(tuned.errors, tuned.error, samples=tuned.samples, title=leading.name)
     return (
-        *simulator_tables.misfit(facts),
-        *simulator_tables.identified(facts),
+        *tables.misfit(facts),
+        *tables.identified(facts),
         *([Bullets(remarks)] if remarks else []),
         Drawing(error),
         Drawing(simulator_coordinates(store, leading.curve.experiment, title=leading.name)),

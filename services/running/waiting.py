@@ -1,10 +1,10 @@
-"""Repetitions that wait for a physical measurement, and the steps that its answer adds to their logs."""
+"""Repetitions that wait for a physical measurement, the steps that its answer adds, and refusals of some of them."""
 
 from collections.abc import Mapping
 
-from sqlalchemy.orm import Session
-
+from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.measurements import AnswerState, RequestState
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.history import History
@@ -13,14 +13,18 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.types import Measured, Sample, Step
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.running.leases import Change
-from gaplab.services.running.refusals import refuse
 from gaplab.services.running.repetition_leases import RepetitionLeases
 from gaplab.services.specs.measured import outcome_of, samples_of
 from gaplab.services.specs.robots import robot_of
+from gaplab.services.store.clock import moment
 from gaplab.services.store.lease import Claim, Requested, TimedStep
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests, steps
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.experiments import new_id
 from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Session
+from gaplab.services.store.statements import storable
 
 _LEASES = RepetitionLeases()
 
@@ -68,3 +72,52 @@ def step_of(session: Session, experiment: ExperimentRow, request: RequestRow, an
         if step.iteration <= request.iteration:
             history = history.after(step)
     return probe_of(history, request.iteration, *outcome, repeats)
+
+
+OPERATOR = "gaplab"
+"""Operator of an answer that no person and no driver gave."""
+
+
+def refuse(session: Session, claim: Claim, request: RequestRow) -> AnswerRow | None:
+    """Answer a request as failed if its forecast exceeds the limits and the spec says to refuse that.
+
+    The controller then counts as tried, and teaches nothing. A person who voids the answer overrules it: the controller
+    is offered, and never refused in this repetition again.
+
+    Args:
+        session: session of a transaction that writes.
+        claim: claim of the repetition that asked.
+        request: request, which no answer counts for.
+
+    Returns:
+        The answer; None if the controller is to be offered.
+    """
+    beyond = (request.safety or {}).get("beyond", ())
+    if claim.spec.reality.beyond != "refuse" or not beyond or _overruled(session, request):
+        return None
+    reason = f"not offered: the simulators expect that {'; '.join(beyond)}"
+    refused = AnswerRow(
+        id=new_id(),
+        repetition_id=request.repetition_id,
+        request_id=request.id,
+        take=None,
+        state=AnswerState.COUNTED,
+        values=None,
+        failed=storable(reason[:2_000]),
+        operator=OPERATOR,
+        at=moment(session),
+    )
+    session.add(refused)
+    request.state, request.ended_at = RequestState.FAILED, moment(session)
+    session.flush()
+    body = {"iteration": request.iteration, "request": request.id, "reason": reason}
+    note(session, EventKind.REFUSED, claim.experiment_id, claim.number, **body)
+    return refused
+
+
+def _overruled(session: Session, request: RequestRow) -> bool:
+    """Return whether a person has voided a refusal of the same controller in the repetition, or answered it."""
+    asked = requests.requests_of(session, request.repetition_id)
+    same = [row.id for row in asked if row.genome == request.genome]
+    answers = requests.answers_of(session, same).values()
+    return any(answer.state is not AnswerState.COUNTED for given in answers for answer in given)

@@ -25,9 +25,9 @@ from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-from gaplab.services.specs.bench_violations import bench_violations
 from gaplab.services.specs.blame import refusing_specs
 from gaplab.services.specs.default_engines import default_engine, runs
+from gaplab.services.specs.measured import bench_violations
 from gaplab.services.specs.presets import PRESETS, Preset, preset_options, with_preset
 from gaplab.services.specs.realities import completed, physical_reality, simulated_reality
 from gaplab.services.specs.robots import robot_of

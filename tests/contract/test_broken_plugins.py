@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.contract.checks import CHECKS, results
-from gaplab.services.contract.files import check_file
+from gaplab.services.contract.checks import CHECKS, check_file, results
 from gaplab.services.core import external_plugins
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness

@@ -10,8 +10,7 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract import checks
-from gaplab.services.contract.checks import CHECKS, Check, results
-from gaplab.services.contract.files import check_file, write_skeleton
+from gaplab.services.contract.checks import CHECKS, Check, check_file, results, write_skeleton
 from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.tuners.search import SearchTuner
