@@ -11,7 +11,7 @@ from gaplab.services.experiments.query.fields import Condition, Field, field_of
 from gaplab.services.experiments.query.parsing import Every, Not, Some, Term, Tree, Value, Words, parse, refusal
 from gaplab.services.store.cursor import Column
 from gaplab.services.store.models import ExperimentRow, StudyRow
-from gaplab.services.store.queries.fitness import best_of_all, points_of_all
+from gaplab.services.store.queries.results import best_of_all, points_of_all
 from gaplab.services.store.texts import storable
 
 Fields = Mapping[str, Field]
