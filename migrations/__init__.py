@@ -11,7 +11,7 @@ from sqlalchemy import Connection, text
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.store import database_errors
 from gaplab.services.store.engine import WRITES, open_engine
-from gaplab.services.store.revisions import is_later, other_schema
+from gaplab.services.store.models.base import is_later, other_schema
 from gaplab.services.store.sqlite_file import file_of, refuse_damaged
 
 _LOCK = 0x6761706C6162

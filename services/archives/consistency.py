@@ -24,7 +24,8 @@ from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.core.types import Probed
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.store.models import RepetitionRow
-from gaplab.services.store.queries import attachments, attempts, experiments, logs, provenance
+from gaplab.services.store.queries import attachments, attempts, logs, provenance
+from gaplab.services.store.queries.experiments import get_experiments, repetitions_of
 from gaplab.services.store.queries.step_rows import position
 from gaplab.services.store.session import Session
 from gaplab.services.store.texts import pack_tags, unpack_tags
@@ -180,8 +181,8 @@ def check_logs(session: Session, ids: Iterable[str]) -> None:
     Raises:
         InvalidArchive: the message names the first of them.
     """
-    for experiment in experiments.get_experiments(session, list(ids)):
-        rows, expected = experiments.repetitions_of(session, experiment.id), experiment.spec["repetitions"]
+    for experiment in get_experiments(session, list(ids)):
+        rows, expected = repetitions_of(session, experiment.id), experiment.spec["repetitions"]
         if [row.number for row in rows] != list(range(expected)):
             raise InvalidArchive(f"experiment {experiment.id!r} has {len(rows)} of its {expected} repetitions")
         latest = attempts.latest(session, experiment.id)
