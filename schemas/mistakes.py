@@ -1,11 +1,13 @@
-"""Mistakes that pydantic finds, in plain words: the place, what is permitted there, and the value."""
+"""Errors of the API; and mistakes that pydantic finds, in words: the place, what is permitted there, and the value."""
 
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from gaplab.schemas.base import TAG_PATTERN
+from pydantic import Field
+
+from gaplab.schemas.base import TAG_PATTERN, Frozen
 
 LONGEST_VALUE = 60
 """Most characters of a value in a sentence."""
@@ -117,3 +119,27 @@ def _not(error: Mapping[str, Any]) -> str:
     except (ValueError, RecursionError):
         return ""
     return f", not {value if len(value) <= LONGEST_VALUE else f'{value[:LONGEST_VALUE]}…'}"
+
+
+class SpecError(Frozen):
+    """One error in a request."""
+
+    pointer: str = Field(
+        description="JSON pointer into the body, or the name of a query or path parameter", examples=["/robot"]
+    )
+    value: Any = Field(default=None, description="the offending value, as sent")
+    message: str = Field(
+        examples=["unknown robot 'quadrupet' (did you mean 'quadruped'?); permitted: quadruped, toy_function"]
+    )
+    permitted: tuple[str, ...] | str | None = None
+    nearest: str | None = None
+
+
+class Problem(Frozen):
+    """The reason why a request failed, sent as `application/problem+json`."""
+
+    type: str = Field(examples=["urn:gaplab:problem:not-found"])
+    title: str = Field(examples=["Not found"])
+    status: int = Field(examples=[404])
+    detail: str = Field(examples=["there is nothing with the id 'x'"])
+    errors: tuple[SpecError, ...] = ()

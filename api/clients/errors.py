@@ -5,7 +5,7 @@ from typing import Self
 import httpx2
 from pydantic import ValidationError
 
-from gaplab.schemas.problems import Problem
+from gaplab.schemas.mistakes import Problem
 from gaplab.schemas.records import ExperimentRead, StudyRead
 
 

@@ -10,7 +10,7 @@ from gaplab.api.http.access import OPEN
 from gaplab.api.http.assets import Assets
 from gaplab.api.http.problems import documented
 from gaplab.api.http.security_headers import page
-from gaplab.schemas.problems import Problem
+from gaplab.schemas.mistakes import Problem
 
 ASSETS = "/assets/docs"
 ABOUT_TOKENS = "created by `gaplab token create`; on loopback none is needed until the first exists"

@@ -17,7 +17,7 @@ from starlette.requests import ClientDisconnect
 
 from gaplab.api.http.security_headers import page
 from gaplab.api.http.violations import MOST_ERRORS, explain, finite, without_consequences
-from gaplab.schemas.problems import Problem, SpecError
+from gaplab.schemas.mistakes import Problem, SpecError
 from gaplab.services.core.errors import (
     Changed,
     ConditionMissing,

@@ -10,8 +10,7 @@ from typing import Any, Union, get_args, get_origin
 from fastapi import Request
 from pydantic import BaseModel
 
-from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
-from gaplab.schemas.problems import SpecError
+from gaplab.schemas.mistakes import SpecError, permitted_by, pointer_to, sentence
 from gaplab.services.core.errors import Violation
 
 MOST_ERRORS = 50

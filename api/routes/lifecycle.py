@@ -6,9 +6,8 @@ from fastapi import APIRouter, Body, Query
 
 from gaplab.api.http.dependencies import Confirmation, Id, LimitedDep, StoreDep
 from gaplab.api.http.problems import documented
-from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.lifecycle import ExtensionSpec, ScheduleChange, Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
-from gaplab.schemas.schedule import ExtensionSpec, ScheduleChange
 from gaplab.services.experiments import extension, lifecycle
 
 _experiment = APIRouter(prefix="/experiments/{id}", tags=["experiments"])

@@ -15,8 +15,7 @@ from types import CodeType, ModuleType
 from typing import TypeGuard, TypeVar
 
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.plugin_faults import fault_of
-from gaplab.services.core.unusable_plugins import Unusable, from_file, quoted, remedied
+from gaplab.services.core.plugin_faults import Unusable, fault_of, from_file, quoted, remedied
 
 
 class _Uncached(SourceFileLoader):

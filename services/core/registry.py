@@ -14,8 +14,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRead, PluginRef
 from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, unknown_name
-from gaplab.services.core.plugin_faults import option_violation
-from gaplab.services.core.unusable_plugins import Unusable, quoted, remedied
+from gaplab.services.core.plugin_faults import Unusable, option_violation, quoted, remedied
 
 
 class NoOptions(Frozen):

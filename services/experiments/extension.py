@@ -6,10 +6,9 @@ Each function is one transaction, and raises StoreUnavailable while the database
 from collections.abc import Iterator, Sequence
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import State, Verb
+from gaplab.schemas.lifecycle import ExtensionSpec, State, Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.estimates import check_cost

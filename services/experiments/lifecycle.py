@@ -9,9 +9,8 @@ from collections.abc import Callable
 from sqlalchemy import update
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import PERMITTED, Ending, State, Verb
+from gaplab.schemas.lifecycle import PERMITTED, Ending, ScheduleChange, State, Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
-from gaplab.schemas.schedule import ScheduleChange
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.checks import cancel_unneeded

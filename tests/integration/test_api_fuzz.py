@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from gaplab.api.app import create_app
 from gaplab.migrations import upgrade
-from gaplab.schemas.problems import Problem
+from gaplab.schemas.mistakes import Problem
 from gaplab.services.store.session import Store
 from tests.mutated_specs import EXPERIMENT, places
 

@@ -19,8 +19,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import insert
 
-from gaplab.schemas.lifecycle import Ending, State, Verb
-from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.schemas.lifecycle import Ending, ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_experiment, export_study, import_archive
 from gaplab.services.archives import reading as importing

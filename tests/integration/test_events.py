@@ -31,10 +31,9 @@ from gaplab.schemas.access import Role
 from gaplab.schemas.corrections import ConflictSpec, CorrectionSpec, VoidSpec
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.events import EventKind, EventPage, EventRead
-from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.lifecycle import ExtensionSpec, Verb
 from gaplab.schemas.measurements import HolderSpec, TakeSpec
 from gaplab.schemas.notifications import Channel
-from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services import access, archives, events
 from gaplab.services.bench import corrections, taking
 from gaplab.services.bench.taking import RequestFilter

@@ -15,8 +15,7 @@ from gaplab.api.app import create_app
 from gaplab.schemas.access import Role
 from gaplab.schemas.editing import DeletionRead
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import State, Verb
-from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.schemas.lifecycle import ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.schemas.views import ViewSpec
 from gaplab.services import access, events

@@ -10,8 +10,8 @@ from rich.console import Console
 
 from gaplab.api.app import create_app
 from gaplab.api.commands import tables
+from gaplab.schemas.lifecycle import ExtensionSpec
 from gaplab.schemas.records import common_count
-from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_study, import_archive
 from gaplab.services.core.errors import InvalidSpec

@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from gaplab.schemas.lifecycle import PERMITTED, Ending, State, Verb
-from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.schemas.lifecycle import PERMITTED, Ending, ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition

@@ -15,8 +15,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule, run_state_machine_as_test
 
-from gaplab.schemas.lifecycle import ENDS, MOVES, PERMITTED, Ending, State, Verb
-from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.schemas.lifecycle import ENDS, MOVES, PERMITTED, Ending, ExtensionSpec, State, Verb
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec
 from gaplab.services.core.loop import repetition

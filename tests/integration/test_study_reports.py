@@ -12,8 +12,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.schemas.lifecycle import Verb
-from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.schemas.lifecycle import ExtensionSpec, Verb
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.types import Probed
 from gaplab.services.experiments import extension, lifecycle, listing, reading, submission

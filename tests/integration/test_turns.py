@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from gaplab.schemas.schedule import ScheduleChange
+from gaplab.schemas.lifecycle import ScheduleChange
 from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.running import execution, turns
 from gaplab.services.running.versions import provenance as present_provenance
