@@ -11,8 +11,8 @@ from gaplab.api.clients.errors import ExperimentFailed, ExtraMissing, ServiceErr
 # the order of the commands in `gaplab --help`, and of its groups
 # isort: off
 from gaplab.api.commands import service, submission, events, records, keeping, differences, figures  # noqa: F401
-from gaplab.api.commands import reports, replays, tuned, comparisons, life_cycle, bench, driving  # noqa: F401
-from gaplab.api.commands import archives, reruns, catalogue, plugins, robots, tokens, help  # noqa: A004, F401
+from gaplab.api.commands import reports, tuned, comparisons, life_cycle, bench, driving  # noqa: F401
+from gaplab.api.commands import archives, plugins, robots, tokens, help  # noqa: A004, F401
 
 # isort: on
 from gaplab.api.commands.app import app as app

@@ -1,14 +1,17 @@
-"""The commands that write reports, and what one takes home from a bench."""
+"""The commands that write reports and replays, and what one takes home from a bench."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from gaplab.api.clients.replays import FORMATS as VIDEOS
 from gaplab.api.clients.reports import FORMATS
-from gaplab.api.commands.app import BENCH, RESULTS, AsJson, Id, Url, app, connect
+from gaplab.api.commands.app import BENCH, RESULTS, AsJson, ExperimentId, Id, Url, app, connect
 from gaplab.api.commands.comparisons import MarginOption, margins
+from gaplab.api.commands.figures import named_option
 from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.schemas.replays import ReplayWorld
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -58,3 +61,45 @@ def takehome(
         written = client.take_home(id, file)
     document = {"file": str(written), "bytes": written.stat().st_size}
     print_result(document, f"Wrote {written}.", as_json=as_json)
+
+
+@app.command(rich_help_panel=RESULTS)
+def replay(
+    id: ExperimentId,
+    save: Annotated[
+        Path | None, typer.Option("--save", "-o", help=f"file; its suffix is the format: {', '.join(VIDEOS)}")
+    ] = None,
+    options: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            "-s",
+            metavar="NAME=VALUE",
+            help="repetition, iteration (left out: the last), kind (transfer or sample), simulator; repeatable",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Replay a controller in its simulator and in reality, and save it as a video."""
+    if save and save.suffix.removeprefix(".").lower() not in VIDEOS:
+        raise typer.BadParameter(
+            f"{save} has no suffix of a video; permitted: {', '.join(VIDEOS)}", param_hint="--save"
+        )
+    with connect(url) as client:
+        choice = dict(map(named_option, options or []))
+        found = client.replay(id, **choice)
+        file = client.video(id, save, **choice) if save else None
+    if as_json:
+        print_json(found)
+    else:
+        for name, world in (("in its simulator", found.simulation), ("in reality", found.reality)):
+            typer.echo(f"{name}: {_told(world, found.unit)}")
+    if file:
+        typer.echo(f"Wrote {file}.", err=as_json)
+
+
+def _told(world: ReplayWorld | None, unit: str) -> str:
+    if world is None:
+        return "not shown"
+    return "the physics failed" if world.fitness is None else f"{world.fitness:.3f} {unit}, {world.engine}"
