@@ -22,7 +22,6 @@ from gaplab.api.routes import (
     corrections,
     curves,
     dashboard,
-    differences,
     estimates,
     events,
     experiments,
@@ -30,7 +29,6 @@ from gaplab.api.routes import (
     health,
     keeping,
     lifecycle,
-    metrics,
     provenance,
     replay_figures,
     replays,
@@ -90,7 +88,6 @@ MODULES = (
     events,
     curves,
     comparisons,
-    differences,
     figures,
     replay_figures,
     reports,
@@ -100,12 +97,11 @@ MODULES = (
     catalogue,
     robots,
     health,
-    metrics,
 )
 """The modules of the API, in the order of the documentation."""
 
 
-WITHOUT_PLUGINS = (views, webhooks, events, health, metrics)
+WITHOUT_PLUGINS = (views, webhooks, events, health)
 """The modules whose answers do not depend on plug-ins; before others answer, edited plug-ins are imported again."""
 
 

@@ -12,7 +12,7 @@ from gaplab.services.core.errors import Conflict, StoreUnavailable
 from gaplab.services.running import execution
 from gaplab.services.running.leases import Silences
 from gaplab.services.specs.blame import describe
-from gaplab.services.specs.hardware import hardware_of
+from gaplab.services.specs.rollouts import hardware_of
 from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store
 from gaplab.workers import task

@@ -1,17 +1,19 @@
-"""Statistical comparisons of experiments, as JSON, CSV or LaTeX."""
+"""Statistical comparisons of experiments, as JSON, CSV or LaTeX; and the settings in which they differ."""
 
 from dataclasses import replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from gaplab.api.http.attachments import attachment
-from gaplab.api.http.dependencies import Parameters, StoreDep
+from gaplab.api.http.dependencies import Id, Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.routes.curves import Ids
 from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.differences import SpecDiff
 from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.experiments.reading import read_differences
 from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex
 from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.results.curves import unit_of
@@ -107,3 +109,34 @@ def compare_experiments(
         unit = unit_of(store, query.experiment[0])
         return attachment(comparisons_latex(pairs, unit), "application/x-latex", "gaplab-comparisons.tex")
     return pairs
+
+
+class DifferencesQuery(Parameters):
+    """The studies and experiments whose settings to compare."""
+
+    experiment: list[Id] = Field(default=[], max_length=100, description="id of an experiment; repeat for more")
+    study: list[Id] = Field(
+        default=[],
+        max_length=20,
+        description="id of a study, which is one column; a single study alone is compared experiment by experiment",
+    )
+
+    @model_validator(mode="after")
+    def _something_is_compared(self) -> "DifferencesQuery":
+        if not self.experiment and not self.study:
+            raise ValueError("name what to compare, as in ?experiment=…&experiment=… or ?study=…&study=…")
+        return self
+
+
+@router.get(
+    "/differences",
+    summary="Compare settings",
+    response_description="The settings that differ",
+    responses=documented(404, 422),
+)
+def read_spec_differences(store: StoreDep, query: Annotated[DifferencesQuery, Query()]) -> SpecDiff:
+    """Return the settings of the resolved specs that differ: studies first, then experiments, one column each.
+
+    Tunables are compared by name. Parameters of reality are compared once they may be shown.
+    """
+    return read_differences(store, list(dict.fromkeys(query.study)), list(dict.fromkeys(query.experiment)))

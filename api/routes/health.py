@@ -1,12 +1,13 @@
-"""Health checks, for whatever keeps the service alive."""
+"""Health checks and metrics, for whatever keeps the service alive and watches it."""
 
 from typing import Literal
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Request, Response
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import Field
 
 from gaplab.api.http.dependencies import StoreDep
-from gaplab.api.http.problems import documented
+from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.base import Frozen
 from gaplab.services import health
 from gaplab.services.core.errors import SupervisorUnavailable
@@ -59,3 +60,19 @@ def ready(store: StoreDep, request: Request) -> Health:
     if kept and kept.warning:
         found = (kept.warning, *found)
     return Health(status="degraded" if found else "ok", warnings=found)
+
+
+_EXAMPLE = '# TYPE gaplab_repetitions gauge\ngaplab_repetitions{state="RUNNING"} 2.0\n'
+_TEXT: Responses = {200: {"content": {"text/plain": {"schema": {"type": "string"}, "example": _EXAMPLE}}}}
+
+
+@router.get(
+    "/metrics",
+    summary="Read metrics",
+    response_class=Response,
+    response_description="In the text format of Prometheus",
+    responses=_TEXT | documented(),
+)
+def read_metrics(request: Request) -> Response:
+    """Return request counts and latency, stored experiments by state, open streams, and the supervisors' heartbeats."""
+    return Response(generate_latest(request.app.state.metrics.registry), media_type=CONTENT_TYPE_LATEST)

@@ -28,7 +28,7 @@ from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.states import settle
 from gaplab.services.settings import Limits
-from gaplab.services.specs.hardware import hardware_of
+from gaplab.services.specs.rollouts import hardware_of
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives

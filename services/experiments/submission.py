@@ -15,9 +15,8 @@ from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.experiments.views import view_experiments, view_studies
-from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study, takes_samples
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.rollouts import expected_rollouts, hardware_of
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.experiments import Extent, get_experiment, get_study, insert_experiment, insert_study
 from gaplab.services.store.session import Session, Store

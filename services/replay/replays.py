@@ -15,9 +15,9 @@ from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import LAST, ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.replay.sent_specs import sent
 from gaplab.services.specs.assembly import refuse_missing
-from gaplab.services.specs.hardware import is_computed
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.rollouts import is_computed
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.session import Session, Store

@@ -27,9 +27,9 @@ from gaplab.services.core.types import Budget, Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.forecasts import forecast_of
-from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.specs.measured import samples_of
 from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.rollouts import hardware_of
 from gaplab.services.specs.simulation import Simulation
 
 

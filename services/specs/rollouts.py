@@ -1,10 +1,13 @@
-"""The number of rollouts that a spec costs."""
+"""What follows from a resolved spec: the number of rollouts that it costs, and the hardware that it moves."""
+
+from hashlib import sha256
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.controller_search import Allowance
 from gaplab.services.core.held_out import seen_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners import tuners
+from gaplab.services.engines import engines
 from gaplab.services.specs.blame import refusing_specs
 
 
@@ -35,3 +38,19 @@ def _of_tuning(spec: ResolvedSpec, iteration: int) -> int:
     samples = iteration + len(spec.reality.samples)
     seen = seen_of(samples, spec.held_out)
     return spec.budget.simulator_evaluations // tuners.create(spec.tuner).divisor(seen) * seen + samples - seen
+
+
+def is_computed(spec: ResolvedSpec) -> bool:
+    """Return whether reality is only computed, so that asking it moves nothing."""
+    return spec.reality.engine is not None and hardware_of(spec) is None
+
+
+def hardware_of(spec: ResolvedSpec) -> str | None:
+    """Return the name of the hardware that is reality, or None if reality is only computed, or on a bench.
+
+    Equal engines with equal options are the same hardware. An engine that also runs the simulators is computed.
+    """
+    ref = spec.reality.engine
+    if ref is None or ref.name == spec.engine.name or ref.name not in engines or engines[ref.name].repeatable:
+        return None
+    return f"{ref.name[:20]}-{sha256(ref.model_dump_json().encode()).hexdigest()[:10]}"

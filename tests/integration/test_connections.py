@@ -19,8 +19,7 @@ from fastapi import FastAPI, Request
 
 from gaplab.api.app import create_app
 from gaplab.api.http.limits import SPARE, RequestLimit, most_requests
-from gaplab.api.process.connections import TimedConnection
-from gaplab.api.process.server import Server, listen
+from gaplab.api.process.server import Server, TimedConnection, listen
 from gaplab.services.logs import Repeats
 from gaplab.services.settings import Limits
 from gaplab.services.store.session import Store

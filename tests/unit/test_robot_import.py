@@ -15,7 +15,7 @@ from gaplab.services.core.motor_law import pd_law, pd_torque
 from gaplab.services.core.robot_files import read_robot_file
 from gaplab.services.core.shapes import Box, Capsule, Hull
 from gaplab.services.core.world import Joint, Motor, PDMotor, World
-from gaplab.services.robots.hulls import simplify
+from gaplab.services.robots.geometry import simplify
 from gaplab.services.robots.importing import ImportedFile, import_robot
 from gaplab.services.robots.options import ImportOptions
 from tests import real_robots
