@@ -273,12 +273,12 @@ declare namespace Api {
   }
   interface ExperimentRead {
     id: string;
-    study: string | null;
     name: string;
     notes: string | null;
     tags: Array<string>;
     edits: number;
     archived_at: string | null;
+    study: string | null;
     strategy: string;
     direct: boolean;
     level: boolean;
