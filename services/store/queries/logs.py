@@ -105,8 +105,8 @@ def fit_of(stored: list[float | None] | None) -> Fit | None:
     """Return the fit of a simulator from its column; None if it is not known."""
     if stored is None or None in stored[:3]:
         return None
-    numbers = _readings(stored)
-    return Fit(*numbers[:3].tolist(), numbers[3:])
+    expected, surprise, scale, *errors = _readings(stored).tolist()
+    return Fit(expected, surprise, scale, frozen(errors))
 
 
 def _transferred(row: IterationRow) -> Transferred | None:
