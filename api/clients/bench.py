@@ -226,13 +226,8 @@ class Bench:
         return self._connection.get(tuple[BranchRead, ...], f"/experiments/{segment(experiment)}/branches")
 
     def _attach(self, name: str, content: bytes, media_type: str) -> AttachmentRead:
-        return self._connection.change(
-            AttachmentRead,
-            "POST",
-            f"/attachments?name={segment(name)}",
-            content=[content],
-            headers={"Content-Type": media_type},
-        )
+        path, headers = f"/attachments?name={segment(name)}", {"Content-Type": media_type}
+        return self._connection.change(AttachmentRead, "POST", path, content=[content], headers=headers)
 
     def _after(self, answer: str, what: str, body: dict[str, Any], *, dry_run: bool) -> Consequences:
         path = f"/measurements/{segment(answer)}/{what}{'?dry_run=true' if dry_run else ''}"

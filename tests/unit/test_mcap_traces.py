@@ -66,7 +66,7 @@ def foxglove(
         for topic in topics:
             channel = writer.register_channel(topic, "json", kind)
             for second, (place, name) in product(range(2), enumerate(bodies)):
-                body = {"timestamp": {"sec": second, "nsec": 250_000_000}, "frame_id": "map", "pose": pose(float(place))}
+                body = {"timestamp": {"sec": second, "nsec": 250_000_000}, "frame_id": "map", "pose": pose(1.0 * place)}
                 body |= {"child_frame_id": name} if name else {}
                 writer.add_message(channel, log_time=1, data=json.dumps(body).encode(), publish_time=0)
         writer.finish()
