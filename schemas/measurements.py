@@ -203,9 +203,13 @@ class RequestRead(Frozen):
         default=(), description="`safety` in words", examples=[("3 simulators expect 0.3 to 0.5 m/s",)]
     )
     between_repeats: str | None = Field(
-        default=None, description="how the robot begins, and what to do between repeats; null: it has no body"
+        default=None,
+        description="how it begins, and what to do between repeats; null: it has no body",
+        examples=["Let it rest for 1 s."],
     )
-    needs: str | None = Field(default=None, description="what an answer needs beside values; null: nothing")
+    needs: str | None = Field(
+        default=None, description="what is needed beside values; null: nothing", examples=["Send a trace."]
+    )
     same_as: Id | None = Field(
         default=None, description="an earlier request for the same controller, whose answer is this one's too"
     )
