@@ -11,7 +11,6 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from gaplab.schemas.measurements import Table
 from gaplab.schemas.records import SampleRead
 from gaplab.services.bench import motions
 from gaplab.services.core import robot_library, trace_tables
@@ -30,8 +29,8 @@ from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Store
 
-Readings: TypeAlias = dict[tuple[Any, ...], Sequence[Table]]
-"""Readings of all repeats, by genome and values."""
+Readings: TypeAlias = dict[tuple[Any, ...], Sequence[Any]]
+"""Tables of readings of all repeats, by genome and values."""
 
 MOTIONS: dict[motions.MotionFormat, str] = {"csv": "motion.csv", "json": "motion.json", "ros2": "motion.ros2.yaml"}
 

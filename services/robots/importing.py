@@ -120,7 +120,7 @@ def _world(source: Source, bodies: Bodies, options: ImportOptions, notes: Notes)
     joints = with_swings(with_motors(joints, source, options, notes), notes)
     found, material, surfaces = _surfaces(source, bodies, options, notes)
     height_m, turn = base_pose(bodies, found, joints, qpos, fixed=fixed)
-    largest_m = max(abs(height_m), *(abs(each) for joint in joints for each in joint.origin_m))
+    largest_m = max([abs(height_m), *(abs(each) for joint in joints for each in joint.origin_m)])
     if largest_m > HUGE_M:
         notes.lose(f"lengths up to {largest_m:.3g} m are taken as they are, not as millimetres; meshes have a scale")
     if not fixed and source.is_urdf:
