@@ -23,6 +23,7 @@ class Driver:
 
         `motion.times_s` has the times at which targets change, `motion.targets` a row of targets for each: one for
         each name in `motion.actuators`, in its unit in `motion.units`. The run ends at `motion.observe_s[-1]`.
+        `motion.start` has the angle of each joint before it: move there slowly, and rest.
         """
         expected = tuple(joint.name for joint in self.robot.world.actuators)
         if motion.actuators != expected:

@@ -89,6 +89,13 @@ class HolderSpec(Frozen):
     take: int = Field(ge=1, description="number of the take, as it was answered")
 
 
+class ReleaseSpec(HolderSpec):
+    """The take that ends without an answer. Another person than its holder says who, and why."""
+
+    operator: Label | None = None
+    reason: Annotated[str, Field(min_length=1, max_length=2_000)] | None = None
+
+
 class MeasurementSpec(Frozen):
     """An answer to a request: its values, or why there are none."""
 
@@ -192,6 +199,17 @@ class RequestRead(Frozen):
     taken_until: Moment | None = Field(default=None, description="when the take ends without a heartbeat")
     busy: bool = Field(default=False, description="whether another request of the same bench is taken")
     safety: Safety | None = None
+    expected: tuple[str, ...] = Field(
+        default=(), description="`safety` in words", examples=[("3 simulators expect 0.3 to 0.5 m/s",)]
+    )
+    between_repeats: str | None = Field(
+        default=None,
+        description="how it begins, and what to do between repeats; null: it has no body",
+        examples=["Let it rest for 1 s."],
+    )
+    needs: str | None = Field(
+        default=None, description="what is needed beside values; null: nothing", examples=["Send a trace."]
+    )
     same_as: Id | None = Field(
         default=None, description="an earlier request for the same controller, whose answer is this one's too"
     )

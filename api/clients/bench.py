@@ -159,21 +159,22 @@ class Bench:
         path = Path(file)
         return self._attach(path.name, path.read_bytes(), media_type)
 
-    def attach_trace(self, file: str | Path, topic: str | None = None) -> AttachmentRead:
+    def attach_trace(self, file: str | Path, topic: str | None = None, body: str | None = None) -> AttachmentRead:
         """Store a trace, CSV or MCAP, and return its hash; a recording in MCAP is stored as CSV.
 
         Args:
             file: the recording; with the suffix .mcap, the extra `gaplab[mcap]` reads it.
             topic: topic of the base's pose in MCAP; left out: the only one that has poses.
+            body: `child_frame_id` of the base, if the topic has several.
 
         Raises:
             ExtraMissing: the libraries for MCAP are not installed.
-            ValueError: the recording has no such topic, or several.
+            ValueError: the recording has no such topic or body, or several.
         """
         path = Path(file)
         if path.suffix.lower() != ".mcap":
             return self.attach(path, "text/csv")
-        return self._attach(path.with_suffix(".csv").name, mcap_to_csv(path, topic).encode(), "text/csv")
+        return self._attach(path.with_suffix(".csv").name, mcap_to_csv(path, topic, body).encode(), "text/csv")
 
     def traces(self, id: str, traces: Sequence[str], lags_s: Sequence[float | None] | None = None) -> TracesRead:
         """Return fitness and readings that traces of a request say, and how their clocks were aligned.
@@ -225,13 +226,8 @@ class Bench:
         return self._connection.get(tuple[BranchRead, ...], f"/experiments/{segment(experiment)}/branches")
 
     def _attach(self, name: str, content: bytes, media_type: str) -> AttachmentRead:
-        return self._connection.change(
-            AttachmentRead,
-            "POST",
-            f"/attachments?name={segment(name)}",
-            content=[content],
-            headers={"Content-Type": media_type},
-        )
+        path, headers = f"/attachments?name={segment(name)}", {"Content-Type": media_type}
+        return self._connection.change(AttachmentRead, "POST", path, content=[content], headers=headers)
 
     def _after(self, answer: str, what: str, body: dict[str, Any], *, dry_run: bool) -> Consequences:
         path = f"/measurements/{segment(answer)}/{what}{'?dry_run=true' if dry_run else ''}"

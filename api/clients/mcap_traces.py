@@ -3,7 +3,7 @@
 import csv
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -26,16 +26,17 @@ _PLACES, _TURNS = ("position", "translation"), ("orientation", "rotation")
 _STAMPS, _NANOSECONDS = ("timestamp", "stamp"), ("nsec", "nanosec")
 
 
-def mcap_to_csv(file: Path, topic: str | None = None) -> str:
+def mcap_to_csv(file: Path, topic: str | None = None, body: str | None = None) -> str:
     """Return the trace of an MCAP file as CSV.
 
     Args:
         file: the recording.
         topic: topic of the base's pose; None if the recording has a single topic of poses.
+        body: `child_frame_id` of the base; None if the topic has a single one.
 
     Raises:
         ExtraMissing: the libraries for MCAP are not installed.
-        ValueError: the recording has no such topic, or several.
+        ValueError: the recording has no such topic or body, or several.
     """
     try:
         from mcap.exceptions import McapError
@@ -51,8 +52,11 @@ def mcap_to_csv(file: Path, topic: str | None = None) -> str:
             factories: list[Any] = [DecoderFactory(), _Json()]
             reader = make_reader(stream, decoder_factories=factories)
             chosen = _chosen(reader.get_summary(), topic, file)
+            poses: dict[str, list[list[float]]] = {}
             for _, _, message, decoded in reader.iter_decoded_messages(topics=[chosen]):
-                writer.writerow(_pose(decoded, message.log_time))
+                name = getattr(decoded, "child_frame_id", "")
+                poses.setdefault(name, []).append(_pose(decoded, message.log_time))
+            writer.writerows(_of_body(poses, body, f"{file.name} has {{}} on {chosen!r}"))
     except McapError as error:
         raise ValueError(f"{file.name} is no MCAP file that can be read: {error}") from error
     return text.getvalue()
@@ -81,6 +85,16 @@ def _chosen(summary: Any, topic: str | None, file: Path) -> str:  # noqa: ANN401
     raise ValueError(
         f"{file.name} has {'several' if topic is None and found else 'no'} {wrong}; permitted: {permitted}"
     )
+
+
+def _of_body(poses: Mapping[str, list[list[float]]], body: str | None, problem: str) -> list[list[float]]:
+    """Return the poses of the named body, or of the only one."""
+    if body is None and len(poses) < 2:
+        return next(iter(poses.values()), [])
+    if body is None or body not in poses:
+        what = "several bodies" if body is None else f"no body {body!r}"
+        raise ValueError(f"{problem.format(what)}; choose one by its child_frame_id: {', '.join(sorted(poses))}")
+    return poses[body]
 
 
 def _pose(message: Any, log_time_ns: int) -> list[float]:  # noqa: ANN401 - of any schema

@@ -1,7 +1,8 @@
 """Motions as drivers get them."""
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from gaplab.api.clients.connection import Connection, segment
 
@@ -16,6 +17,7 @@ class DriverMotion:
         times_s: times at which targets change.
         targets: a row of targets for each time, with a column for each actuator.
         observe_s: times of observation; the last one ends the run.
+        start: angle of each joint before the motion, rad or m.
     """
 
     actuators: tuple[str, ...]
@@ -23,6 +25,7 @@ class DriverMotion:
     times_s: tuple[float, ...]
     targets: tuple[tuple[float, ...], ...]
     observe_s: tuple[float, ...]
+    start: Mapping[str, float] = field(default_factory=dict)
 
 
 def motion_of(connection: Connection, request: str) -> DriverMotion:
@@ -38,4 +41,5 @@ def motion_of(connection: Connection, request: str) -> DriverMotion:
         times_s=tuple(found["times_s"]),
         targets=tuple(map(tuple, found["targets"])),
         observe_s=tuple(found["observe_s"]),
+        start=found["start"],
     )

@@ -100,6 +100,9 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
     topic: Annotated[
         str | None, typer.Option("--topic", help="topic of the base's pose in MCAP", show_default=False)
     ] = None,
+    body: Annotated[
+        str | None, typer.Option("--body", help="child_frame_id of the base, if it has several", show_default=False)
+    ] = None,
     answer: Annotated[bool, typer.Option("--answer", help="answer the request with them")] = False,
     lag_s: Annotated[
         list[float] | None,
@@ -114,7 +117,7 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
     if operator and not answer:
         raise typer.BadParameter("an operator is of an answer; add --answer", param_hint="--operator")
     with connect(url) as client:
-        stored = [client.bench.attach_trace(file, topic).id for file in files]
+        stored = [client.bench.attach_trace(file, topic, body).id for file in files]
         said = client.bench.traces(id, stored, lag_s)
         if not answer:
             print_result(said, _words_of(said), as_json=as_json)

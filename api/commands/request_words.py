@@ -50,10 +50,13 @@ def stored_words(answer: AnswerRead) -> str:
 
 
 def print_safety(found: RequestRead) -> None:
-    """Print on standard error which limits a wanted controller is expected to exceed, and what is not forecast."""
-    if found.safety and found.state in _WANTED:
-        for warning in (*found.safety.beyond, *found.safety.unknown):
-            typer.echo(f"warning: {warning}", err=True)
+    """Print what to do before a run, and what simulators expect; on standard error what is beyond limits or unknown."""
+    if found.state not in _WANTED:
+        return
+    for line in filter(None, (found.needs, found.between_repeats, *found.expected)):
+        typer.echo(f"  {line}")
+    for warning in (*found.safety.beyond, *found.safety.unknown) if found.safety else ():
+        typer.echo(f"warning: {warning}", err=True)
 
 
 def _row(found: RequestRead) -> tuple[str, ...]:

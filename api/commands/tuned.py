@@ -136,4 +136,4 @@ def _lines(output: Path, best: SimulatorRead, written: "WrittenFile", distance_m
     yield from (f"  not in the file: {change}" for change in written.left_out)
     yield from (f"  an import computes it: {change}" for change in written.computed)
     what = "with the values that are not in it, rollouts are" if written.left_out else "rollouts are"
-    yield f"Wrote {output}: {what} within {distance_m:.2g} m of the tuned simulator's."
+    yield f"Wrote {output}: in gaplab's engine, {what} within {distance_m:.2g} m of the tuned simulator's."

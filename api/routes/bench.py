@@ -25,6 +25,7 @@ from gaplab.schemas.measurements import (
     DoubtsRead,
     HolderSpec,
     MeasurementSpec,
+    ReleaseSpec,
     RequestRead,
     TakeSpec,
 )
@@ -45,10 +46,11 @@ _MOTIONS = {"csv": ("text/csv", "csv"), "json": ("application/json", "json"), "r
 _MOTION: Responses = {
     200: {
         "content": {
-            "text/csv": {"schema": {"type": "string"}, "example": "time_s,front_left_knee (rad)\n0.0,0.12\n"},
+            "text/csv": {"schema": {"type": "string"}, "example": "time_s,front_left_knee (rad)\n-1.0,0.0\n0.0,0.12\n"},
             "application/json": {
                 "schema": {"type": "object"},
                 "example": {
+                    "start": {"front_left_knee": 0.0},
                     "actuators": ["front_left_knee"],
                     "units": ["rad"],
                     "times_s": [0.0],
@@ -106,7 +108,7 @@ def read_request(id: Id, store: StoreDep) -> RequestRead:
     responses={**_MOTION, **documented(404, 409, 422)},
 )
 def read_motion(id: Id, query: Annotated[MotionQuery, Query()], store: StoreDep) -> Response:
-    """Return the targets of the actuators over time, with the unit of each.
+    """Return the targets of the actuators over time, with the unit of each, after a rest in the start pose.
 
     A controller that observes the robot while it acts, or of a robot without actuators, has none: 409.
     """
@@ -136,10 +138,10 @@ def keep_request(
 
 @router.post("/{id}/release", summary="Release a request", responses=documented(404, 409, 413, 415, 422))
 def release_request(
-    id: Id, holder: Annotated[HolderSpec, Body(openapi_examples=HolderSpec.EXAMPLES)], store: StoreDep
+    id: Id, spec: Annotated[ReleaseSpec, Body(openapi_examples=ReleaseSpec.EXAMPLES)], store: StoreDep
 ) -> RequestRead:
-    """End a take without an answer."""
-    return taking.release(store, id, holder)
+    """End a take without an answer; with `operator` and `reason` that of somebody else, whose phone is dead."""
+    return taking.release(store, id, spec)
 
 
 @router.post("/{id}/reopen", summary="Offer a stuck request again", responses=documented(404, 409))

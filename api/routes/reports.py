@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from gaplab.api.http.dependencies import Id, Parameters, StoreDep
+from gaplab.api.http.dependencies import Id, Parameters, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import in_turn
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.http.security_headers import page
@@ -82,7 +82,9 @@ def report_experiment(id: Id, store: StoreDep, query: Annotated[ReportQuery, Que
     response_class=Response,
     responses=_TAKEN_HOME,
 )
-def take_home(id: Id, store: StoreDep, query: Annotated[TakeHomeQuery, Query()]) -> Response:
+def take_home(
+    id: Id, store: StoreDep, process: RolloutProcessDep, query: Annotated[TakeHomeQuery, Query()]
+) -> Response:
     """Return the best measured controller, the tuned simulator with its intervals, the verdict, samples and provenance.
 
     The same results give the same bytes.
@@ -90,7 +92,7 @@ def take_home(id: Id, store: StoreDep, query: Annotated[TakeHomeQuery, Query()])
     if query.format == "html":
         answer: Response = page(in_turn(lambda: takehome_page(store, id)))
     else:
-        answer = Response(takehome_zip(store, id, in_turn), media_type="application/zip")
+        answer = Response(takehome_zip(store, process, id, in_turn), media_type="application/zip")
     answer.headers["Content-Disposition"] = f'inline; filename="gaplab-{id}-takehome.{query.format}"'
     return answer
 

@@ -3,24 +3,29 @@
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, Literal
 
 import yaml
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.controllers.actuation import middles
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.motions import Loop, Motion, open_loop
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.core.world import Joint, PDMotor
+from gaplab.services.core.world import Joint, PDMotor, World
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Session, snapshot
 
 MotionFormat = Literal["csv", "json", "ros2"]
+
+REST_S = 1.0
+"""Rest in the start pose before a motion: a recording that begins in it shows when the motion began."""
 
 BEFORE_NS = 1_000_000
 """Nanoseconds before a step at which a JointTrajectory, which is interpolated, has a second point."""
@@ -52,12 +57,23 @@ def written(spec: ResolvedSpec, genome: FloatArray, form: MotionFormat) -> str:
     robot = robot_of(spec)
     if form not in forms_of(robot, genome):
         raise Conflict(_why_not(robot, genome))
-    motion, actuators = open_loop(robot.motion(genome)), robot.world.actuators
+    motion, world = open_loop(robot.motion(genome)), robot.world
     if form == "csv":
-        return _csv(motion, actuators)
+        return _csv(motion, world)
     if form == "json":
-        return json.dumps(_plain(motion, actuators), indent=1, ensure_ascii=False) + "\n"
-    return _ros2(motion, actuators)
+        return json.dumps(_plain(motion, world), indent=1, ensure_ascii=False) + "\n"
+    return _ros2(motion, world)
+
+
+def between_repeats(world: World) -> str:
+    """Return how a robot with bodies begins a motion, and what to do between repeats."""
+    starts = dict[str, list[str]]()
+    for joint in world.joints:
+        starts.setdefault(f"{joint.start:.4g} {'m' if joint.slides else 'rad'}", []).append(joint.name)
+    pose = "; ".join(f"{start}: {', '.join(names) if len(starts) > 1 else 'all'}" for start, names in starts.items())
+    base = "" if world.fixed else f", put the base down as at first, its frame {world.start_height_m:.3g} m high,"
+    before = f"Before each repeat, move the joints slowly to the start pose ({pose}){base}"
+    return f"{before} and let it rest for {REST_S:g} s. After it, hold the last targets until the robot is safe."
 
 
 def forms_of(robot: Robot, genome: FloatArray) -> tuple[MotionFormat, ...]:
@@ -94,46 +110,60 @@ def _unit_of(joint: Joint) -> str:
     return _UNITS[_follows(joint)][joint.slides]
 
 
-def _plain(motion: Motion, actuators: Sequence[Joint]) -> dict[str, Any]:
+def _plain(motion: Motion, world: World) -> dict[str, Any]:
     return {
-        "actuators": [joint.name for joint in actuators],
-        "units": [_unit_of(joint) for joint in actuators],
+        "start": {joint.name: joint.start for joint in world.joints},
+        "between_repeats": between_repeats(world),
+        "actuators": [joint.name for joint in world.actuators],
+        "units": [_unit_of(joint) for joint in world.actuators],
         "times_s": motion.times_s.tolist(),
         "targets": motion.targets.tolist(),
         "observe_s": motion.observe_s.tolist(),
     }
 
 
-def _csv(motion: Motion, actuators: Sequence[Joint]) -> str:
-    """Return a line for each change of targets, and a last one at the end."""
+def _csv(motion: Motion, world: World) -> str:
+    """Return a line for the rest before time 0, one for each change of targets, and a last one at the end."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["time_s", *(f"{joint.name} ({_unit_of(joint)})" for joint in actuators)])
-    writer.writerows([time, *targets] for time, targets in _points(motion))
+    writer.writerow(["time_s", *(f"{joint.name} ({_unit_of(joint)})" for joint in world.actuators)])
+    writer.writerows([time, *targets] for time, targets in _points(motion, world))
     return text.getvalue()
 
 
-def _ros2(motion: Motion, actuators: Sequence[Joint]) -> str:
-    """Return a trajectory_msgs/JointTrajectory in YAML, in which each step of a target is a steep line."""
+def _ros2(motion: Motion, world: World) -> str:
+    """Return a trajectory_msgs/JointTrajectory in YAML: steep lines between steps, plain ones along smooth curves."""
+    ramp_ns = round(motion.every_s * 1e9) or BEFORE_NS
     at: dict[int, list[float]] = {}
     before, last = 0, None
-    for time, targets in _points(motion):
-        now = round(time * 1e9)
-        if last is not None and now - before > 1:
-            at[now - min(BEFORE_NS, (now - before) // 2)] = last
+    for time, targets in _points(motion, world):
+        now = round((time + REST_S) * 1e9)
+        if last is not None:
+            at[max(before, now - ramp_ns)] = last
         at[now] = last = targets
         before = now
     points = [{"positions": targets, "time_from_start": _time(place)} for place, targets in at.items()]
-    told = {"joint_names": [joint.name for joint in actuators], "points": points}
-    return str(yaml.safe_dump(told, sort_keys=False, default_flow_style=None))
+    told = {"joint_names": [joint.name for joint in world.actuators], "points": points}
+    remarks = [f"The motion begins at {REST_S:g} s. {between_repeats(world)}", *_fastest(world.actuators, at)]
+    comments = "".join(f"# {remark}\n" for remark in remarks)
+    return comments + str(yaml.safe_dump(told, sort_keys=False, default_flow_style=None))
 
 
-def _points(motion: Motion) -> list[tuple[float, list[float]]]:
-    """Return the times of changes with the targets from then on, to the last observation."""
-    points = list(zip(motion.times_s.tolist(), motion.targets.tolist(), strict=True))
+def _fastest(actuators: Sequence[Joint], at: Mapping[int, Sequence[float]]) -> Iterator[str]:
+    """Yield the largest speed of each joint along the lines of a trajectory, and its limit if it is known."""
+    lines = list(pairwise(at.items()))
+    for place, joint in enumerate(actuators):
+        speed = max(abs(two[place] - one[place]) / (after - before) * 1e9 for (before, one), (after, two) in lines)
+        limit = getattr(joint.motor, "max_speed_rad_s", "not known")
+        yield f"{joint.name}: up to {speed:.3g} {'m/s' if joint.slides else 'rad/s'}; its limit is {limit}"
+
+
+def _points(motion: Motion, world: World) -> list[tuple[float, list[float]]]:
+    """Return the rest in the start pose, then the times of changes with the targets from then on, to the end."""
+    changes = zip(motion.times_s.tolist(), motion.targets.tolist(), strict=True)
     end = float(motion.observe_s[-1])
-    kept = [(time, targets) for time, targets in points if time < end]
-    return [*kept, (end, kept[-1][1])] if kept else []
+    kept = [(-REST_S, middles(world).tolist()), *((time, targets) for time, targets in changes if time < end)]
+    return [*kept, (end, kept[-1][1])]
 
 
 def _time(nanoseconds: int) -> dict[str, int]:

@@ -11,6 +11,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.measurements import (
     AnswerState,
     HolderSpec,
+    ReleaseSpec,
     RequestRead,
     RequestState,
     TakeSpec,
@@ -172,16 +173,17 @@ def heartbeat(session: Session, id_: str, holder: HolderSpec) -> RequestRead:
 
 
 @transaction
-def release(session: Session, id_: str, holder: HolderSpec) -> RequestRead:
-    """End a take without an answer: the request is open again.
+def release(session: Session, id_: str, spec: ReleaseSpec) -> RequestRead:
+    """End a take without an answer: the request is open again. Its event says who ended it, and why.
 
     Raises:
         NotFound: the request does not exist.
         Conflict: the take has ended already.
     """
     row, _ = locked(session, id_)
-    _refuse_unless_held(session, row, holder)
-    requests.give_up(session, row, EventKind.RELEASED)
+    _refuse_unless_held(session, row, spec)
+    told = {"by": spec.operator, "reason": spec.reason}
+    requests.give_up(session, row, EventKind.RELEASED, **{name: storable(each) for name, each in told.items() if each})
     session.flush()
     return view_requests(session, [row])[0]
 

@@ -12,15 +12,20 @@ from gaplab.schemas.measurements import (
     Safety,
 )
 from gaplab.schemas.traces import TraceRead
+from gaplab.services.bench.motions import between_repeats
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.repeats import mean
 from gaplab.services.core.robot_library import label_of
-from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.safety import expected
+from gaplab.services.core.stored_specs import discrepancy_of, spec_of
+from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Session
+
+READINGS = "The experiment tunes on readings: send a trace of the base for each repeat, or let a driver return them."
 
 
 def view_requests(session: Session, rows: Sequence[RequestRow]) -> tuple[RequestRead, ...]:
@@ -53,6 +58,8 @@ def _view(
 ) -> RequestRead:
     number, experiment = owner
     spec, state, unanswered = spec_of(experiment.spec), row.state, row.unanswered
+    robot, safety = robot_of(spec), None if row.safety is None else Safety.model_validate(row.safety)
+    needs = needs_readings(discrepancy_of(experiment.spec), robot.sensors)
     if requests.is_expired(row, at):
         unanswered += 1
         state = RequestState.STUCK if unanswered >= requests.MOST_UNANSWERED else RequestState.OPEN
@@ -66,7 +73,7 @@ def _view(
         iteration=row.iteration,
         kind=row.kind,
         robot=label_of(spec.robot),
-        unit=robot_of(spec).unit,
+        unit=robot.unit,
         bench=row.bench,
         repeats=spec.reality.repeats,
         genome=tuple(row.genome),
@@ -76,7 +83,10 @@ def _view(
         taken_by=row.taken_by if taken else None,
         taken_until=row.taken_until if taken else None,
         busy=held and not taken,
-        safety=None if row.safety is None else Safety.model_validate(row.safety),
+        safety=safety,
+        expected=tuple(expected(safety, robot.unit)) if safety else (),
+        between_repeats=between_repeats(robot.world) if robot.world.bodies else None,
+        needs=READINGS if needs else None,
         same_as=row.same_as,
         branch=row.branch,
         answers=tuple(map(view_answer, answers)),

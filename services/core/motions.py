@@ -28,12 +28,14 @@ class Motion:
         targets: `(k, a)`: targets from each time on, in the unit of what each motor follows: rad for a servo's hinge.
         observe_s: `(t,)`, ascending: times of observation; the last one ends the rollout.
         start_tilt_rad: rotation of the base at time 0, about x and y of the world.
+        every_s: interval at which a smooth curve was sampled; 0 if targets step.
     """
 
     times_s: FloatArray
     targets: FloatArray
     observe_s: FloatArray
     start_tilt_rad: Tilt = LEVEL
+    every_s: float = 0.0
 
     def observed_at(self, times_s: FloatArray) -> "Motion":
         """Return the same motion, observed at other times `(t,)`."""

@@ -1,6 +1,6 @@
 """The safety forecast: extremes of recorded rollouts, and whether they exceed the limits of a physical robot."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import nan, pi
 from operator import attrgetter
@@ -9,6 +9,7 @@ import numpy as np
 
 from gaplab.schemas.safety import LimitsSpec, Safety
 from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.controllers.actuation import follows_angle
 from gaplab.services.core.kinematics import clearances_m, from_start
 from gaplab.services.core.motions import Loop, Motion, Recording
 from gaplab.services.core.world import World
@@ -18,6 +19,9 @@ MOST_SIMULATORS = 20
 
 FALL_RAD = pi / 2
 """Tilt beyond which a robot has fallen."""
+
+STOP_RAD = 0.01
+"""How far beyond its range a joint may be: stops of simulators give way a little."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class Extremes:
         height: least height of the base's frame, m.
         clearance: least height of the lowest point of the base's body, m.
         fitness: fitness of the rollout.
+        out_of_range: sentences about joints that are commanded to, or reach, an angle beyond their range.
     """
 
     joint_speed: float = nan
@@ -39,6 +44,7 @@ class Extremes:
     height: float = nan
     clearance: float = nan
     fitness: float = nan
+    out_of_range: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,11 +82,12 @@ def recording_times(motion: Motion | Loop, world: World) -> FloatArray:
     return frozen(np.arange(steps + 1) * world.time_step_s)
 
 
-def extremes(world: World, recording: Recording, fitness: float) -> Extremes:
+def extremes(world: World, motion: Motion | Loop, recording: Recording, fitness: float) -> Extremes:
     """Return the extremes of a rollout.
 
     Args:
         world: world of the rollout; its first body is the base.
+        motion: what drove it.
         recording: rollout, recorded at every time step.
         fitness: its fitness.
     """
@@ -96,6 +103,7 @@ def extremes(world: World, recording: Recording, fitness: float) -> Extremes:
         height=float(poses[:, 2].min()),
         clearance=float(clearances_m(world.bodies[0], poses[:, :3], poses[:, 3:]).min()),
         fitness=fitness,
+        out_of_range=tuple(_out_of_range(world, motion, recording)),
     )
 
 
@@ -122,8 +130,23 @@ def safety(rollouts: Sequence[Extremes], limits: LimitsSpec | None, engine: str)
     )
 
 
+def expected(found: Safety, unit: str) -> Iterator[str]:
+    """Yield what a forecast expects of a controller, a line each; `unit` is that of its fitness."""
+    ends = [f"{end:.3g}" for end in (found.fitness_low, found.fitness_high) if end is not None]
+    if ends:
+        yield f"simulators expect {' to '.join(dict.fromkeys(ends))} {unit}".rstrip()
+    for what, count in (("the physics fails", found.failed), ("it falls", found.falls)):
+        if count:
+            yield f"{what} in {count} of {found.simulators} simulators"
+    for limit in (*LIMITS, Limit("clearance", "the clearance of the base", "m", least=True)):
+        if (value := getattr(found, limit.name)) is not None:
+            yield f"{limit.words}: at {'least' if limit.least else 'most'} {value:.3g} {limit.unit}"
+
+
 def _beyond(ran: Sequence[Extremes], limits: LimitsSpec | None) -> list[str]:
-    found = []
+    falls = sum(rollout.tilt > FALL_RAD for rollout in ran)
+    found = [f"it falls in {falls} of {len(ran)} simulators"] if falls and getattr(limits, "tilt", None) is None else []
+    found += dict.fromkeys(sentence for rollout in ran for sentence in rollout.out_of_range)
     for limit in LIMITS:
         permitted = getattr(limits, limit.name, None)
         if permitted is None:
@@ -154,6 +177,21 @@ def _unknown(
 def _worst(ran: Sequence[Extremes], name: str, worse: Callable[..., float]) -> float | None:
     values = [value for value in map(attrgetter(name), ran) if np.isfinite(value)]
     return worse(values) if values else None
+
+
+def _out_of_range(world: World, motion: Motion | Loop, recording: Recording) -> Iterator[str]:
+    """Yield a sentence for each joint whose targets, or whose angles, are beyond its range."""
+    for place, joint in enumerate(world.joints):
+        if joint.limits is None:
+            continue
+        seen = [] if recording.angles_rad is None else [recording.angles_rad[:, place]]
+        if isinstance(motion, Motion) and joint.motor is not None and follows_angle(joint):
+            seen.append(motion.targets[:, world.actuators.index(joint)])
+        (lower, upper), angles = joint.limits, np.concatenate([*seen, [joint.start]])
+        farthest = float(angles[np.argmax(np.maximum(lower - angles, angles - upper))])
+        if not lower - STOP_RAD <= farthest <= upper + STOP_RAD:
+            unit = "m" if joint.slides else "rad"
+            yield f"{joint.name} is to go to {farthest:.3g} {unit}; its range is {lower:.3g} to {upper:.3g} {unit}"
 
 
 def _joint_speed(recording: Recording) -> float:

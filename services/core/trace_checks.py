@@ -70,7 +70,8 @@ def _holes(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
 
 def _start(height_m: float, wanted_m: float, seen: FloatArray, wanted: FloatArray) -> Iterator[str]:
     if abs(height_m - wanted_m) > max(HIGHER_M, 0.5 * abs(wanted_m)):
-        what = "is z upwards, in metres, from the ground?"
+        is_mm = 300.0 * wanted_m < height_m < 3000.0 * wanted_m
+        what = "are these millimetres (`x [mm]`)?" if is_mm else "is z upwards, in metres, from the ground?"
         yield f"the base begins {height_m:.3g} m high, and the simulators expect {wanted_m:.2g} m: {what}"
     tilts = [scipy.spatial.transform.Rotation.from_quat(each[0]).apply([0.0, 0.0, 1.0]) for each in (seen, wanted)]
     angle = float(np.arccos(np.clip(tilts[0] @ tilts[1], -1.0, 1.0)))

@@ -1,7 +1,6 @@
 """Evaluation of traces: fitness and readings of a physical robot, computed by its code from its recorded motion."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
@@ -33,23 +32,6 @@ FRAMES_PER_S = 50
 
 LONGEST_PLOT_S = 20.0
 """Longest part of a motion whose alignment is shown."""
-
-
-@dataclass(frozen=True)
-class Expected:
-    """What a subprocess needs to compute an expected motion, in plain values.
-
-    Attributes:
-        spec: resolved spec, as JSON.
-        genome: genome of the controller.
-        parameters: parameters of the simulator.
-        until_s: length of the motion.
-    """
-
-    spec: SentSpec
-    genome: tuple[float, ...]
-    parameters: tuple[float, ...]
-    until_s: float
 
 
 def evaluate_traces(
@@ -85,9 +67,8 @@ def evaluate_traces(
     if not simulators:
         raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
     traces = [read_trace(*table) for table in tables]
-    until_s = max([float(robot.motion(frozen(genome)).observe_s[-1]), *robot.sensors.times_s.tolist()])
-    wanted = Expected(sent(resolved), genome, tuple(simulators[0]), until_s)
-    expected = _trace_of(*process.call(expected_motion, wanted))
+    times_s, poses, _ = process.call(expected_motion, sent(resolved), genome, tuple(simulators[0]))
+    expected = Trace(times_s, poses[:, :3], poses[:, 3:])
     return _evaluated(robot, frozen(genome), traces, expected, spec)
 
 
@@ -98,19 +79,17 @@ def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec
     return evaluate_traces(store, process, request, TracesSpec(traces=spec.traces, lags_s=spec.lags_s), answer=True)
 
 
-def expected_motion(wanted: Expected) -> tuple[FloatArray, FloatArray]:
-    """Return times `(k,)` and poses `(k, 7)` of a controller in a simulator; nan if the physics failed."""
-    spec, genome = received(wanted.spec), np.array(wanted.genome)
+def expected_motion(
+    sent_spec: SentSpec, genes: Sequence[float], parameters: Sequence[float]
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return times `(k,)`, poses `(k, 7)` and fitness of a controller in a simulator; nan if the physics failed."""
+    spec, genome = received(sent_spec), np.array(genes)
     robot = robot_of(spec)
-    end_s = min(wanted.until_s, float(robot.motion(genome).observe_s[-1]))
+    end_s = float(robot.motion(genome).observe_s[-1])
     times = np.unique(np.append(np.arange(int(end_s * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S, end_s))
     simulation = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
-    _, recording = simulation.record(genome, np.array(wanted.parameters), times)
-    return times, recording.poses
-
-
-def _trace_of(times_s: FloatArray, poses: FloatArray) -> Trace:
-    return Trace(times_s, poses[:, :3], poses[:, 3:])
+    _, recording = simulation.record(genome, np.array(parameters), times)
+    return times, recording.poses, float(robot.fitness(recording.trajectory))
 
 
 def refuse_other_bodies(world: World) -> None:

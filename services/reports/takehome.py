@@ -3,21 +3,34 @@
 import csv
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
-from typing import Any
+from math import isfinite
+from typing import Any, TypeAlias
 from zipfile import ZipFile
+
+import numpy as np
 
 from gaplab.schemas.records import SampleRead
 from gaplab.services.bench import motions
+from gaplab.services.core import robot_library, trace_tables
 from gaplab.services.core.arrays import frozen
+from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.tunables.labels import unit_of
+from gaplab.services.replay.process import RolloutProcess
+from gaplab.services.replay.sent_specs import sent
+from gaplab.services.replay.traces import expected_motion
 from gaplab.services.reports.html import render_html
 from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
-from gaplab.services.reports.outcome_page import outcome_report, verdict_sentences
+from gaplab.services.reports.outcome_page import MOST_SHOWN, outcome_report, verdict_sentences
 from gaplab.services.reports.reproduction import spec_text, submitted
 from gaplab.services.results.files import entry_of
+from gaplab.services.store.models import AttachmentRow
+from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Store
+
+Readings: TypeAlias = dict[tuple[Any, ...], Sequence[Any]]
+"""Tables of readings of all repeats, by genome and values."""
 
 MOTIONS: dict[motions.MotionFormat, str] = {"csv": "motion.csv", "json": "motion.json", "ros2": "motion.ros2.yaml"}
 
@@ -33,6 +46,10 @@ samples.csv        all measurements, for `reality.samples` of another spec. gapl
                    service client.bench.check_samples("samples.csv", ROBOT) does
 samples.json       the same for programs of yours, with repetition, iteration, operator and time, and with readings in
                    units of noise; `reality.samples` takes samples.csv
+robot.json         the robot file: `gaplab robot add robot.json` first, where samples and spec are used elsewhere.
+                   `gaplab simulator {id} -o tuned.urdf --from FILE` writes the tuned URDF or MJCF
+traces/            recordings that answered, by repetition, iteration, kind and repeat
+expected/          motion of each measured controller in the tuned simulator, and fitness.json, to compare with yours
 spec.json          the spec; `gaplab submit spec.json` runs it again
 provenance.json    versions of everything that computed it
 
@@ -51,11 +68,14 @@ def takehome_page(store: Store, experiment_id: str) -> str:
     return _page(outcome_of(store, experiment_id))
 
 
-def takehome_zip(store: Store, experiment_id: str, draw: Callable[[Callable[[], str]], str]) -> bytes:
+def takehome_zip(
+    store: Store, process: RolloutProcess, experiment_id: str, draw: Callable[[Callable[[], str]], str]
+) -> bytes:
     """Return the outcome of an experiment as a zip.
 
     Args:
         store: the database.
+        process: process that computes expected motions.
         experiment_id: id of the experiment.
         draw: calls a function that draws figures, perhaps after waiting for a turn.
 
@@ -67,7 +87,8 @@ def takehome_zip(store: Store, experiment_id: str, draw: Callable[[Callable[[], 
     outcome, content = outcome_of(store, experiment_id), io.BytesIO()
     with ZipFile(content, "w") as archive:
         archive.writestr(entry_of("page.html"), draw(lambda: _page(outcome)))
-        for name, text in _files(outcome):
+        readings, traces = _answered(store, experiment_id)
+        for name, text in (*_files(outcome, readings), *traces, *_expected(outcome, process)):
             archive.writestr(entry_of(name), text)
     return content.getvalue()
 
@@ -76,8 +97,40 @@ def _page(outcome: ExperimentOutcome) -> str:
     return render_html(outcome_report(outcome), f"Made by gaplab {version('gaplab')}.")
 
 
-def _files(outcome: ExperimentOutcome) -> Iterator[tuple[str, str]]:
+def _answered(store: Store, experiment_id: str) -> tuple[Readings, list[tuple[str, str]]]:
+    """Return the readings of all repeats by measurement, and name and text of each trace."""
+    readings, traces = Readings(), list[tuple[str, str]]()
+    with store.reading() as session:
+        for number, request, answer in requests.measured(session, experiment_id):
+            readings[tuple(request.genome), tuple(answer.values or ())] = answer.readings or ()
+            for repeat, trace in enumerate(answer.traces or (), start=1):
+                content = session.get_one(AttachmentRow, trace["attachment"]).content.decode("utf-8", "replace")
+                traces.append((f"traces/{number}-{request.iteration}-{request.kind.value}-{repeat}.csv", content))
+    return readings, traces
+
+
+def _expected(outcome: ExperimentOutcome, process: RolloutProcess) -> Iterator[tuple[str, str]]:
+    """Yield the motion of measured controllers in the best tuned simulator, and fitness there; nothing if none runs."""
+    if not (outcome.simulators and outcome.robot.world.bodies):
+        return
+    spec, fitness = sent(outcome.spec), dict[str, float | None]()
+    parameters = tuple(outcome.simulators[0].parameters[ref.name] for ref in outcome.spec.tunables)
+    for each in outcome.measured[:MOST_SHOWN]:
+        name = f"{each.repetition}-{each.iteration}-{each.kind.value}"
+        try:
+            times_s, poses, expected = process.call(expected_motion, spec, each.genome, parameters)
+        except GaplabError:
+            return
+        text, header = io.StringIO(), ",".join(trace_tables.COLUMNS)
+        np.savetxt(text, np.column_stack([times_s, poses]), "%.9g", ",", header=header, comments="")
+        fitness[name] = expected if isfinite(expected) else None
+        yield f"expected/{name}.csv", text.getvalue()
+    yield "expected/fitness.json", _json(fitness)
+
+
+def _files(outcome: ExperimentOutcome, readings: Readings) -> Iterator[tuple[str, str]]:
     """Yield name and text of each file beside the page."""
+    yield from (("robot.json", text) for text in robot_library.needed_by(outcome.spec.robot))
     experiment, best = outcome.experiment, outcome.best
     yield "README.txt", README.format(id=experiment.id, name=experiment.name, version=version("gaplab"))
     yield "verdict.txt", "\n\n".join((outcome.facts.verdict.headline, *verdict_sentences(outcome))) + "\n"
@@ -85,7 +138,7 @@ def _files(outcome: ExperimentOutcome) -> Iterator[tuple[str, str]]:
     yield "provenance.json", outcome.facts.provenance[experiment.id].model_dump_json(indent=1) + "\n"
     if best is not None:
         yield "controller.json", _json(best.model_dump(mode="json") | {"unit": outcome.robot.unit})
-        yield "samples.csv", samples_csv(outcome)
+        yield "samples.csv", samples_csv(outcome, readings)
         yield "samples.json", _json([sample.model_dump(mode="json") for sample in outcome.measured])
         genome = frozen(best.genome)
         for form in motions.forms_of(outcome.robot, genome):
@@ -94,15 +147,13 @@ def _files(outcome: ExperimentOutcome) -> Iterator[tuple[str, str]]:
         yield "simulator.json", _json(_simulator(outcome))
 
 
-def samples_csv(outcome: ExperimentOutcome) -> str:
-    """Return the measurements as a table of samples; equal ones once, since a sample may also be a probe.
-
-    Readings are in it unless measurements have repeats, since the mean of readings is all that is stored.
-    """
+def samples_csv(outcome: ExperimentOutcome, readings: Readings) -> str:
+    """Return the measurements as a table of samples; equal ones once, since a sample may also be a probe."""
     samples = list({(each.genome, each.repeats, each.fitness): each for each in outcome.measured}.values())
     repeats = max(len(each.repeats or (0,)) for each in samples)
     sensors = outcome.robot.sensors
-    names = sensors.columns if repeats == 1 and any(each.readings for each in samples) else ()
+    ends = ["", *(f"#{number}" for number in range(2, repeats + 1))] if any(each.readings for each in samples) else []
+    names = [f"{name}{end}" for end in ends for name in sensors.columns]
     values = ["value"] if repeats == 1 else [f"value_{number}" for number in range(1, repeats + 1)]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -110,7 +161,9 @@ def samples_csv(outcome: ExperimentOutcome) -> str:
     for each in samples:
         measured = each.repeats or (each.fitness,)
         blanks = [""] * (repeats - len(measured))
-        writer.writerow([*each.genome, *measured, *blanks, *(_readings(each, outcome) if names else [])])
+        told = [cell for table in readings.get((each.genome, measured), ()) for row in table for cell in row]
+        told = told or (_readings(each, outcome) if len(measured) == 1 else [])
+        writer.writerow([*each.genome, *measured, *blanks, *(told + [None] * len(names))[: len(names)]])
     return text.getvalue()
 
 

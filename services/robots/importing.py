@@ -26,6 +26,9 @@ from gaplab.services.robots.poses import base_pose, start_angles, with_starts
 from gaplab.services.robots.reading import Source, body_name, mujoco_library, read_source
 from gaplab.services.robots.xml import decoded
 
+HUGE_M = 10.0
+"""Length in a robot from which its file may mean millimetres."""
+
 URDF_STEP_S = 1 / 240
 """Time step of a URDF, which has none: Bullet's."""
 
@@ -117,6 +120,9 @@ def _world(source: Source, bodies: Bodies, options: ImportOptions, notes: Notes)
     joints = with_swings(with_motors(joints, source, options, notes), notes)
     found, material, surfaces = _surfaces(source, bodies, options, notes)
     height_m, turn = base_pose(bodies, found, joints, qpos, fixed=fixed)
+    largest_m = max([abs(height_m), *(abs(each) for joint in joints for each in joint.origin_m)])
+    if largest_m > HUGE_M:
+        notes.lose(f"lengths up to {largest_m:.3g} m are taken as they are, not as millimetres; meshes have a scale")
     if not fixed and source.is_urdf:
         notes.lose("the base floats: --fixed holds it")
     usual_step_s = URDF_STEP_S if source.is_urdf else float(model.opt.timestep)

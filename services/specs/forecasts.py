@@ -53,9 +53,10 @@ class SafetyForecast:
         return found.model_copy(update={"unknown": (*found.unknown, *sorted(errors))})
 
     def _extremes(self, genome: Genome, simulator: FloatArray) -> Extremes:
-        times_s = recording_times(self._robot.motion(genome), self._robot.world)
+        motion = self._robot.motion(genome)
+        times_s = recording_times(motion, self._robot.world)
         world, recording = self._simulation.record(genome, simulator, times_s)
-        return extremes(world, recording, float(self._robot.fitness(recording.trajectory)))
+        return extremes(world, motion, recording, float(self._robot.fitness(recording.trajectory)))
 
 
 def forecast_of(spec: ResolvedSpec, robot: Robot, simulation: RecordsRollouts) -> SafetyForecast | None:

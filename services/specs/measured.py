@@ -36,7 +36,7 @@ def outcome_of(
     return Outcome(fitness, _standardised(sensors, readings)), repeats
 
 
-def needs_readings(discrepancy: Discrepancy, sensors: SensorsRead) -> bool:
+def needs_readings(discrepancy: Discrepancy, sensors: Sensors | SensorsRead) -> bool:
     """Return whether the discrepancy cannot compare a sample without readings."""
     times_s = frozen(np.repeat(sensors.times_s, len(sensors.names)))
     return discrepancy.senses and bool(times_s.size) and discrepancy.lack(times_s * np.nan, times_s) is not None
@@ -111,9 +111,10 @@ def bench_violations(spec: ExperimentSpec, robot: Robot, discrepancy: Discrepanc
 
 def _limit_violations(spec: ExperimentSpec, robot: Robot) -> Iterator[Violation]:
     limits = spec.reality.limits
-    if limits is not None and not robot.world.bodies:
-        message = f"the {robot.label} has no body, so no simulator can forecast its motion"
+    if robot.world.bodies:
+        return
+    message = f"the {robot.label} has no body, so no simulator can forecast its motion"
+    if limits is not None:
         yield Violation("/reality/limits", limits.model_dump(mode="json"), message, "left out")
-    if spec.reality.beyond == "refuse" and (limits is None or limits == type(limits)()):
-        message = "nothing is refused without limits; give some in `reality.limits`"
-        yield Violation("/reality/beyond", spec.reality.beyond, message, "warn, or limits")
+    if spec.reality.beyond == "refuse":
+        yield Violation("/reality/beyond", spec.reality.beyond, message, "warn")

@@ -4,6 +4,7 @@ import re
 from contextlib import suppress
 from datetime import timedelta
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,6 +23,7 @@ from gaplab.services.store.models import RequestRow
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
 from tests.integration.test_bench import bench, compute, finish
+from tests.integration.test_bench_http import traces_of
 
 PHONE = {"width": 390, "height": 844}
 MODES: dict[str, dict[str, Any]] = {"light": {}, "dark": {"dark": True}, "phone": PHONE}
@@ -96,6 +98,35 @@ def test_an_operator_takes_measures_and_sends(visit: Any, api: Any, written: Sto
     )
     compute(written)
     expect(page.get_by_role("heading", name="Toy function: sample of iteration 1")).to_be_visible()
+
+
+@pytest.mark.release
+def test_a_phone_is_told_that_readings_are_needed_and_sends_traces(
+    visit: Any, api: Any, written: Store, tmp_path: Path
+) -> None:
+    walker = {"robot": "quadruped", "discrepancy": "readings"}
+    experiment, request = asked(written, "camera", **walker, reality={"repeats": 2})
+    taking.take(written, request.id, TakeSpec(operator="Eve", lease_s=600.0), FREELY)
+    page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
+    expect(page.get_by_text("send a trace of the base for each repeat")).to_be_visible()
+    expect(page.get_by_text("move the joints slowly to the start pose")).to_be_visible()
+
+    page.get_by_role("button", name="End that take…").click()
+    page.get_by_label("Your name").last.fill("Ada")
+    page.get_by_label("Why?").last.fill("her phone is dead")
+    page.get_by_role("button", name="End it").click()
+    take(page)
+    page.get_by_label("Traces (CSV) in place of values").set_input_files([*traces_of(request.genome, tmp_path)])
+    page.get_by_text("✓").nth(1).wait_for()
+    send = page.get_by_role("button", name="Send 2 values")
+    send.click()
+    expect(page.get_by_text("Send the traces?")).to_contain_text("m/s")
+    send.click()
+
+    expect(page.get_by_text("All of them are stored by the service.")).to_be_visible()
+    (answer,) = answers_of(written, request)
+    assert (len(answer.traces), answer.operator) == (2, "Ada")
+    assert answer.readings
 
 
 @pytest.mark.release

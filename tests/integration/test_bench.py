@@ -15,7 +15,7 @@ from sqlalchemy import select, update
 from gaplab.api.app import create_app
 from gaplab.schemas.corrections import ConflictSpec, CorrectionSpec, VoidSpec
 from gaplab.schemas.lifecycle import State, Verb
-from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, TakeSpec
+from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, ReleaseSpec, TakeSpec
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec
@@ -182,7 +182,7 @@ def test_a_take_has_one_holder_and_a_bench_one_take(store: Store) -> None:
     with pytest.raises(Conflict, match="take 2"):
         taking.heartbeat(store, first.id, HolderSpec(take=2))
     assert taking.heartbeat(store, first.id, HolderSpec(take=1)).state == "taken"
-    assert taking.release(store, first.id, HolderSpec(take=1)).state == "open"
+    assert taking.release(store, first.id, ReleaseSpec(take=1)).state == "open"
     assert taking.take(store, second.id, TakeSpec(operator="Bo"), FREELY).answer.taken_by == "Bo"
 
 
@@ -483,7 +483,7 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
     taken = taking.take(store, requests[one.id].id, TakeSpec(operator="Ada"), FREELY).answer
     assert lifecycle.ask_experiment(store, one.id, Verb.PAUSE).state is State.PAUSED
     assert {each.experiment for each in pending(store)} == {one.id, two.id, three.id}  # a taken one is being measured
-    taking.release(store, taken.id, HolderSpec(take=taken.takes))
+    taking.release(store, taken.id, ReleaseSpec(take=taken.takes))
     assert {each.experiment for each in pending(store)} == {two.id, three.id}
     with pytest.raises(Conflict, match="PAUSED"):
         taking.take(store, requests[one.id].id, TakeSpec(operator="Ada"), FREELY)
@@ -611,7 +611,7 @@ def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) 
     compute(store)
     taken = taking.take(store, pending(store)[0].id, TakeSpec(operator="Ada"), FREELY).answer
     archive = exported(export_experiment(store, experiment.id))
-    taking.release(store, taken.id, HolderSpec(take=1))
+    taking.release(store, taken.id, ReleaseSpec(take=1))
 
     for _ in range(2):  # the second time under other ids
         there = imported(other, archive)

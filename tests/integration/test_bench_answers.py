@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from gaplab.schemas.corrections import ConflictSpec
-from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, TakeSpec
+from gaplab.schemas.measurements import MeasurementSpec, ReleaseSpec, TakeSpec
 from gaplab.services.bench import answering, corrections, taking
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.experiments.submission import submit_experiment
@@ -112,7 +112,7 @@ def test_a_failure_that_is_sent_again_is_stored_once(store: Store, request_: Any
 def test_an_answer_of_an_earlier_take_is_not_said_to_be_of_whoever_took_the_request_since(
     store: Store, request_: Any
 ) -> None:
-    taking.release(store, request_.id, HolderSpec(take=1))
+    taking.release(store, request_.id, ReleaseSpec(take=1))
     taking.take(store, request_.id, TakeSpec(operator="Bo"), FREELY)
 
     late = given(store, request_, take=1, values=(0.4,))
@@ -125,7 +125,7 @@ def test_an_answer_of_an_earlier_take_is_not_said_to_be_of_whoever_took_the_requ
 
 
 def test_an_answer_after_the_end_of_the_latest_take_is_of_its_holder(store: Store, request_: Any) -> None:
-    taking.release(store, request_.id, HolderSpec(take=1))
+    taking.release(store, request_.id, ReleaseSpec(take=1))
 
     late = given(store, request_, take=1, values=(0.4,))
 

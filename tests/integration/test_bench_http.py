@@ -15,6 +15,7 @@ from gaplab import Client, InvalidSamples, ServiceError, ServiceUnreachable
 from gaplab.api.clients import driving
 from gaplab.api.clients.journal import Journal
 from gaplab.schemas.access import Role
+from gaplab.schemas.measurements import RequestRead
 from gaplab.services import access
 from gaplab.services.store.session import Store
 from tests.experiments import toy
@@ -258,12 +259,15 @@ def test_a_motion_leaves_in_three_formats(client: Client, store: Store) -> None:
     points = yaml.safe_load(client.bench.motion(request.id, "ros2"))
     assert plain["actuators"] == points["joint_names"]
     assert lines[0].split(",")[1:] == [f"{name} (rad)" for name in plain["actuators"]]
-    assert [float(number) for number in lines[1].split(",")[1:]] == plain["targets"][0]
+    assert [float(number) for number in lines[1].split(",")] == [-1.0, *plain["start"].values()]
+    assert [float(number) for number in lines[2].split(",")[1:]] == plain["targets"][0]
     times = [each["time_from_start"]["sec"] + each["time_from_start"]["nanosec"] / 1e9 for each in points["points"]]
     assert times == sorted(set(times))
-    assert times[-1] == plain["observe_s"][-1] == float(lines[-1].split(",")[0])
+    assert times[-1] - 1.0 == plain["observe_s"][-1] == float(lines[-1].split(",")[0])
     driven = next(client.requests(experiment.id)).motion
     assert (list(driven.actuators), list(driven.units)) == (plain["actuators"], plain["units"])
+    assert driven.start == plain["start"]
+    assert "Before each repeat, move the joints slowly to the start pose" in plain["between_repeats"]
     assert ([list(row) for row in driven.targets], set(driven.units)) == (plain["targets"], {"rad"})
 
 
@@ -326,6 +330,24 @@ def test_a_driver_is_told_before_the_first_run_that_readings_are_needed(client: 
 
     assert task.sensors is not None
     assert (task.sensors.names[0], task.sensors.needed) == ("roll", True)
+    assert "send a trace of the base for each repeat, or let a driver return them" in task.request.needs
+    assert task.request.expected[0].startswith("simulators expect ")
+
+
+def test_the_take_of_a_dead_phone_is_ended_by_somebody_else_with_the_reason(client: Client, store: Store) -> None:
+    experiment = submitted(client)
+    compute(store)
+    (request,) = client.bench.pending(experiment.id)
+    path = f"/requests/{request.id}/release"
+    taken = client._connection.post(RequestRead, f"/requests/{request.id}/take", {"operator": "Ada"})
+
+    by = {"take": taken.takes, "operator": "Bea", "reason": "her phone is dead"}
+    assert client._connection.change(RequestRead, "POST", path, json=by).state == "open"
+
+    (event,) = client.events(follow=False, experiment=experiment.id, kind="released")
+    assert {"by": "Bea", "operator": "Ada", "reason": "her phone is dead"}.items() <= event.body.items()
+    late = client.bench.answer(request.id, [0.4], take=taken.takes)
+    assert (late.state, late.operator) == ("counted", "Ada")
 
 
 def test_readings_of_numpy_are_stored_with_null_where_a_sensor_failed(

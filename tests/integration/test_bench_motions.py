@@ -4,7 +4,9 @@ import csv
 import json
 from typing import Any
 
+import numpy as np
 import pytest
+import yaml
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.bench import motions
@@ -65,13 +67,31 @@ def test_each_target_has_the_unit_of_what_its_motor_follows(put: Any) -> None:
     put(mixed=ROBOT)
 
     plain = json.loads(written("mixed", "json"))
-    heading, first, *_ = csv.reader(written("mixed", "csv").splitlines())
+    heading, rest, first, *_ = csv.reader(written("mixed", "csv").splitlines())
 
     assert plain["units"] == UNITS
     assert heading == ["time_s", *(f"{name} ({unit})" for name, unit in zip(plain["actuators"], UNITS, strict=True))]
+    assert [float(cell) for cell in rest] == [-1.0, *[0.0] * 8]
     assert [float(target) for target in first[1:]] == plain["targets"][0] == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]
     with pytest.raises(Conflict, match=r"follow others: velocity hinge \(velocity\), .*, torque slide \(torque\)"):
         written("mixed", "ros2")
+
+
+def test_a_trajectory_begins_at_rest_and_jumps_nowhere() -> None:
+    spec: Any = Driven(PluginRef(name="quadruped"), controller=PluginRef(name="sine"))
+    robot = robot_of(spec)
+    text = motions.written(spec, robot.known, "ros2")
+    points = yaml.safe_load(text)["points"]
+    times = [each["time_from_start"]["sec"] + each["time_from_start"]["nanosec"] / 1e9 for each in points]
+    targets = np.array([each["positions"] for each in points])
+    motion: Any = robot.motion(robot.known)
+
+    assert targets[0].tolist() == targets[1].tolist() == [joint.start for joint in robot.world.actuators]
+    assert times[:4] == pytest.approx([0.0, 0.98, 1.0, 1.02])
+    assert targets[2:-1].tolist() == motion.targets.tolist()
+    speeds = np.abs(np.diff(targets, axis=0) / np.diff(times)[:, None]).max(axis=0)
+    assert f"# {robot.world.actuators[0].name}: up to {speeds[0]:.3g} rad/s; its limit is 20.0\n" in text
+    assert text.startswith("# The motion begins at 1 s. Before each repeat, move the joints slowly to the start pose (")
 
 
 @pytest.mark.parametrize("form", ["csv", "json", "ros2"])

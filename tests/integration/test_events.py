@@ -32,7 +32,7 @@ from gaplab.schemas.corrections import ConflictSpec, CorrectionSpec, VoidSpec
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.schemas.lifecycle import ExtensionSpec, Verb
-from gaplab.schemas.measurements import HolderSpec, TakeSpec
+from gaplab.schemas.measurements import ReleaseSpec, TakeSpec
 from gaplab.schemas.notifications import Channel
 from gaplab.services import access, archives, events
 from gaplab.services.bench import corrections, taking
@@ -131,7 +131,7 @@ def on_a_bench(store: Store) -> None:
     for _ in range(2):
         taken = taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY).answer
         if taken.takes == 1:
-            taking.release(store, request.id, HolderSpec(take=1))
+            taking.release(store, request.id, ReleaseSpec(take=1))
     with store.transaction() as session:
         session.execute(update(RequestRow).values(taken_until=moment(session) - timedelta(seconds=1)))
     assert taking.open_again(store) == 1

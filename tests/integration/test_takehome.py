@@ -3,6 +3,7 @@
 import io
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -11,16 +12,22 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 import yaml
+from sqlalchemy import update
 
 import gaplab
 from gaplab import Client, ServiceError
+from gaplab.services.bench import attachments
 from gaplab.services.core.arrays import frozen
+from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
+from gaplab.services.engines.mujoco.engine import MuJoCo
 from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.running import execution
+from gaplab.services.store.models import AnswerRow
 from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 from tests.integration.test_bench import compute, measure, pending
+from tests.integration.test_bench_safety import ask
 from tests.integration.test_client import InProcess
 
 WALKING = {"robot": "quadruped", "engine": "mujoco", "repetitions": 1, "iterations": 1}
@@ -73,6 +80,7 @@ def test_everything_is_in_the_zip_and_can_be_used(store: Store, client: Client, 
     assert set(found) == {
         *("page.html", "README.txt", "verdict.txt", "spec.json", "provenance.json", "controller.json"),
         *("samples.csv", "samples.json", "motion.csv", "motion.json", "motion.ros2.yaml", "simulator.json"),
+        *("expected/0-0-probe.csv", "expected/0-1-sample.csv", "expected/fitness.json"),
     }
     controller = json.loads(found["controller.json"])
     assert (controller["fitness"], controller["unit"], controller["kind"]) == (0.4, "m/s", "sample")
@@ -81,6 +89,12 @@ def test_everything_is_in_the_zip_and_can_be_used(store: Store, client: Client, 
     assert len(yaml.safe_load(found["motion.ros2.yaml"])["joint_names"]) == 12
     simulator = json.loads(found["simulator.json"])
     assert simulator["samples"] == 1
+    robot = Quadruped()
+    motion, material = robot.motion(walk(1)), replace(robot.world.material, static_friction=0.9, dynamic_friction=0.4)
+    path = MuJoCo().record(replace(robot.world, material=material), motion, motion.observe_s[-1:])
+    assert json.loads(found["expected/fitness.json"])["0-1-sample"] == float(robot.fitness(path.trajectory))
+    last = [float(cell) for cell in found["expected/0-1-sample.csv"].splitlines()[-1].split(",")]
+    assert last == pytest.approx([motion.observe_s[-1], *path.poses[0]], abs=1e-7)
     first, second = simulator["tunables"]
     assert (first["name"], first["value"], first["interval"]) == ("static_friction", 0.9, [0.8, 1.0])
     assert second["bounds"] == [0.0, pytest.approx(second["bounds"][1])]
@@ -141,6 +155,25 @@ def test_repeats_of_a_bench_are_taken_home(store: Store, client: Client, tmp_pat
     assert found["samples.csv"].splitlines()[0] == "gene_0,value_1,value_2"
     assert "Repeats of one measurement differ by 0.0707 m/s" in found["verdict.txt"]
     assert "± 0.05 (standard error)" in found["page.html"]
+
+
+def test_readings_of_all_repeats_and_traces_are_taken_home(store: Store, client: Client, tmp_path: Path) -> None:
+    reality = {"kind": "physical", "repeats": 2, "probes": "each"}
+    experiment = submit_experiment(store, toy(**WALKING, reality=reality))
+    ask(store)
+    said = [[[0.1 * repeat, None, 0.2, 0.3, 0.4]] * 10 for repeat in (1, 2)]
+    client.bench.answer(pending(store)[0].id, [0.4, 0.5], readings=said)
+    trace = attachments.store_attachment(store, b"time_s,x\n", "run.csv", "text/csv").id
+    recorded = [{"attachment": trace, "lag_s": 1.0, "match": None}]
+    store.write(lambda session: session.execute(update(AnswerRow).values(traces=recorded)))
+
+    found = files(client.take_home(experiment.id, tmp_path / "home.zip").read_bytes())
+    table = tmp_path / "samples.csv"
+    table.write_text(found["samples.csv"])
+    (sample,) = gaplab.read_samples(table, "quadruped")
+
+    assert (sample["values"], sample["readings"]) == ([0.4, 0.5], said)
+    assert found["traces/0-0-probe-1.csv"] == "time_s,x\n"
 
 
 def test_an_experiment_without_results_or_of_another_id_says_so(store: Store, client: Client, tmp_path: Path) -> None:

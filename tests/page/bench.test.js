@@ -3,7 +3,6 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { browserStore } from "../../api/dashboard/lib/bench/browser_store.js";
 import { backoffMs, isMine, nextRequest } from "../../api/dashboard/lib/bench/choosing.js";
-import { expectations } from "../../api/dashboard/lib/bench/expectations.js";
 import { isTemporary, outbox } from "../../api/dashboard/lib/bench/outbox.js";
 import { keyed, newKey } from "../../api/dashboard/lib/keyed.js";
 import { answerText, requestWords, typedNumber, typedValues, withOtherSign } from "../../api/dashboard/lib/bench/values.js";
@@ -119,6 +118,7 @@ test("numbers are read as people type them, and all mistakes are told at once", 
 test("answers and requests are words", () => {
   assert.equal(answerText({ values: [0.41, 0.4] }, "m/s"), "0.41, 0.4 m/s");
   assert.equal(answerText({ values: null, failed: "a leg slipped" }, "m/s"), "failed: a leg slipped");
+  assert.equal(answerText({ traces: ["ab", "cd"] }, "m/s"), "2 traces");
   assert.equal(requestWords({ repetition: 0, iteration: 3, kind: "probe" }), "probe of iteration 3, repetition 0");
 });
 
@@ -144,13 +144,6 @@ test("the next request is the one held here, else the chosen, else the oldest th
 
 test("tries are farther apart each time, up to half a minute", () => {
   assert.deepEqual([0, 1, 2, 5, 6, 60].map(backoffMs), [0, 1000, 2000, 16_000, 30_000, 30_000]);
-});
-
-test("what simulators expect is told with the worst of them", () => {
-  const safety = { simulators: 3, failed: 1, joint_speed: 12.534, torque: null, tilt: Math.PI / 6, height: null, falls: 2, fitness_low: 0.3, fitness_high: 0.5, clearance: null, beyond: [], unknown: ["the torque, which the engine does not tell"] };
-  assert.deepEqual(expectations(safety, "m/s"), ["3 simulators expect 0.3 to 0.5 m/s", "The physics fails in 1 of 3 simulators",
-    "It falls in 2 of 3 simulators", "Greatest joint speed: 12.5 rad/s", "Greatest tilt: 30 °", "Not known: the torque, which the engine does not tell"]);
-  assert.deepEqual(expectations({ ...safety, simulators: 1, failed: 0, falls: 0, joint_speed: null, tilt: null, fitness_high: 0.3, unknown: [] }, ""), ["1 simulator expects 0.3"]);
 });
 
 test("a sentence says what is stored and what waits", () => {

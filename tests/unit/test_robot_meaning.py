@@ -137,7 +137,9 @@ def test_numbers_that_no_robot_has_are_told_and_taken(tmp_path: Path) -> None:
     assert [line.rpartition(": ")[2] for line in told] == ["hip", "hip"]
     (hip,) = found.world.joints
     assert (hip.limits, hip.motor.max_torque_nm) == ((-90.0, 90.0), 1000.0)
-    assert not [line for line in imported(tmp_path).robot.lost if "not as degrees" in line or "weight" in line]
+    assert not [line for line in imported(tmp_path).robot.lost if "not as" in line or "weight" in line]
+    far = imported(tmp_path, edits={'<axis xyz="0 1 0"/>': '<axis xyz="0 1 0"/><origin xyz="300 0 0"/>'}).robot
+    assert any("lengths up to 300 m are taken as they are, not as millimetres" in line for line in far.lost)
 
 
 @pytest.mark.parametrize("beside", [True, False])

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.schemas.safety import LimitsSpec
+from gaplab.schemas.safety import LimitsSpec, Safety
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.motions import Recording, Trajectory
+from gaplab.services.core.motions import Motion, Recording, Trajectory
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.safety import Extremes, extremes, recording_times, safety
+from gaplab.services.core.safety import Extremes, expected, extremes, recording_times, safety
 from gaplab.services.core.world import World
 from gaplab.services.engines import engines
 from gaplab.services.specs.assembly import setting
@@ -21,6 +21,7 @@ from gaplab.services.specs.resolution import resolve_experiment
 from tests.experiments import toy
 
 ROBOT = Quadruped()
+STILL = Motion(frozen([0.0]), frozen(np.zeros((1, 12))), frozen([0.1]))
 LIMITS = LimitsSpec(joint_speed=5.0, torque=3.0, tilt=0.5, height=0.1)
 
 
@@ -36,11 +37,11 @@ def tilted(*angles: float) -> Recording:
 def test_a_joint_may_turn_by_more_than_half_a_turn_between_two_observations() -> None:
     spun = replace(tilted(0.0, 0.0, 0.0), angles_rad=frozen([[0.0], [3.5], [7.0]]))
 
-    assert extremes(ROBOT.world, spun, 0.4).joint_speed == pytest.approx(350.0)
+    assert extremes(ROBOT.world, STILL, spun, 0.4).joint_speed == pytest.approx(350.0)
 
 
 def test_extremes_are_the_worst_of_a_rollout() -> None:
-    found = extremes(ROBOT.world, tilted(0.0, 0.3, -0.6), 0.4)
+    found = extremes(ROBOT.world, STILL, tilted(0.0, 0.3, -0.6), 0.4)
 
     assert found.tilt == pytest.approx(0.6)
     assert found.joint_speed == pytest.approx(10.0)
@@ -54,13 +55,39 @@ def test_a_robot_that_starts_turned_is_upright_there() -> None:
 
     world = replace(ROBOT.world, start_turn=tuple(lying.poses[0, 3:].tolist()))
 
-    assert extremes(world, lying, 0.4).tilt == pytest.approx(0.6)
-    assert extremes(ROBOT.world, lying, 0.4).tilt == pytest.approx(pi / 2 + 0.3)
+    assert extremes(world, STILL, lying, 0.4).tilt == pytest.approx(0.6)
+    assert extremes(ROBOT.world, STILL, lying, 0.4).tilt == pytest.approx(pi / 2 + 0.3)
+
+
+def test_a_range_of_the_robot_file_and_a_fall_are_limits_that_nobody_needs_to_ask_for() -> None:
+    hip, *others = ROBOT.world.joints
+    world = replace(ROBOT.world, joints=(replace(hip, limits=(-0.2, 0.5)), *others))
+    far = replace(STILL, targets=frozen(np.full((1, 12), -0.7)))
+    (said,) = extremes(world, far, tilted(0.0, 0.1), 0.4).out_of_range
+
+    assert said == f"{hip.name} is to go to -0.7 rad; its range is -0.2 to 0.5 rad"
+    assert extremes(world, STILL, tilted(0.0, 0.1), 0.4).out_of_range == ()
+    fell = Extremes(tilt=pi, fitness=0.1, out_of_range=(said,))
+    assert safety([fell, fell], None, "mine").beyond == ("it falls in 2 of 2 simulators", said)
+    assert safety([fell], LimitsSpec(tilt=3.2), "mine").beyond == (said,)
+
+
+def test_what_simulators_expect_is_told_with_the_worst_of_them() -> None:
+    found = Safety(simulators=3, failed=1, joint_speed=12.534, height=0.1, falls=2, fitness_low=0.3, fitness_high=0.5)
+
+    assert list(expected(found, "m/s")) == [
+        *("simulators expect 0.3 to 0.5 m/s", "the physics fails in 1 of 3 simulators"),
+        *("it falls in 2 of 3 simulators", "the speed of a joint: at most 12.5 rad/s"),
+        "the height of the base: at least 0.1 m",
+    ]
+    assert list(expected(Safety(simulators=1, failed=0, fitness_low=0.3, fitness_high=0.3), "")) == [
+        "simulators expect 0.3"
+    ]
 
 
 def test_failed_physics_has_no_extremes() -> None:
-    assert np.isnan(extremes(ROBOT.world, tilted(0.0, nan), 0.4).tilt)
-    assert np.isnan(extremes(ROBOT.world, tilted(0.0), nan).tilt)
+    assert np.isnan(extremes(ROBOT.world, STILL, tilted(0.0, nan), 0.4).tilt)
+    assert np.isnan(extremes(ROBOT.world, STILL, tilted(0.0), nan).tilt)
 
 
 def test_the_forecast_is_the_worst_of_all_simulators_and_says_what_it_exceeds() -> None:
@@ -151,11 +178,10 @@ def test_a_robot_without_a_body_and_a_simulated_reality_have_no_forecast() -> No
     ("spec", "pointers"),
     [
         (toy(reality={"kind": "physical", "limits": {"tilt": 0.5}}), {"/reality/limits"}),
-        (quadruped(beyond="refuse"), {"/reality/beyond"}),
-        (quadruped(beyond="refuse", limits={}), {"/reality/beyond"}),
+        (toy(reality={"kind": "physical", "beyond": "refuse"}), {"/reality/beyond"}),
         (toy(reality={"limits": {"tilt": 0.5}, "beyond": "refuse"}), {"/reality/limits", "/reality/beyond"}),
     ],
-    ids=["no body", "no limits", "empty limits", "simulated"],
+    ids=["no body", "nothing to refuse", "simulated"],
 )
 def test_limits_that_nothing_checks_are_refused(spec: Any, pointers: set[str]) -> None:
     with pytest.raises(InvalidSpec) as refused:

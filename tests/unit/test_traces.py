@@ -100,7 +100,7 @@ def test_the_start_is_where_a_base_at_rest_begins_to_move_however_it_moves_then(
         (lambda trace: cut(trace, 6.0, 7.0), "there is no pose from 6 to 7 s"),
         (lambda trace: frozen_from(trace, 6.0, 7.0), "the pose stays the same from 6 s for 1 s"),
         (lambda trace: moved(trace, [0.0, 0.0, 230.0]), "the base begins 230 m high, and the simulators expect 0.17 m"),
-        (lambda trace: scaled(trace, 1000.0), "m, and the simulators expect"),
+        (lambda trace: scaled(trace, 1000.0), "are these millimetres (`x [mm]`)?"),
         (lambda trace: on_its_side(trace), "the base begins tilted by 90° from what the simulators expect"),
         (lambda trace: still(trace), "the base does not move"),
     ],

@@ -521,6 +521,11 @@ declare namespace Api {
     limits: LimitsSpec | null;
     beyond: "warn" | "refuse";
   }
+  interface ReleaseSpec {
+    take: number;
+    operator: string | null;
+    reason: string | null;
+  }
   interface RepetitionRead {
     number: number;
     state: State;
@@ -590,6 +595,9 @@ declare namespace Api {
     taken_until: string | null;
     busy: boolean;
     safety: Safety | null;
+    expected: Array<string>;
+    between_repeats: string | null;
+    needs: string | null;
     same_as: string | null;
     branch: number | null;
     answers: Array<AnswerRead>;

@@ -35,7 +35,7 @@ def swings(world: World, amplitude: float = 1.0) -> FloatArray:
 def sampled(targets: FloatArray, times_s: FloatArray, observe_s: FloatArray) -> Motion:
     """Return the motion of targets `(k, a)` that were sampled at times `(k,)`."""
     targets.setflags(write=False)
-    return Motion(times_s, targets, observe_s)
+    return Motion(times_s, targets, observe_s, every_s=float(times_s[1] if len(times_s) > 1 else observe_s[-1]))
 
 
 def sampling_times_s(observe_s: FloatArray, every_s: float) -> FloatArray:

@@ -154,14 +154,14 @@ def expire(session: Session, which: ColumnElement[bool] | None = None) -> int:
     return len(expired)
 
 
-def give_up(session: Session, row: RequestRow, kind: EventKind) -> None:
-    """End the take of a request that got no answer."""
+def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
+    """End the take of a request that got no answer; `more` is told in its event."""
     unanswered = row.unanswered + (kind is EventKind.TAKE_EXPIRED)
     to = RequestState.STUCK if unanswered >= MOST_UNANSWERED else RequestState.OPEN
     request_states.become(session, row, to, held=None, unanswered=unanswered)
     repetition = session.get(RepetitionRow, row.repetition_id)
     if repetition is not None:
-        body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by}
+        body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by, **more}
         note(session, kind, repetition.experiment_id, repetition.number, **body)
 
 
@@ -171,6 +171,15 @@ def answers_of(session: Session, requests: Iterable[str]) -> dict[str, list[Answ
     for each in session.scalars(select(row).where(row.request_id.in_(list(requests))).order_by(row.at, row.id)):
         found.setdefault(each.request_id, []).append(each)
     return found
+
+
+def measured(session: Session, experiment: str) -> Sequence[tuple[int, RequestRow, AnswerRow]]:
+    """Return the answers with values that count, each with the number of its repetition and its request."""
+    row, request = AnswerRow, RequestRow
+    query = of_experiments(row, [experiment], RepetitionRow.number, request, row)
+    query = query.join(request, request.id == row.request_id).where(row.state == AnswerState.COUNTED)
+    found = session.execute(query.order_by(row.at, row.id))
+    return [(number, asked, answer) for number, asked, answer in found if answer.values is not None]
 
 
 def doubtful(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str, ...]]:

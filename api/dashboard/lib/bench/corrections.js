@@ -16,7 +16,7 @@ import { answerText, typedValues } from "./values.js";
  * @property {string} words which one it is
  */
 
-const REASON = { name: "reason", label: "Why?", value: "", required: true, maxlength: 2000, autocomplete: "off", hint: "it is stored with the measurement" };
+export const REASON = { name: "reason", label: "Why?", value: "", required: true, maxlength: 2000, autocomplete: "off", hint: "it is stored with the measurement" };
 
 /** The name of the person at this browser. */
 export const operatorName = () => /** @type {string} */ (browserStore("operator").read("name") ?? "");

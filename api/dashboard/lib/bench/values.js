@@ -39,13 +39,13 @@ export function typedValues(texts) {
 export const withOtherSign = (text) => (/^\s*[-−]/.test(text) ? text.replace(/^\s*[-−]/, "") : `-${text.trim()}`);
 
 /**
- * Return an answer in words: its values with their unit, or why there are none.
+ * Return an answer in words: its values with their unit, its traces, or why there are none.
  *
- * @param {{ values?: number[] | null, failed?: string | null }} answer
+ * @param {{ values?: number[] | null, failed?: string | null, traces?: unknown[] }} answer
  * @param {string} [unit]
  */
-export const answerText = ({ values, failed }, unit = "") =>
-  (values ? `${values.map(number).join(", ")}${unit ? ` ${unit}` : ""}` : `failed: ${failed}`);
+export const answerText = ({ values, failed, traces = [] }, unit = "") =>
+  (values ? `${values.map(number).join(", ")}${unit ? ` ${unit}` : ""}` : failed ? `failed: ${failed}` : `${traces.length} traces`);
 
 /**
  * Return which measurement a request asks for.

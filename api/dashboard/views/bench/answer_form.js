@@ -6,14 +6,15 @@ import { browserStore } from "../../lib/bench/browser_store.js";
 import { isMine } from "../../lib/bench/choosing.js";
 import { operatorName } from "../../lib/bench/corrections.js";
 import { answers } from "../../lib/bench/sender.js";
-import { requestWords, typedValues, withOtherSign } from "../../lib/bench/values.js";
+import { answerText, requestWords, typedValues, withOtherSign } from "../../lib/bench/values.js";
 import { h, setText } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
 import { filesField } from "./files_field.js";
 
 const ASK_MS = 5000;
+const EVALUATE_MS = 60_000;
 
-/** @typedef {{ values: string[], note: string, failed: string, files?: import("./files_field.js").Kept[] }} Draft */
+/** @typedef {{ values: string[], note: string, failed: string, files?: import("./files_field.js").Kept[], traces?: import("./files_field.js").Kept[] }} Draft */
 
 /**
  * Return the form. A request keeps its form when its card is made again, so that nobody who types is interrupted.
@@ -33,8 +34,9 @@ export function answerForm(request, view) {
  * @param {string} id
  * @param {Record<string, any>} body
  */
-export function reviseAnswer(view, id, { values, note, failed, attachments = [] }) {
-  browserStore("draft").write(id, { values: (values ?? []).map(String), note: note ?? "", failed: failed ?? "", files: attachments.map((/** @type {string} */ hash) => ({ id: hash, name: "file" })) });
+export function reviseAnswer(view, id, { values, note, failed, attachments = [], traces = [] }) {
+  const [files, recorded] = [attachments, traces].map((hashes) => hashes.map((/** @type {string} */ hash) => ({ id: hash, name: "file" })));
+  browserStore("draft").write(id, { values: (values ?? []).map(String), note: note ?? "", failed: failed ?? "", files, traces: recorded });
   view.form = null;
 }
 
@@ -43,7 +45,7 @@ export function reviseAnswer(view, id, { values, note, failed, attachments = [] 
  * @param {Page.BenchView} view
  */
 function make(request, view) {
-  const { id, repeats, unit } = request;
+  const { id, repeats, unit, between_repeats: between } = request;
   const drafts = browserStore("draft");
   const draft = /** @type {Draft} */ (drafts.read(id) ?? { values: [], note: "", failed: "" });
   const fields = Array.from({ length: repeats }, (_, index) => valueField(index, repeats, unit, draft.values[index] ?? ""));
@@ -52,8 +54,9 @@ function make(request, view) {
   Object.assign(note, { value: draft.note });
   Object.assign(why, { value: draft.failed });
   const [trouble, doubt] = [h("p", { class: "failed", role: "alert" }), h("p", { class: "failed", role: "alert" })];
-  const keep = () => drafts.write(id, { values: fields.map(({ input }) => input.value), note: note.value, failed: why.value, files: files.kept() });
-  const files = filesField(draft.files ?? [], keep);
+  const keep = () => drafts.write(id, { values: fields.map(({ input }) => input.value), note: note.value, failed: why.value, files: files.kept(), traces: traces.kept() });
+  const files = filesField({ id: "files", label: "Photos and other files" }, draft.files ?? [], keep);
+  const traces = filesField({ id: "traces", label: `Traces (CSV) in place of ${repeats === 1 ? "the value" : "values: one for each repeat, in order"}` }, draft.traces ?? [], keep);
 
   /** @param {Record<string, unknown>} answer */
   function give(answer) {
@@ -74,18 +77,20 @@ function make(request, view) {
   let asked = "";
   const submit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
-    const { values, mistakes } = typedValues(fields.map(({ input }) => input.value));
-    fields.forEach((field, index) => field.mark(mistakes[index]));
+    const recorded = traces.kept().map((file) => file.id);
+    const { values, mistakes } = recorded.length ? { values: [], mistakes: [] } : typedValues(fields.map(({ input }) => input.value));
+    fields.forEach((field, index) => field.mark(mistakes[index] ?? null));
     const first = mistakes.findIndex(Boolean);
     if (first >= 0) {
       fields[first].input.focus();
       return;
     }
-    const isConfirmed = asked === String(values);
-    const doubts = isConfirmed ? [] : await doubtsAbout(id, values);
-    asked = String(values);
-    setText(doubt, doubts.length ? `${doubts.join("; ")}. Send it all the same?` : "");
-    if (!doubts.length) give({ values, ...(isConfirmed ? { confirmed: true } : {}) });
+    const measured = recorded.length ? { traces: recorded } : { values };
+    const isConfirmed = asked === JSON.stringify(measured);
+    const doubts = isConfirmed ? [] : await doubtsAbout(id, measured, unit);
+    asked = JSON.stringify(measured);
+    setText(doubt, doubts.length ? `${doubts.join("; ")}. Send ${recorded.length ? "the traces" : "it all the same"}?` : "");
+    if (!doubts.length) give({ ...measured, ...(isConfirmed ? { confirmed: true } : {}) });
   };
   const fail = () => {
     setText(trouble, why.value.trim() ? "" : "Enter why it failed.");
@@ -99,7 +104,7 @@ function make(request, view) {
   });
   return h("form", { class: "answer", novalidate: true, oninput: keep, onsubmit: submit },
     ...fields.map(({ element }) => element),
-    h("p", { class: "field" }, h("label", { for: "note" }, "Note"), note), files.element,
+    between ? traces.element : null, h("p", { class: "field" }, h("label", { for: "note" }, "Note"), note), files.element,
     doubt, h("button", { type: "submit", class: "big" }, repeats === 1 ? "Send the value" : `Send ${repeats} values`),
     h("details", { open: Boolean(draft.failed) }, h("summary", {}, "It failed…"),
       h("p", { class: "field" }, h("label", { for: "failed" }, "Why?"), why,
@@ -108,17 +113,20 @@ function make(request, view) {
 }
 
 /**
- * Return what is unlikely about values; nothing if the service is away. It then remarks on what it gets later.
+ * Return what is unlikely about values, and what traces say; nothing if the service is away. It then remarks on what it gets later.
  *
  * @param {string} id
- * @param {number[]} values
+ * @param {{ values?: number[], traces?: string[] }} measured
+ * @param {string} unit
  * @returns {Promise<string[]>}
  */
-async function doubtsAbout(id, values) {
+async function doubtsAbout(id, measured, unit) {
   try {
-    return (await post(`/requests/${id}/doubts`, { values }, {}, AbortSignal.timeout(ASK_MS))).doubts;
-  } catch {
-    return [];
+    if (!measured.traces) return (await post(`/requests/${id}/doubts`, measured, {}, AbortSignal.timeout(ASK_MS))).doubts;
+    const { values, doubts } = await post(`/requests/${id}/traces`, measured, {}, AbortSignal.timeout(EVALUATE_MS));
+    return [answerText({ values }, unit), ...doubts];
+  } catch (error) {
+    return measured.traces && error.status ? [error.message] : [];
   }
 }
 

@@ -1,5 +1,5 @@
 // @ts-check
-/** Files of an answer, like a photograph or a trace: each is stored as soon as it is chosen, and the answer names it by its hash. */
+/** Files of an answer, like photographs, or its traces: each is stored as soon as it is chosen, and the answer names it by its hash. */
 
 import { postFile } from "../../lib/api.js";
 import { h, setText } from "../../lib/dom.js";
@@ -9,12 +9,13 @@ import { h, setText } from "../../lib/dom.js";
 /**
  * Return the field, and the files that it has.
  *
+ * @param {{ id: string, label: string }} words
  * @param {Kept[]} given
  * @param {() => void} changed
  */
-export function filesField(given, changed) {
+export function filesField({ id: name, label }, given, changed) {
   let kept = given;
-  const input = h("input", { id: "files", type: "file", multiple: true });
+  const input = h("input", { id: name, type: "file", multiple: true });
   const list = h("ul", { class: "rows" });
   const status = h("small", { role: "status" });
   const draw = () => list.replaceChildren(...kept.map((file) => {
@@ -41,6 +42,6 @@ export function filesField(given, changed) {
     input.value = "";
   });
   draw();
-  const element = h("div", { class: "field" }, h("label", { for: "files" }, "Photos and other files"), input, status, list);
+  const element = h("div", { class: "field" }, h("label", { for: name }, label), input, status, list);
   return { element, kept: () => kept };
 }

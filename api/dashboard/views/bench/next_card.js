@@ -3,11 +3,11 @@
 
 import { ageOf } from "../../lib/ages.js";
 import { post, queryString } from "../../lib/api.js";
-import { operatorName } from "../../lib/bench/corrections.js";
+import { operatorName, REASON } from "../../lib/bench/corrections.js";
 import { browserStore } from "../../lib/bench/browser_store.js";
 import { isMine } from "../../lib/bench/choosing.js";
-import { expectations } from "../../lib/bench/expectations.js";
 import { copyButton } from "../../lib/copy.js";
+import { openDialog } from "../../lib/dialog.js";
 import { h } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { count, readableName } from "../../lib/format.js";
@@ -42,16 +42,17 @@ export function nextCard(request, view) {
     h("h2", { id: "next-title", tabindex: "-1" }, `${readableName(robot)}: ${request.kind} of iteration ${request.iteration}`),
     h("p", { class: "large" }, `Repetition ${request.repetition} · `, h("strong", {}, values)),
     h("p", { class: "note" }, h("a", { href: `#/experiments/${experiment}` }, name), " · asked ", ageOf(request.created_at)),
-    safety(request), files(request, view), holder(request, view));
+    advice(request), files(request, view), holder(request, view));
 }
 
 /** @param {Api.RequestRead} request */
-function safety({ safety: expected, unit }) {
-  if (!expected) return null;
-  const lines = expectations(expected, unit);
+function advice({ safety, expected, between_repeats: between, needs }) {
+  const list = (/** @type {string[]} */ lines, attributes = {}) => h("ul", attributes, ...lines.map((line) => h("li", {}, line)));
   return [
-    expected.beyond.length ? h("div", { class: "remark broken" }, h("strong", {}, "Beyond the limits of the robot"), h("ul", {}, ...expected.beyond.map((words) => h("li", {}, words)))) : null,
-    lines.length ? h("ul", { class: "expected", "aria-label": "What simulators expect" }, ...lines.map((line) => h("li", {}, line))) : null,
+    needs ? h("p", { class: "remark warned" }, needs) : null,
+    safety?.beyond.length ? h("div", { class: "remark broken" }, h("strong", {}, "Beyond the limits of the robot"), list(safety.beyond)) : null,
+    safety ? list([...expected, ...safety.unknown], { class: "expected", "aria-label": "What simulators expect" }) : null,
+    between ? h("p", { class: "note" }, between) : null,
   ];
 }
 
@@ -98,7 +99,15 @@ function holder(request, view) {
     return [h("p", { class: "held" }, `You have it, as ${by}. `, button("Give it back", () => view.take.release(), "quiet small")), failure, form];
   }
   if (state === "taken") {
-    return [h("p", { class: "remark warned" }, `${by} has taken it until ${timeOf(request)}.`), failure,
+    const end = () => openDialog({
+      title: `End the take of ${by}?`, text: "The request is open again. An answer that still comes is kept, and a person decides which one counts.",
+      fields: [{ name: "operator", label: "Your name", value: operatorName(), required: true, maxlength: 200 }, REASON], action: "End it",
+      act: async (given) => {
+        await post(`/requests/${id}/release`, { take: request.takes, ...given });
+        view.refresh();
+      },
+    }, view.signal);
+    return [h("p", { class: "remark warned" }, `${by} has taken it until ${timeOf(request)}. `, button("End that take…", async () => end(), "quiet small")), failure,
       h("details", {}, h("summary", {}, "Answer it all the same"), h("p", { class: "note" }, "A person then decides which answer counts."), form)];
   }
   if (state === "stuck") {

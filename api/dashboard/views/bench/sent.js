@@ -78,5 +78,5 @@ function row(entry, view) {
       return [h("span", {}, `✓ ${STORED[stored.state]}`), undo];
     },
   };
-  return h("li", { class: state, dataset: { key } }, h("strong", {}, answerText(body, unit)), h("span", { class: "note" }, ` ${words} · ${new Date(entry.made).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" })}`), ...parts[state]());
+  return h("li", { class: state, dataset: { key } }, h("strong", {}, answerText(answer ?? body, unit)), h("span", { class: "note" }, ` ${words} · ${new Date(entry.made).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" })}`), ...parts[state]());
 }

@@ -68,7 +68,7 @@ const WORDS = {
   requested: (event) => `${step(event)}: a measurement of the ${event.body.kind === "probe" ? "transferred controller" : "sample"} is requested`,
   refused: (event) => `${step(event)}: refused before it was offered${reason(event)}`,
   taken: (event) => `${step(event)}: taken by ${event.body.operator}`,
-  released: (event) => `${step(event)}: given back by ${event.body.operator} without an answer`,
+  released: (event) => `${step(event)}: given back by ${event.body.by ?? event.body.operator} without an answer${event.body.reason ? `, taken by ${event.body.operator}: ${event.body.reason}` : ""}`,
   take_expired: (event) => `${step(event)}: ${event.body.operator} gave no sign of life, so the measurement is open again`,
   conflicting: (event) => `${step(event)}: an answer by ${event.body.operator} is in conflict, to be decided`,
   corrected: (event) => `${step(event)}: the measurement by ${event.body.operator} was corrected${event.body.by ? ` by ${event.body.by}` : ""}${reason(event)}`,
