@@ -86,10 +86,11 @@ def numbers(studies: Sequence[Study], others: Sequence[Study]) -> dict[str, str]
     def each(of: Callable[[Study], str]) -> str:
         return "; ".join(f"{of(study)} in {ENGINES.get(study.reality, study.reality)}" for study in studies)
 
-    told = {f"spread_{kind}": each(partial(_spread, kind)) for kind in results.KINDS}
+    told = {f"spread_{kind}": listed([_spread(kind, study) for study in studies]) for kind in results.KINDS}
     told |= {f"means_{kind}": each(partial(_means, kind)) for kind in results.KINDS}
     samples = [(study, found.told(".2f")) for study in others if (found := _one_sample(study))]
     return told | {
+        "engines": listed([ENGINES.get(study.reality, study.reality) for study in studies]),
         "counts": each(_counts),
         "over": each(_over),
         "alone": each(_alone),

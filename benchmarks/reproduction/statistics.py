@@ -150,9 +150,12 @@ class Tested(NamedTuple):
 
 
 def pooled(parts: Sequence[Tested]) -> Tested:
-    """Return the same test of one statement in several studies, each weighted by the inverse of its variance."""
-    found = [each.found for each in parts if each.found and each.found.error and each.shows is not None]
-    if len(found) < len(parts) or parts[0].again is None:
+    """Return the same test of one statement in several studies, each weighted by the inverse of its variance.
+
+    Studies in which it is not tested are left out.
+    """
+    found = [each.found for each in parts if each.found and each.shows is not None]
+    if not found or parts[0].again is None:
         return Tested(None, None, "")
     return parts[0].again(Difference.pooled(found))
 
