@@ -139,14 +139,19 @@ def fitness_table(store: Store, labels: Imported) -> Table:
 
 
 def difference_table(store: Store, labels: Imported, counts: Sequence[int]) -> Table:
-    """Return the differences of all pairs after each number of evaluations, with Holm's p over the pairs of a count."""
+    """Return the differences of all pairs after each number of evaluations, and of their means over all of them.
+
+    Each p has Holm's correction over the pairs of a row's number or range.
+    """
     title = "Differences of fitness with 90 % intervals; p of the trusted test after Holm"
     table = Table("after", "first", "second", "difference", "p", title=title)
-    for count in counts:
-        for pair in compare(store, list(labels), from_evaluations=count, to_evaluations=count, intervals=False):
+    first, last = min(counts), max(counts)
+    for begin, end in [*((count, count) for count in counts), *([(first, last)] if first < last else [])]:
+        after = str(end) if begin == end else f"{begin} to {end}"
+        for pair in compare(store, list(labels), from_evaluations=begin, to_evaluations=end, intervals=False):
             difference = f"{_number(pair.difference)} ({_number(pair.lower)} to {_number(pair.upper)})"
             p = "-" if pair.trusted.p_holm is None else f"{pair.trusted.p_holm:.2g}"
-            table.add_row(str(count), labels[pair.first], labels[pair.second], difference, p)
+            table.add_row(after, labels[pair.first], labels[pair.second], difference, p)
     return table
 
 

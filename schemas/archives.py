@@ -62,6 +62,11 @@ class RepetitionRerun(Frozen):
     outcome: Outcome
     steps: int = Field(description="steps with the same bits, up to the first that differs")
     stored_steps: int = Field(description="steps in the archive")
+    code: str | None = Field(
+        default=None,
+        description="processor's code that gives these bits, if it is not the usual one",
+        examples=["AVX-512"],
+    )
     reason: str | None = Field(default=None, description="first difference, or why it was not computed")
 
 

@@ -20,7 +20,7 @@ _SUMMARIES = tuple(
     )
 )
 _PATHS = (
-    *("first", "first_name", "second", "second_name", "from_evaluations", "to_evaluations"),
+    *("first", "first_name", "second", "second_name", "from_evaluations", "to_evaluations", "fitness"),
     *_GROUPS,
     *(f"{test}.{part}" for test in TESTS for part in _OF_A_TEST),
     *("lower", "upper", *(f"improvement.{part}" for part in _OF_AN_ESTIMATE)),
@@ -31,9 +31,8 @@ _PATHS = (
 )
 
 COLUMNS = tuple(path.removesuffix(".value").replace(".", "_") for path in _PATHS)
-TEXTS = frozenset(
-    {"first", "first_name", "second", "second_name", "trusted_test", "equivalence_test", "equivalence_verdict"}
-)
+_NAMES = {"first", "first_name", "second", "second_name", "fitness"}
+TEXTS = frozenset({*_NAMES, "trusted_test", "equivalence_test", "equivalence_verdict"})
 NUMBERS = tuple(name for name in COLUMNS if name not in TEXTS | {"shared_streams"})
 
 

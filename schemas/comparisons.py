@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Id, Name, Statistic
+from gaplab.schemas.curves import Fitness
 
 
 class Test(Frozen):
@@ -109,10 +110,11 @@ class Pair(Frozen):
 class Comparison(Groups, Pair):
     """Two experiments, compared by one value for each repetition.
 
-    The value is the recorded fitness at a single number of real-world evaluations. Over a range it is the mean over
+    The value is the fitness at a single number of real-world evaluations. Over a range it is the mean over
     the range; a repetition that lacks a number of the range is left out. Differences are `first` minus `second`.
     """
 
+    fitness: Fitness = Fitness.RECORDED
     difference: Statistic = Field(
         description="difference of the means; where streams are shared, over the repetitions that both have"
     )

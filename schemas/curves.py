@@ -1,13 +1,36 @@
 """Fitness against the number of real-world evaluations."""
 
+from enum import StrEnum
+
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Id, Name, Statistic, Unit
 from gaplab.schemas.lifecycle import State
 
 
+class Fitness(StrEnum):
+    """Whose fitness in reality counts after each number of real-world evaluations.
+
+    The paper's `recorded` is the larger of the transferred controller's and the best sample's, `transferred` that of
+    the transferred controller alone, `equal_chances` the best of those so far: as many for every strategy.
+    """
+
+    RECORDED = "recorded"
+    TRANSFERRED = "transferred"
+    EQUAL_CHANCES = "equal_chances"
+
+    @property
+    def words(self) -> str:
+        """What it is, as a heading begins with it."""
+        return {
+            Fitness.RECORDED: "Recorded fitness",
+            Fitness.TRANSFERRED: "Fitness of transferred controllers alone",
+            Fitness.EQUAL_CHANCES: "Best fitness of the controllers transferred so far",
+        }[self]
+
+
 class CurvePoint(Frozen):
-    """Recorded fitness at one number of real-world evaluations, over the repetitions that have reached it.
+    """Fitness at one number of real-world evaluations, over the repetitions that have reached it.
 
     A statistic is null if it has too few repetitions.
     """
@@ -33,6 +56,7 @@ class Curve(Frozen):
     strategy: Name
     state: State
     unit: Unit
+    fitness: Fitness = Fitness.RECORDED
     direct: bool = Field(default=False, description="true for the direct baseline, which evolves in reality itself")
     level: bool = Field(default=False, description="true for a strategy without samples: a level across the figure")
     points: tuple[CurvePoint, ...]

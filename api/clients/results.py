@@ -41,14 +41,21 @@ class Results:
             default=None,
         )
 
-    def curves(self, ids: Sequence[str]) -> tuple[Curve, ...]:
-        """Return the curves of experiments, and of all experiments of studies, in this order."""
-        return self.curves_of(self._experiments(ids))
+    def curves(self, ids: Sequence[str], fitness: str = "recorded") -> tuple[Curve, ...]:
+        """Return the curves of experiments, and of all experiments of studies, in this order.
 
-    def curves_of(self, experiments: Sequence[str]) -> tuple[Curve, ...]:
+        Args:
+            ids: ids of experiments and studies.
+            fitness: recorded as in the paper, `transferred` controllers alone, or the best of these so far,
+                `equal_chances`.
+        """
+        return self.curves_of(self._experiments(ids), fitness)
+
+    def curves_of(self, experiments: Sequence[str], fitness: str = "recorded") -> tuple[Curve, ...]:
         """Return the curves of experiments, given by their ids, with one request per hundred."""
-        parts = [self._connection.get(tuple[Curve, ...], "/curves", experiment=ids) for ids in _hundreds(experiments)]
-        return tuple(curve for part in parts for curve in part)
+        parts = _hundreds(experiments)
+        found = (self._connection.get(tuple[Curve, ...], "/curves", experiment=ids, fitness=fitness) for ids in parts)
+        return tuple(curve for part in found for curve in part)
 
     def curves_csv(self, ids: Sequence[str]) -> str:
         """Return the curves of experiments and studies as CSV."""
@@ -56,7 +63,7 @@ class Results:
         first, *others = (self._connection.get_bytes("/curves", **request).decode() for request in requests)
         return first + "".join(other.partition("\n")[2] for other in others)  # the header stands once
 
-    def compare(
+    def compare(  # noqa: PLR0913 - each is a parameter of the operation
         self,
         experiments: Sequence[str],
         first: int | None = None,
@@ -65,6 +72,7 @@ class Results:
         margin: float | None = None,
         margin_of_direct: float | None = None,
         intervals: bool | None = None,
+        fitness: str = "recorded",
     ) -> Comparisons:
         """Compare every pair of experiments, one value for each repetition: over a range, its mean.
 
@@ -79,10 +87,11 @@ class Results:
             margin: difference in the unit of fitness; `equivalence` of a pair says whether it differs by less.
             margin_of_direct: the same margin as a share of the direct baseline's mean fitness, like 0.03.
             intervals: with intervals; left out: for up to 20 experiments.
+            fitness: whose fitness counts, as in `curves`.
         """
         records = [each for id in _several(experiments) for each in experiments_of(self._records.find(id))]
         query: dict[str, Parameter] = {"experiment": [each.id for each in records], "from": first, "to": last}
-        query |= {"margin": margin, "margin_of_direct": margin_of_direct, "intervals": intervals}
+        query |= {"margin": margin, "margin_of_direct": margin_of_direct, "intervals": intervals, "fitness": fitness}
         pairs = self._connection.get(tuple[Comparison, ...], "/comparisons", **query)
         query |= {"from": pairs[0].from_evaluations, "to": pairs[0].to_evaluations}  # also if an experiment goes on
 

@@ -152,6 +152,7 @@ def _line(result: RepetitionRerun) -> str:
     outcome = f"[{COLORS[result.outcome]}]{result.outcome}[/]"
     reason = f": {escape(result.reason)}" if result.reason else ""
     steps = f"{result.steps} of {result.stored_steps} steps"
+    steps += f" with the code for {result.code}" if result.code else ""
     return f"{escape(result.name)} {result.repetition}: {outcome}, {steps}{reason}"
 
 

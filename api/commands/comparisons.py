@@ -12,6 +12,7 @@ from gaplab.api.clients.progress.text import console
 from gaplab.api.commands import comparison_tables
 from gaplab.api.commands.app import RESULTS, AsJson, Ids, Url, app, connect
 from gaplab.api.commands.json_output import print_json
+from gaplab.schemas.curves import Fitness
 
 
 class Format(StrEnum):
@@ -34,7 +35,7 @@ MarginOption = Annotated[
 
 
 @app.command(rich_help_panel=RESULTS)
-def compare(
+def compare(  # noqa: PLR0913, PLR0917 - each is an option of the command
     ids: Ids,
     at: Annotated[
         str | None,
@@ -46,6 +47,9 @@ def compare(
         ),
     ] = None,
     margin: MarginOption = None,
+    fitness: Annotated[
+        Fitness, typer.Option(help="recorded as in the paper, transferred controllers alone, or the best of these")
+    ] = Fitness.RECORDED,
     format: Annotated[Format, typer.Option(help="of the output")] = Format.TABLE,  # noqa: A002 - as the API says
     as_json: AsJson = False,
     url: Url = None,
@@ -57,7 +61,7 @@ def compare(
     first, last = _range(at)
     width, share = margins(margin)
     with connect(url) as client:
-        pairs = client.compare(ids, first, last, margin=width, margin_of_direct=share)
+        pairs = client.compare(ids, first, last, margin=width, margin_of_direct=share, fitness=fitness)
         _PRINTERS[Format.JSON if as_json else format](pairs)
 
 

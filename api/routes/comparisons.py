@@ -9,8 +9,9 @@ from pydantic import Field, model_validator
 from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import Id, Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
-from gaplab.api.routes.curves import Ids
+from gaplab.api.routes.curves import FITNESS, Ids
 from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.curves import Fitness
 from gaplab.schemas.differences import SpecDiff
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.experiments.reading import read_differences
@@ -73,6 +74,7 @@ class ComparisonQuery(MarginQuery):
     to_evaluations: Evaluations = Field(
         default=None, alias="to", description="last number; left out: the last that the experiments share"
     )
+    fitness: Fitness = FITNESS
     intervals: bool | None = Field(default=None, description="with intervals; left out: for up to 20 experiments")
 
 
@@ -99,6 +101,7 @@ def compare_experiments(
             to_evaluations=query.to_evaluations,
             margin=query.chosen(),
             intervals=query.intervals,
+            fitness=query.fitness,
         )
     except InvalidSpec as error:
         renamed = (replace(each, pointer=each.pointer.removesuffix("_evaluations")) for each in error.violations)

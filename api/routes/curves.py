@@ -8,12 +8,18 @@ from pydantic import Field
 from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import Id, Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
-from gaplab.schemas.curves import Curve
+from gaplab.schemas.curves import Curve, Fitness
 from gaplab.services.results import curves
 
 router = APIRouter(tags=["curves"])
 
 Ids = Annotated[list[Id], Field(min_length=1, max_length=100, description="ids of experiments; repeat for more")]
+
+FITNESS: Fitness = Field(
+    default=Fitness.RECORDED,
+    description="`recorded`, as in the paper, is the larger fitness of the transferred controller and the best sample; "
+    "`transferred` is that of the transferred controller alone; `equal_chances` is the best of those so far",
+)
 
 _ROWS = """experiment,name,strategy,repetition,evaluations,fitness
 01f2e3d4c5b6,simulated_fit,simulated_fit,0,0,0.9
@@ -22,8 +28,9 @@ _CSV: Responses = {200: {"content": {"text/csv": {"schema": {"type": "string"}, 
 
 
 class CurveQuery(Parameters):
-    """The format of curves."""
+    """Whose fitness curves show, and their format."""
 
+    fitness: Fitness = FITNESS
     format: Literal["json", "csv"] = "json"
 
 
@@ -42,7 +49,7 @@ class CurvesQuery(CurveQuery):
 )
 def read_curve(id: Id, store: StoreDep, query: Annotated[CurveQuery, Query()]) -> Curve | Response:
     """Return mean, SD, n and 95 % interval after each real-world evaluation, and the value of each repetition."""
-    curve = curves.curve(store, id)
+    curve = curves.curve(store, id, query.fitness)
     return _csv((curve,)) if query.format == "csv" else curve
 
 
@@ -55,7 +62,7 @@ def read_curve(id: Id, store: StoreDep, query: Annotated[CurveQuery, Query()]) -
 )
 def read_study_curves(id: Id, store: StoreDep, query: Annotated[CurveQuery, Query()]) -> tuple[Curve, ...] | Response:
     """Return the curves of a study's experiments, in the order of the study."""
-    return _formatted(curves.study_curves(store, id), query)
+    return _formatted(curves.study_curves(store, id, query.fitness), query)
 
 
 @router.get(
@@ -67,7 +74,7 @@ def read_study_curves(id: Id, store: StoreDep, query: Annotated[CurveQuery, Quer
 )
 def read_curves(store: StoreDep, query: Annotated[CurvesQuery, Query()]) -> tuple[Curve, ...] | Response:
     """Return the curves of the named experiments, in that order."""
-    return _formatted(curves.curves(store, query.experiment), query)
+    return _formatted(curves.curves(store, query.experiment, query.fitness), query)
 
 
 def _formatted(found: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import FigureQuery, answer, responses
+from gaplab.schemas.curves import Fitness
 from gaplab.schemas.figures import FigureRead
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.stored_specs import spec_of
@@ -65,6 +66,9 @@ class CurvesDrawing(CoordinatesDrawing):
     )
     cost_s: float = Field(default=0.0, ge=0, le=1e9, description="seconds per real-world evaluation, if x is time")
     each: bool = EACH
+    fitness: Fitness | None = Field(
+        default=None, description="as of curves; left out: recorded, with thin lines for transferred controllers alone"
+    )
 
 
 class ExperimentDrawing(FigureQuery):
@@ -181,9 +185,10 @@ def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition)
 
 def _curves(store: Store, query: CurvesDrawing) -> FigureDefinition:
     studies = [reading.read_study(store, id) for id in query.study]
-    drawn = [curve for study in studies for curve in curves.study_curves(store, study.id)]
-    drawn += curves.curves(store, query.experiment) if query.experiment else ()
-    drawn = list({curve.experiment: curve for curve in drawn}.values())  # each experiment once
+    named = [each.id for study in studies for each in study.experiments] + query.experiment
+    ids = list(dict.fromkeys(named))
+    drawn = curves.curves(store, ids, query.fitness or Fitness.RECORDED)
+    beside = () if query.fitness else curves.curves(store, ids, Fitness.TRANSFERRED)
     title = query.title if query.title is not None else ", ".join(study.name for study in studies)
     against = None if query.x == "evaluations" else cost_axis(store, drawn, query.x, cost_s=query.cost_s)
-    return curves_figure(drawn, title=title, band=query.band, against=against, each=query.each)
+    return curves_figure(drawn, title=title, band=query.band, against=against, each=query.each, beside=beside)

@@ -1,6 +1,6 @@
-"""The paper's figures and claims beside stored studies, as a Markdown page with pictures.
+"""The paper's figures and claims beside stored studies, as two Markdown pages with pictures.
 
-`python -m benchmarks.reproduction ARCHIVE.zip … -o docs/reproduction.md`; without -o, it prints the text alone.
+`python -m benchmarks.reproduction ARCHIVE.zip … -o docs/reproduction.md`; without -o, it prints the claims alone.
 """
 
 from argparse import ArgumentParser
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from benchmarks.archives import private_store
-from benchmarks.reproduction.page import ROOT, Page
+from benchmarks.reproduction.page import CLAIMS_PAGE, ROOT, Page
 from benchmarks.reproduction.results import FIGURE_3
 from benchmarks.reproduction.studies import Study, read_study
 from gaplab.services.figures.kinds.curves import curves_figure
@@ -27,7 +27,7 @@ def pictures(store: Store, studies: Mapping[str, Study], folder: Path) -> dict[t
     """Write the paper's figures as SVG, and return their addresses, by label and number of the figure."""
     figures: dict[tuple[str, int], FigureDefinition] = {}
     for label, study in studies.items():
-        figures[label, 4] = curves_figure(study.curves, title=study.name or label)
+        figures[label, 4] = curves_figure(study.curves, title=study.name or label, beside=study.beside)
         shown = [count for count in FIGURE_3[1:] if count <= study.last]
         if study.toy and study.present and shown:
             figures[label, 3] = toy_figure(toy_iterations(store, study.of()[0].read.id, 0, shown))
@@ -49,7 +49,12 @@ def main() -> None:
     several = "archives of studies, in the order of the page; commas between those of one study"
     once = "archive of a control, repeatable; it may be a study as well"
     parser.add_argument("archives", nargs="+", type=archives_of, help=several)
-    parser.add_argument("-o", "--output", type=Path, help="file of the page; its pictures go to figures/ beside it")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        help=f"file of the first page; beside it are {CLAIMS_PAGE} and the pictures in figures/",
+    )
     parser.add_argument("--control", action="append", type=archives_of, default=[], help=once)
     arguments = parser.parse_args()
     every = list(dict.fromkeys([*arguments.archives, *arguments.control]))
@@ -64,8 +69,9 @@ def main() -> None:
             print(Page(studies, controls, ROOT / "docs", {}).text(), end="")
             return
         folder = arguments.output.resolve().parent
-        text = Page(studies, controls, folder, pictures(store, studies, folder)).text()
-        arguments.output.write_text(text, encoding="utf-8")
+        page = Page(studies, controls, folder, pictures(store, studies, folder))
+        arguments.output.write_text(page.first(), encoding="utf-8")
+        (folder / CLAIMS_PAGE).write_text(page.text(), encoding="utf-8")
 
 
 if __name__ == "__main__":

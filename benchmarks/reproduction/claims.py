@@ -31,7 +31,6 @@ class Claim:
 
     key: str
     kind: str
-    title: str
     says: str
     rule: str
     strategies: str = ""
@@ -41,6 +40,7 @@ class Claim:
     pairs: Sequence[str] = ()
     p: float | None = None
     counts: int = 1
+    late: bool = False
 
     def least(self, first: str, second: str) -> float:
         """Return the least difference of two strategies that agrees with the paper's; 0 if it tests none."""

@@ -8,12 +8,12 @@ from pathlib import Path
 from re import sub
 from typing import Any
 
-from benchmarks.reproduction import controls, paper, results, settings
+from benchmarks.reproduction import answer, controls, paper, results, settings
 from benchmarks.reproduction.claims import CLAIMS, DATA, Claim
 from benchmarks.reproduction.controls import Row
 from benchmarks.reproduction.settings import table
 from benchmarks.reproduction.studies import Study
-from benchmarks.reproduction.verdicts import Verdict, judge, worded
+from benchmarks.reproduction.verdicts import judge, worded
 from gaplab.services.core.equivalence import SIGNIFICANT
 from gaplab.services.core.trends import FEWEST_REPETITIONS
 
@@ -26,6 +26,10 @@ NUMBERS: dict[str, Any] = {name: value for name, value in vars(paper).items() if
     "deviation_fit": paper.deviation(paper.FIT[0]),
     "deviation_weak": paper.deviation(paper.WEAK[0]),
 }
+CLAIMS_PAGE = "claims.md"
+"""File of the second page, beside the first."""
+LATE = "†"
+"""Mark of a claim whose rule was completed after results were read."""
 CLAIM = ("study", "verdict", "here", "the paper's test", "our test", "why")
 STATEMENT = ("study", "statement", "here", "p that shows it", "p that refutes it")
 
@@ -46,13 +50,31 @@ class Page:
     folder: Path
     pictures: Mapping[tuple[str, int], str]
 
+    def first(self) -> str:
+        """Return the first page, or nothing without a whole figure of a robot."""
+        if not self.whole:
+            return ""
+        others = [each for each in self.robots.values() if each not in self.whole and each.arm(answer.BEST)]
+        label = next(label for label, each in self.studies.items() if each is self.whole[0])
+        return (
+            TEXT["first"]
+            .format(
+                **answer.numbers(self.whole, others),
+                docs=self.docs,
+                title=answer.title(self.whole),
+                picture=self.pictures.get((label, 4), ""),
+                rows=answer.rows(self.whole),
+                claims=CLAIMS_PAGE,
+            )
+            .lstrip()
+        )
+
     def text(self) -> str:
-        """Return the page."""
+        """Return the page of the claims."""
         toys = {label: study for label, study in self.studies.items() if label not in self.robots}
         text = TEXT["page"].format(
             **NUMBERS,
             docs=self.docs,
-            short="\n\n".join(self._short()),
             verdicts=self._verdicts(self.robots),
             verdicts_of_toys=TEXT["toys"].format(table=self._verdicts(toys)) if toys else "",
             figure_4="\n\n".join(self._figure_4()),
@@ -80,6 +102,12 @@ class Page:
         return {label: each for label, each in self.studies.items() if not each.toy} or dict(self.studies)
 
     @cached_property
+    def judged(self) -> dict[str, tuple[Study, ...]]:
+        """Return the studies by their labels, and the whole figures of a robot together if there are several."""
+        together = {answer.ALL: self.whole} if len(self.whole) > 1 else {}
+        return {label: (each,) for label, each in self.studies.items()} | together
+
+    @cached_property
     def beside(self) -> dict[str, tuple[str, list[Row]]]:
         """Return the study beside each control, and the differences from it."""
         found = {label: controls.compared_with(control, self.studies) for label, control in self.controls.items()}
@@ -88,37 +116,24 @@ class Page:
             for label, beside in found.items()
         }
 
+    @cached_property
+    def whole(self) -> tuple[Study, ...]:
+        """Return the whole figures of a robot."""
+        return tuple(each for each in self.robots.values() if each.whole)
+
     def _link(self, path: Path) -> str:
         return Path(os.path.relpath(path, self.folder)).as_posix()
 
-    def _short(self) -> Iterator[str]:
-        """Yield the verdicts of each whole figure of a robot, and of other studies that decide a claim."""
-        told = {
-            label: each
-            for label, each in self.robots.items()
-            if each.whole or any(judge(claim, each).verdict.decided for claim in CLAIMS)
-        }
-        for label, study in (told or self.robots).items():
-            yield f"**In short**, {label} ({settings.in_words(study)}):"
-            if study.spec.reality.engine and study.reality != study.spec.engine.name:
-                yield TEXT["extension"]
-            if label in self.controls and not study.whole:
-                yield f"*A control of {self.beside[label][0]}*: it was chosen after results of that study were read."
-            yield _in_short(study)
-            if lead := results.lead(study):
-                yield f"{lead} [Why](#where-the-recorded-fitness-comes-from)."
-            changed = [
-                f"- [{control}](#{control}-beside-{label}): {shown}"
-                for control, (beside, rows) in self.beside.items()
-                if beside == label and (shown := controls.shown(rows))
-            ]
-            if changed:
-                yield "\n\n".join([TEXT["changed"], "\n".join(changed)])
-
     def _verdicts(self, studies: Mapping[str, Study]) -> str:
-        found = {claim: [judge(claim, study).verdict for study in studies.values()] for claim in CLAIMS}
-        rows = ((f"{claim.key}: {_formatted(claim, claim.says)}", *each) for claim, each in found.items())
-        return table(("claim", *studies), rows)
+        judged = {label: each for label, each in self.judged.items() if set(each) <= set(studies.values())}
+        rows = (
+            (
+                f"{claim.key}{LATE if claim.late else ''}: {_formatted(claim, claim.says)}",
+                *(judge(claim, *each).verdict for each in judged.values()),
+            )
+            for claim in CLAIMS
+        )
+        return table(("claim", *judged), rows)
 
     def _figure_4(self) -> Iterator[str]:
         for label, study in self.studies.items():
@@ -143,7 +158,7 @@ class Page:
     def _origins(self) -> Iterator[str]:
         for label, study in self.robots.items():
             if len(study.direct) and study.present:
-                yield f"### Origins: {label}\n\n{results.lead(study)}\n\n{results.origins(study)}"
+                yield f"### Origins: {label}\n\n{results.leads(study)}\n\n{results.origins(study)}"
 
     def _controls(self) -> str:
         each = []
@@ -160,7 +175,7 @@ class Page:
     def _claim(self, claim: Claim) -> str:
         rows = (
             (label, found.verdict, found.examined.here, found.examined.paper_test, found.careful, found.why)
-            for label, found in ((label, judge(claim, study)) for label, study in self.studies.items())
+            for label, found in ((label, judge(claim, *each)) for label, each in self.judged.items())
         )
         says, rule = _formatted(claim, claim.says), _formatted(claim, claim.rule)
         return f"### {claim.key}\n\n{says}\n\nThe rule: {rule}\n\n{table(CLAIM, rows)}"
@@ -168,8 +183,8 @@ class Page:
     def _statements(self, claim: Claim) -> str:
         rows = (
             (label, each.statement, each.tested.estimate, worded(each.tested.shows), worded(each.tested.refutes))
-            for label, study in self.studies.items()
-            for each in judge(claim, study).examined.evidence
+            for label, studies in self.judged.items()
+            for each in judge(claim, *studies).examined.evidence
         )
         return f"### {claim.key}, by statement\n\n{table(STATEMENT, rows)}"
 
@@ -179,26 +194,6 @@ class Page:
             for study in studies.values()
         ]
         return table(settings.HEAD, [*first, *rows])
-
-
-def _in_short(study: Study) -> str:
-    """Return the claims of each verdict in a study, as a list in Markdown; undecided ones are keys alone."""
-    found = {verdict: [claim for claim in CLAIMS if judge(claim, study).verdict is verdict] for verdict in Verdict}
-    return "\n".join(
-        f"- {verdict}: {'; '.join(_named(claim, study) for claim in claims)}."
-        for verdict, claims in found.items()
-        if claims
-    )
-
-
-def _named(claim: Claim, study: Study) -> str:
-    """Return a claim in a few words, with its statements if some are refuted; the key alone of an undecided one."""
-    found = judge(claim, study)
-    if not found.verdict.decided:
-        return claim.key
-    sides = {"shown": found.shown, "refuted": found.refuted} if found.refuted else {}
-    told = [f"; {side}: {', '.join(each.lower() for each in names)}" for side, names in sides.items() if names]
-    return f"{claim.title} ({claim.key}{''.join(told)})"
 
 
 def _formatted(claim: Claim, text: str) -> str:

@@ -18,6 +18,8 @@ from gaplab.services.reports.numbers import MISSING
 FIGURE_3 = (0, 2, 4, 6, 8)
 """Samples before those panels of the paper's Fig. 3, and none."""
 ORIGINS = ("strategy", "samples", "last sample", "best sample", "transferred", "recorded", "from a sample", "distance")
+KINDS = {"recorded": "recorded", "transferred": "transferred alone", "chances": "equal chances"}
+"""Kinds of fitness, in words: recorded as in the paper, of transferred controllers alone, and the best of these."""
 FIRST = 3
 """Samples from which on the paper compares the strategies."""
 
@@ -28,7 +30,7 @@ def figure_4(study: Study) -> str:
     counts = range(min(paper.ITERATIONS, max(arm.last for arm in arms)) + 1)
     learned = {0: f"{paper.START:.2f}", 3: f"≥ {paper.AFTER_THREE:.2f}", 10: f"{paper.AFTER_TEN:.2f}"}
     every = {0: f"{paper.START:.2f}", 10: f"about {paper.AT_LAST:.2f}"}
-    best = _best_of(study)[: len(counts)]
+    best = best_of(study)[: len(counts)]
     rows = [
         ("the paper, with simulated fit", *(learned.get(count, MISSING) for count in counts)),
         ("the paper, all six", *(every.get(count, MISSING) for count in counts)),
@@ -38,7 +40,7 @@ def figure_4(study: Study) -> str:
     return table(("samples", *map(str, counts)), rows)
 
 
-def _best_of(study: Study) -> list[str]:
+def best_of(study: Study) -> list[str]:
     """Return the expected best of 1, 2, 3 … direct searches over direct; nothing if there are too few searches."""
     return [f"{each / study.unit:.2f}" for each in best_of_searches(study.direct) if each is not None]
 
@@ -89,64 +91,57 @@ def _origin(study: Study, arm: Arm) -> Iterator[tuple[str, ...]]:
         yield spoken(arm.strategy), str(count), *means, share, _distance(arm.tuned.get(count))
 
 
-def lead(study: Study) -> str:
-    """Return in sentences what simulated fit gains, in transferred controllers alone and in recorded fitness.
+def lead(study: Study, kind: str, first: int, last: int) -> Difference | None:
+    """Return the mean of the means with simulated fit less that of the others, over direct.
 
-    Each repetition is one value, and each strategy counts alike. Empty if the study lacks one of both groups.
+    Each repetition is one value, its mean from the first to the last number of samples, and each strategy counts alike.
+    None if the study lacks one of both groups, or if a strategy has fewer than two repetitions.
+
+    Args:
+        study: the study.
+        kind: `recorded`, `transferred` or `chances`.
+        first: first number of samples.
+        last: last number of samples.
     """
-    if study.last < FIRST:
-        return ""
-    spans = (FIRST, study.last), (study.last, study.last)
-    told = [_lead(study, span, transferred=each) for span in spans for each in (True, False)]
-    if not all(told):
-        return ""
-    return (
-        f"Over {FIRST} to {study.last} samples, strategies with simulated fit lead the others by {told[0]} of direct "
-        f"in transferred controllers alone, and by {told[1]} in recorded fitness; after {study.last}, by {told[2]} and "
-        f"{told[3]}.{_spread(study)}{_searched_as_often(study)}"
-    )
-
-
-def _lead(study: Study, span: tuple[int, int], *, transferred: bool) -> str:
-    """Return the mean of the means with simulated fit less that of the others, with its interval, in words."""
     found = []
-    for sign, groups in zip((1.0, -1.0), _both(study, span, transferred=transferred), strict=True):
+    for sign, groups in zip((1.0, -1.0), both_sides(study, kind, first, last), strict=True):
         means = [Difference.mean(group.mean(axis=1)) for group in groups]
         found += [(sign / len(groups), mean) for mean in means if mean]
         if not groups or not all(means):
-            return ""
-    return Difference.sum(found).over(study.unit).told()
+            return None
+    return Difference.sum(found).over(study.unit)
 
 
-def _spread(study: Study) -> str:
-    """Return in a sentence how much strategies with simulated fit vary beside the others, in both kinds of fitness."""
-    sides = [_both(study, (FIRST, study.last), transferred=each) for each in (True, False)]
-    if min(len(group) for side in sides for groups in side for group in groups) < 2:
-        return ""
-    told = [narrower(*side).estimate for side in sides]
-    return (
-        f" Over {FIRST} to {study.last}, their standard deviations are {told[0]} times the others' in transferred "
-        f"controllers alone, and {told[1]} times in recorded fitness."
+def spread(study: Study, kind: str) -> str:
+    """Return how many times the others' the standard deviations with simulated fit are; a dash if it is unknown."""
+    sides = both_sides(study, kind, FIRST, study.last)
+    if study.last < FIRST or not all(sides) or min(len(group) for side in sides for group in side) < 2:
+        return MISSING
+    return narrower(*sides).estimate
+
+
+def leads(study: Study) -> str:
+    """Return the lead of simulated fit by number of samples, and over all from the third on, for each kind."""
+    counts = range(study.last + 1)
+    spans = [(count, count) for count in counts] + [(FIRST, study.last)] * (study.last >= FIRST)
+    head = (
+        "lead",
+        *map(str, counts),
+        *([f"{FIRST} to {study.last}", "ratio of deviations"] if len(spans) > len(counts) else []),
     )
+    rows = []
+    for kind, words in KINDS.items():
+        cells = [found.told() if (found := lead(study, kind, *span)) else MISSING for span in spans]
+        rows.append((words, *cells, *([spread(study, kind)] if len(spans) > len(counts) else [])))
+    return table(head, rows)
 
 
-def _searched_as_often(study: Study) -> str:
-    """Return in a sentence what the best of several direct searches has, if direct has enough repetitions."""
-    best = _best_of(study)
-    if len(best) <= study.last:
-        return ""
-    few, many = (f"{count} + 1 direct searches has {best[count]}" for count in (FIRST, study.last))
-    return f" The best of {few}, and the best of {many}."
-
-
-def _both(study: Study, span: tuple[int, int], *, transferred: bool) -> list[list[FloatArray]]:
-    """Return the values `(r, k)` with simulated fit, and of the others, in repetitions with both kinds of fitness."""
-    columns = slice(span[0], span[1] + 1)
+def both_sides(study: Study, kind: str, first: int, last: int) -> list[list[FloatArray]]:
+    """Return the values `(r, k)` with simulated fit, and of the others, in repetitions with all kinds of fitness."""
+    columns = slice(first, last + 1)
     return [
         [
-            (arm.transferred if transferred else arm.recorded)[:, columns][
-                np.isfinite(arm.recorded[:, columns] + arm.transferred[:, columns]).all(axis=1)
-            ]
+            getattr(arm, kind)[:, columns][np.isfinite(arm.recorded[:, columns] + arm.chances[:, columns]).all(axis=1)]
             for arm in study.of(names)
         ]
         for names in (paper.FIT, paper.WEAK)

@@ -91,6 +91,12 @@ class Difference(NamedTuple):
         value = sum(factor * each.value for factor, each in parts)
         return cls(value, math.sqrt(sum(squares)), sum(squares) ** 2 / parted if parted else math.inf)
 
+    @classmethod
+    def pooled(cls, parts: Sequence["Difference"]) -> "Difference":
+        """Return the mean of independent estimates of one difference, each weighted by the inverse of its variance."""
+        weights = [each.error**-2 for each in parts]
+        return cls.sum([(weight / sum(weights), each) for weight, each in zip(weights, parts, strict=True)])
+
     @property
     def p(self) -> float:
         """Return the two-sided p of the hypothesis that there is no difference."""
@@ -131,12 +137,27 @@ class Tested(NamedTuple):
         refutes: p of the hypothesis that it holds in the size that refutes the claim.
         estimate: the estimate with its 95 % interval, in words.
         smaller: p of the hypothesis that it holds in the paper's size; None if `refutes` is that.
+        found: the estimate; of a ratio, its logarithm.
+        again: returns the same test of another estimate.
     """
 
     shows: float | None
     refutes: float | None
     estimate: str
     smaller: float | None = None
+    found: Difference | None = None
+    again: "Callable[[Difference], Tested] | None" = None
+
+
+def pooled(parts: Sequence[Tested]) -> Tested:
+    """Return the same test of one statement in several studies, each weighted by the inverse of its variance.
+
+    Studies in which it is not tested are left out.
+    """
+    found = [each.found for each in parts if each.found and each.shows is not None]
+    if not found or parts[0].again is None:
+        return Tested(None, None, "")
+    return parts[0].again(Difference.pooled(found))
 
 
 def above(groups: Sequence[FloatArray], least: float, unit: float) -> Tested:
@@ -180,7 +201,15 @@ def narrower(narrow: Sequence[FloatArray], wide: Sequence[FloatArray]) -> Tested
     low, high = np.quantile(ratios, [SIGNIFICANT / 2, 1 - SIGNIFICANT / 2])
     counts = (ratios >= NEARER_TO_A_THIRD, ratios <= NEARER_TO_A_THIRD, ratios <= LEAST_RATIO)
     shows, refutes, smaller = (min(1.0, 2 * (1 + int(each.sum())) / (RESAMPLES + 1)) for each in counts)
-    return Tested(shows, refutes, f"{ratio:.2f} ({low:.2f} to {high:.2f})", smaller)
+    found = Difference(float(np.log(ratio)), float(np.log(ratios).std()), math.inf)
+    return Tested(shows, refutes, f"{ratio:.2f} ({low:.2f} to {high:.2f})", smaller, found, _of_logarithm)
+
+
+def _of_logarithm(found: Difference) -> Tested:
+    near, least = math.log(NEARER_TO_A_THIRD), math.log(LEAST_RATIO)
+    low, high = (math.exp(found.value + side * 1.96 * found.error) for side in (-1, 1))
+    told = f"{math.exp(found.value):.2f} ({low:.2f} to {high:.2f})"
+    return Tested(found.below(near), found.above(near), told, found.above(least))
 
 
 def _tested(
@@ -191,7 +220,8 @@ def _tested(
 ) -> Tested:
     known = found and found.error and min(map(len, groups)) >= FEWEST_REPETITIONS
     shows, refutes = test(found) if found and known else (None, None)
-    return Tested(shows, refutes, found.told(form) if found else "")
+    told = found.told(form) if found else ""
+    return Tested(shows, refutes, told, found=found, again=lambda one: Tested(*test(one), one.told(form)))
 
 
 def _resampled(groups: Sequence[FloatArray], rng: np.random.Generator) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.archives import import_file
 from benchmarks.findings import Found, found
 from benchmarks.reproduction.paper import ITERATIONS, STRATEGIES
-from gaplab.schemas.curves import Curve
+from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.records import ExperimentRead, MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
@@ -18,12 +18,14 @@ from gaplab.services.core.statistics import finite
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments import reading
-from gaplab.services.results.curves import curves, recorded_of
-from gaplab.services.store.models import MeasurementRow, RepetitionRow
-from gaplab.services.store.queries import experiments
+from gaplab.services.results.curves import curves, values_of
+from gaplab.services.running import provenance
+from gaplab.services.store.queries import experiments, results
 from gaplab.services.store.queries.costs import work_of
-from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.session import Session, Store
+from gaplab.services.store.session import Store
+
+CODE = "OPENBLAS_CORETYPE"
+"""Variable that gaplab sets since it chooses one code for all processors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,18 +37,23 @@ class Arm:
         spec: its resolved spec.
         recorded: recorded fitness `(r, k)` by repetition and number of real-world evaluations; nan is missing.
         transferred: fitness `(r, k)` in reality of the transferred controllers alone; nan if it failed or is missing.
-        samples: the same of the samples.
+        chances: the best of these so far, so that each strategy has as many.
+        samples: fitness `(r, k)` in reality of the samples.
         tuned: its best simulators, by number of samples.
         core_hours: hours of computation in its recorded steps, times cores.
+        origins: repetitions of which the software is known, those from a changed clone, and those that were computed
+            before gaplab chose one code for all processors.
     """
 
     read: ExperimentRead
     spec: ResolvedSpec
     recorded: FloatArray
     transferred: FloatArray
+    chances: FloatArray
     samples: FloatArray
     tuned: dict[int, Found]
     core_hours: float
+    origins: tuple[int, int, int]
 
     @property
     def strategy(self) -> str:
@@ -88,6 +95,7 @@ class Study:
         name: its name.
         arms: its experiments, in their order.
         curves: their curves.
+        beside: the same of transferred controllers alone.
 
     Attributes:
         spec: that of its first experiment, which has the settings that all share.
@@ -99,8 +107,11 @@ class Study:
         whole: whether it has all of the paper's strategies, samples and direct.
     """
 
-    def __init__(self, archives: Sequence[Path], name: str, arms: Sequence[Arm], curves: Sequence[Curve]) -> None:
-        self.archives, self.name, self.arms, self.curves, self.spec = tuple(archives), name, arms, curves, arms[0].spec
+    def __init__(
+        self, archives: Sequence[Path], name: str, arms: Sequence[Arm], curves: Sequence[Curve], beside: Sequence[Curve]
+    ) -> None:
+        self.archives, self.name, self.arms, self.curves, self.beside = tuple(archives), name, arms, curves, beside
+        self.spec = arms[0].spec
         self.toy = self.spec.robot.name == "toy_function"
         self.reality = self.spec.reality.engine.name if self.spec.reality.engine else "a robot on a bench"
         self.direct = next((finite(arm.recorded[:, 0]) for arm in arms if arm.read.direct), np.empty(0))
@@ -148,6 +159,7 @@ def read_study(store: Store, archives: Sequence[Path]) -> Study:
         parts[0][0],
         named,
         [curve.model_copy(update={"name": names[curve.experiment]}) for curve in curves(store, list(names))],
+        curves(store, list(names), Fitness.TRANSFERRED),
     )
 
 
@@ -171,29 +183,29 @@ def _arms(store: Store, reads: Sequence[ExperimentRead]) -> list[Arm]:
     ids, arms = [read.id for read in reads], []
     tuned = {id_: found(store, id_) for id_ in ids}
     with store.reading() as session:
-        work, (_, recorded) = work_of(session, ids), recorded_of(session, ids)
+        work, fitness = work_of(session, ids), {kind: values_of(session, ids, kind)[1] for kind in Fitness}
+        samples = {id_: np.full_like(each, np.nan) for id_, each in fitness[Fitness.RECORDED].items()}
+        for id_, number, iteration, value in results.measured_fitness(session, ids, MeasurementKind.SAMPLE):
+            samples[id_][number, iteration] = np.nan if value is None else value
         for read in reads:
             spec = spec_of(experiments.get_experiment(session, read.id).spec)
-            shape = recorded[read.id].shape
+            uses = provenance.uses(session, read.id)
             engine = spec.reality.engine if read.direct else spec.engine
             cores = int(engine.options.get("threads", 1)) if engine else 1
             arm = Arm(
                 read=read,
                 spec=spec,
-                recorded=recorded[read.id],
-                transferred=_measured(session, read.id, MeasurementKind.PROBE, shape),
-                samples=_measured(session, read.id, MeasurementKind.SAMPLE, shape),
+                recorded=fitness[Fitness.RECORDED][read.id],
+                transferred=fitness[Fitness.TRANSFERRED][read.id],
+                chances=fitness[Fitness.EQUAL_CHANCES][read.id],
+                samples=samples[read.id],
                 tuned=tuned[read.id],
                 core_hours=work[read.id].seconds * cores / 3600,
+                origins=(
+                    sum(use.repetitions for use in uses),
+                    sum(use.repetitions for use in uses if use.provenance.dirty),
+                    sum(use.repetitions for use in uses if CODE not in use.provenance.libraries),
+                ),
             )
             arms.append(arm)
     return arms
-
-
-def _measured(session: Session, experiment: str, kind: MeasurementKind, shape: tuple[int, ...]) -> FloatArray:
-    """Return measured fitness by repetition and iteration; nan if it failed or is missing."""
-    row, values = MeasurementRow, np.full(shape, np.nan)
-    query = of_experiments(row, [experiment], RepetitionRow.number, row.iteration, row.fitness)
-    for repetition, iteration, fitness in session.execute(query.where(row.kind == kind, row.fitness.is_not(None))):
-        values[repetition, iteration] = fitness
-    return values

@@ -6,6 +6,7 @@ from functools import cache
 from typing import NamedTuple
 
 from benchmarks.reproduction.claims import Claim, Evidence, Examined, examine
+from benchmarks.reproduction.statistics import pooled
 from benchmarks.reproduction.studies import Study
 from gaplab.services.core.equivalence import SIGNIFICANT
 from gaplab.services.core.statistics import holm
@@ -27,31 +28,38 @@ class Verdict(StrEnum):
     ABSENT = "not in this study"
 
     @property
-    def decided(self) -> bool:
-        """Return whether the study reproduces or refutes the claim."""
-        return self not in {Verdict.OPEN, Verdict.ABSENT}
+    def reproduced(self) -> bool:
+        """Return whether the claim is reproduced, as large as in the paper or smaller."""
+        return self in {Verdict.REPRODUCED, Verdict.SMALLER}
 
 
 class Judged(NamedTuple):
-    """A verdict: what was examined, the test that it rests on, the reason, and the statements that refute the claim."""
+    """A verdict: what was examined, the test that it rests on, and the reason."""
 
     verdict: Verdict
     examined: Examined
     careful: str
     why: str
-    refuted: tuple[str, ...] = ()
-
-    @property
-    def shown(self) -> list[str]:
-        """Return the statements that are shown and do not refute the claim."""
-        shown = (each.statement for each in self.examined.evidence if significant(each.tested.shows))
-        return [each for each in shown if each not in self.refuted]
 
 
 @cache
-def judge(claim: Claim, study: Study) -> Judged:
-    """Return the verdict of a study on a claim."""
-    examined = examine(claim, study)
+def judge(claim: Claim, *studies: Study) -> Judged:
+    """Return the verdict of a study on a claim; of several, on the estimates of its statements taken together."""
+    each = [examine(claim, study) for study in studies]
+    return _judged(each[0] if len(each) == 1 else _together(each))
+
+
+def _together(parts: Sequence[Examined]) -> Examined:
+    """Return a claim as several studies show it, in the statements that all of them have."""
+    found = [{one.statement: one.tested for one in part.evidence} for part in parts]
+    shared = [name for name in found[0] if all(name in each for each in found)]
+    evidence = [Evidence(name, pooled([each[name] for each in found])) for name in shared]
+    here = "; ".join(f"{each.statement} {each.tested.estimate}" for each in evidence[:MOST_NAMED])
+    lacking = list(dict.fromkeys(each for part in parts for each in part.lacking))
+    return Examined(lacking, evidence, here, "", next((part.unequal for part in parts if part.unequal), None))
+
+
+def _judged(examined: Examined) -> Judged:
     evidence = examined.evidence
     lacking = f"Missing: {', '.join(examined.lacking)}." if examined.lacking else ""
     if not evidence:
@@ -69,8 +77,7 @@ def judge(claim: Claim, study: Study) -> Judged:
         why = f"{_undecided([each for each in evidence if each not in shown])} {lacking}".strip()
     elif not lacking:
         verdict, why = _reproduced([each for each in evidence if significant(each.tested.smaller) or each in too_small])
-    names = tuple(each.statement for each in refuted) if verdict is Verdict.NOT else ()
-    return Judged(verdict, examined, _careful(evidence, shown, refuted), why, names)
+    return Judged(verdict, examined, _careful(evidence, shown, refuted), why)
 
 
 def _reproduced(smaller: Sequence[Evidence]) -> tuple[Verdict, str]:

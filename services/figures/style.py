@@ -44,11 +44,12 @@ SHADES = ("#FDAE32", "#F2844B", "#E16462", "#CB4679", "#B02991", "#900DA4", "#6A
 
 @dataclass(frozen=True)
 class Style:
-    """The look of one mark."""
+    """The look of one mark; a thin line stands beside another one of its name, without an entry in the legend."""
 
     color: str
     dash: Dash
     marker: Marker
+    thin: bool = False
 
     @property
     def ink(self) -> bool:

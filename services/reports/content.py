@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from gaplab.schemas.comparisons import Comparison
-from gaplab.schemas.curves import Curve
+from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.provenance import ProvenanceRead
@@ -38,9 +38,11 @@ class Facts:
         study: whether it is a study.
         experiments: its experiments; of hidden realities without parameters.
         curves: their curves.
+        transferred: the same of transferred controllers alone.
         judged: the curves with their distinct names.
         verdict: the verdict on the curves.
         at_last: comparisons of all pairs at the common count; empty for one experiment.
+        beside: the same of transferred controllers alone, and of the best of these.
         over_all: the same over all counts up to it, one value for each repetition, with the paper's pooled tests; empty
             if there is a single count.
         differing: settings that differ between the experiments; None for one experiment.
@@ -57,9 +59,11 @@ class Facts:
     study: bool
     experiments: tuple[ExperimentRead, ...]
     curves: tuple[Curve, ...]
+    transferred: tuple[Curve, ...]
     judged: tuple[Judged, ...]
     verdict: VerdictRead
     at_last: tuple[Comparison, ...]
+    beside: tuple[tuple[Comparison, ...], ...]
     over_all: tuple[Comparison, ...]
     differing: SpecDiff | None
     checks: tuple[SensitivityRead, ...]
@@ -84,6 +88,7 @@ def facts_of(store: Store, subject: Subject, margin: Margin | None = None) -> Fa
     misfits = _misfits(store, experiments)
     verdict, at_last = _verdict(store, curves, experiments, misfits, margin)
     judged = judged_curves(curves, experiments, verdict.evaluations)
+    others = [each for each in Fitness if at_last and each is not Fitness.RECORDED]
     columns = [SpecColumn(each.id, each.name, (each.spec,)) for each in experiments]
     with store.reading() as session:
         work = work_of(session, ids)
@@ -94,9 +99,11 @@ def facts_of(store: Store, subject: Subject, margin: Margin | None = None) -> Fa
         study=isinstance(subject, StudyRead),
         experiments=experiments,
         curves=curves,
+        transferred=results.curves(store, ids, Fitness.TRANSFERRED),
         judged=judged,
         verdict=verdict,
         at_last=at_last,
+        beside=tuple(compare(store, ids, to_evaluations=verdict.evaluations, fitness=each) for each in others),
         over_all=_over_all(store, ids, verdict.evaluations),
         differing=differences(columns) if len(ids) > 1 else None,
         checks=_checks(store, experiments),

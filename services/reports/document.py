@@ -20,7 +20,7 @@ def report_on(store: Store, subject: Subject, margin: Margin | None = None) -> R
     several = len(facts.experiments) > 1
     sections = [
         Section("Verdict", _verdict(facts.verdict)),
-        Section("Curves", (Drawing(curves_figure(facts.curves)), tables.at_last(facts))),
+        Section("Curves", (Drawing(curves_figure(facts.curves, beside=facts.transferred)), tables.at_last(facts))),
         *([Section("Which differ", _differences(facts))] if several else []),
         *([Section("Simulators", _simulators(store, facts))] if facts.leading else []),
         *([Section("Sensitivity of fitness to the tunables", _sensitivity(facts))] if facts.checks else []),
@@ -54,6 +54,7 @@ def _differences(facts: Facts) -> tuple[Block, ...]:
     return (
         compared.summaries(facts, facts.at_last, f"Fitness {last}"),
         compared.pairs(facts, facts.at_last, f"All pairs {last}, by the tests that the verdict uses"),
+        *(compared.pairs(facts, each, f"{each[0].fitness.words}, {last}") for each in facts.beside),
         compared.tests(facts, facts.at_last, f"All pairs {last}, by each test"),
         *(Paragraph(f"Shared random streams: {caution}.", note=True) for caution in cautions),
         *(_over_all(facts) if facts.over_all else ()),

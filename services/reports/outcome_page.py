@@ -20,7 +20,7 @@ def outcome_report(outcome: ExperimentOutcome) -> Report:
         *([Section("The best measured controller", _controller(outcome))] if outcome.best else []),
         *([Section("The tuned simulator", _simulator(outcome))] if outcome.simulators else []),
         Section("Verdict", (Bullets(verdict_sentences(outcome)),)),
-        Section("Curve", (Drawing(curves_figure(outcome.facts.curves)),)),
+        Section("Curve", (Drawing(curves_figure(outcome.facts.curves, beside=outcome.facts.transferred)),)),
         *([Section("Measurements", _measurements(outcome))] if outcome.measured else []),
         Section("Provenance", tables.provenance(outcome.facts) or (Paragraph("Its versions are not stored."),)),
         Section("How to compute it again", tuple(reproduction(outcome.facts))),

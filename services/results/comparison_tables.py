@@ -63,7 +63,7 @@ def _pairs(comparisons: Sequence[Comparison], unit: str) -> str:
         for pair in comparisons
     ]
     caption = [
-        f"Differences of mean fitness in reality{_units(unit)}, {_where(comparisons[0])}, with 90\\,\\% intervals",
+        f"{comparisons[0].fitness.words}{_units(unit)}, {_where(comparisons[0])}: differences with 90\\,\\% intervals",
         "Cohen's $d$",
         "$P(>)$, the probability that a repetition of the first is fitter, with its 95\\,\\% interval",
         "two-sided $p$-values, in brackets with Holm's correction over all pairs",
@@ -82,7 +82,7 @@ def _experiments(comparisons: Sequence[Comparison], unit: str) -> str:
         [_name(name), str(one.n), _estimate(one.mean), _estimate(one.interquartile_mean), _plain(one.sd)]
         for name, one in found.values()
     ]
-    caption = f"Fitness in reality{_units(unit)}, {_where(comparisons[0])}, with 95\\,\\% intervals"
+    caption = f"{comparisons[0].fitness.words}{_units(unit)}, {_where(comparisons[0])}, with 95\\,\\% intervals"
     return _table(caption, ["Experiment", "$n$", "Mean", "Interquartile mean", "SD"], rows)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 
 from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.curves import Fitness
 from gaplab.schemas.records import common_count
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
@@ -14,7 +15,7 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.fitness import fitness_of
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments
-from gaplab.services.results.curves import recorded_of
+from gaplab.services.results.curves import values_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments
@@ -37,7 +38,7 @@ class Margin:
     of_direct: bool = False
 
 
-def compare(
+def compare(  # noqa: PLR0913 - each is a parameter of the operation
     store: Store,
     experiment_ids: Sequence[str],
     *,
@@ -45,8 +46,9 @@ def compare(
     to_evaluations: int | None = None,
     margin: Margin | None = None,
     intervals: bool | None = None,
+    fitness: Fitness = Fitness.RECORDED,
 ) -> tuple[Comparison, ...]:
-    """Compare every pair of experiments on their recorded fitness, one value for each repetition.
+    """Compare every pair of experiments on their fitness in reality, one value for each repetition.
 
     The only value of an experiment without samples is compared with every number of real-world evaluations.
 
@@ -57,6 +59,7 @@ def compare(
         to_evaluations: the last number of evaluations; by default the last that the experiments share.
         margin: difference within which two experiments are equivalent; None: not tested.
         intervals: with intervals; by default for up to `MOST_WITH_INTERVALS` experiments.
+        fitness: whose fitness counts; by default the recorded one, as in the paper.
 
     Raises:
         NotFound: an experiment does not exist.
@@ -67,7 +70,7 @@ def compare(
         message = f"a comparison needs two or more experiments, each once, not {len(experiment_ids)}"
         raise InvalidSpec([Violation("experiment", list(experiment_ids), message)])
     with store.reading() as session:
-        rows, values = recorded_of(session, experiment_ids)
+        rows, values = values_of(session, experiment_ids, fitness)
         final = _common_count(session, rows) if to_evaluations is None else to_evaluations
         within = None if margin is None else _in_units(session, rows, margin)
         concealed = hidden(session, rows)
@@ -82,7 +85,9 @@ def compare(
     pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
     by_id = {row.id: row for row in rows}
     warned = (tuple(warnings(by_id[pair.first], by_id[pair.second], concealed)) for pair in pairs)
-    return tuple(pair.model_copy(update={"warnings": each}) for pair, each in zip(pairs, warned, strict=True))
+    return tuple(
+        pair.model_copy(update={"warnings": each, "fitness": fitness}) for pair, each in zip(pairs, warned, strict=True)
+    )
 
 
 def _check_the_end(compared: Sequence[Compared], last: int) -> None:

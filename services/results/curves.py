@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gaplab.schemas.curves import Curve
+from gaplab.schemas.curves import Curve, Fitness
+from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import best_of_searches, curve_points
 from gaplab.services.core.stored_specs import spec_of
@@ -20,36 +21,38 @@ from gaplab.services.store.session import Session, Store
 COLUMNS = ("experiment", "name", "strategy", "repetition", "evaluations", "fitness")
 
 
-def curve(store: Store, experiment_id: str) -> Curve:
+def curve(store: Store, experiment_id: str, fitness: Fitness = Fitness.RECORDED) -> Curve:
     """Return the curve of an experiment so far.
 
     Raises:
         NotFound: the experiment does not exist.
     """
-    return curves(store, [experiment_id])[0]
+    return curves(store, [experiment_id], fitness)[0]
 
 
-def curves(store: Store, experiment_ids: Sequence[str]) -> tuple[Curve, ...]:
+def curves(store: Store, experiment_ids: Sequence[str], fitness: Fitness = Fitness.RECORDED) -> tuple[Curve, ...]:
     """Return the curves of experiments, in their order.
 
     Raises:
         NotFound: an experiment does not exist.
     """
     with store.reading() as session:
-        return curves_of(session, experiment_ids)
+        return curves_of(session, experiment_ids, fitness)
 
 
-def curves_of(session: Session, experiment_ids: Sequence[str]) -> tuple[Curve, ...]:
+def curves_of(
+    session: Session, experiment_ids: Sequence[str], fitness: Fitness = Fitness.RECORDED
+) -> tuple[Curve, ...]:
     """Return the curves of experiments, as `curves` does, in the snapshot of a session.
 
     Raises:
         NotFound: an experiment does not exist.
     """
-    rows, values = recorded_of(session, experiment_ids)
-    return tuple(_curve(row, values[row.id]) for row in rows)
+    rows, values = values_of(session, experiment_ids, fitness)
+    return tuple(_curve(row, values[row.id], fitness) for row in rows)
 
 
-def study_curves(store: Store, study_id: str) -> tuple[Curve, ...]:
+def study_curves(store: Store, study_id: str, fitness: Fitness = Fitness.RECORDED) -> tuple[Curve, ...]:
     """Return the curves of a study's experiments, in its order.
 
     Raises:
@@ -57,7 +60,7 @@ def study_curves(store: Store, study_id: str) -> tuple[Curve, ...]:
     """
     with store.reading() as session:
         experiments.get_study(session, study_id)
-        return curves_of(session, [row.id for row in experiments.experiments_of(session, [study_id])])
+        return curves_of(session, [row.id for row in experiments.experiments_of(session, [study_id])], fitness)
 
 
 def unit_of(store: Store, experiment_id: str) -> str:
@@ -88,21 +91,31 @@ def curves_csv(curves: Sequence[Curve]) -> str:
     return text.getvalue()
 
 
-def recorded_of(session: Session, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
-    """Return experiments, and the recorded fitness of each: `(repetitions, iterations + 1)`, nan if missing.
+def values_of(
+    session: Session, ids: Sequence[str], fitness: Fitness = Fitness.RECORDED
+) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
+    """Return experiments, and the fitness of each: `(repetitions, iterations + 1)`, nan if missing.
+
+    A failed controller is never the best. Where one was not measured, there is no best from there on: others had more
+    chances.
 
     Raises:
         NotFound: an experiment does not exist.
     """
     rows = experiments.get_experiments(session, ids)
-    found = results.recorded(session, ids)
+    recorded = fitness is Fitness.RECORDED
+    found = (
+        results.recorded(session, ids) if recorded else results.measured_fitness(session, ids, MeasurementKind.PROBE)
+    )
     values = {row.id: np.full((row.spec["repetitions"], row.iterations), np.nan) for row in rows}
-    for experiment, repetition, iteration, fitness in found:
-        values[experiment][repetition, iteration] = fitness
-    return rows, values
+    for experiment, repetition, iteration, value in found:
+        values[experiment][repetition, iteration] = -np.inf if value is None else value
+    if fitness is Fitness.EQUAL_CHANCES:
+        values = {id_: np.maximum.accumulate(each, axis=1) for id_, each in values.items()}
+    return rows, {id_: np.where(np.isneginf(each), np.nan, each) for id_, each in values.items()}
 
 
-def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
+def _curve(row: ExperimentRow, values: FloatArray, fitness: Fitness) -> Curve:
     spec = spec_of(row.spec)
     direct = is_direct(spec)
     return Curve(
@@ -111,6 +124,7 @@ def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
         strategy=row.strategy,
         state=row.state,
         unit=unit(spec),
+        fitness=fitness,
         direct=direct,
         level=not row.tunes,
         points=curve_points(values),

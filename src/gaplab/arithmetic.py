@@ -7,7 +7,8 @@ imported, so this module is imported before them.
 
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 FIXED: Mapping[str, str] = {
@@ -16,10 +17,13 @@ FIXED: Mapping[str, str] = {
 }
 """Variables that choose code for AVX2. What the environment says already counts instead."""
 
+AVX512: Mapping[str, str] = {"OPENBLAS_CORETYPE": "SkylakeX", "NPY_DISABLE_CPU_FEATURES": ""}
+"""Variables that choose code for AVX-512, which results from before the choice may need."""
+
 
 def fix_arithmetic() -> None:
     """Choose the code for this process, and for those that it starts; nothing on a processor without AVX2."""
-    if has_avx2():
+    if has("avx2"):
         for name, value in FIXED.items():
             os.environ.setdefault(name, value)
 
@@ -29,11 +33,22 @@ def chosen() -> dict[str, str]:
     return {name: os.environ[name] for name in FIXED if name in os.environ}
 
 
-def has_avx2() -> bool:
-    """Return whether this is an x86-64 processor with AVX2, as far as Linux tells."""
+@contextmanager
+def code_for_avx512() -> Iterator[None]:
+    """Choose the code for AVX-512 for processes that are started meanwhile."""
+    before = chosen()
+    os.environ.update(AVX512)
+    try:
+        yield
+    finally:
+        os.environ.update(before)
+
+
+def has(feature: str) -> bool:
+    """Return whether this is an x86-64 processor with a feature like `avx2`, as far as Linux tells."""
     try:
         told = Path("/proc/cpuinfo").read_text()
     except OSError:
         return False
     flags = next((line for line in told.splitlines() if line.startswith("flags")), "")
-    return platform.machine() == "x86_64" and "avx2" in flags.split()
+    return platform.machine() == "x86_64" and feature in flags.split()

@@ -86,7 +86,7 @@ def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(
     expect(curve.locator(".point")).to_have_count(3)
     before = curve.locator(".js-line").count()
     curve.get_by_label("Each repetition").check()
-    expect(curve).to_contain_text("Thin lines: single repetitions")
+    expect(curve).to_contain_text("Faint lines: single repetitions")
     assert curve.locator(".js-line").count() > before
     curve.get_by_label("Band").select_option("interval")
     expect(curve).to_contain_text("95 % interval of the mean")

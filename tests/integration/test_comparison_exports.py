@@ -63,6 +63,29 @@ def test_csv_has_every_number_of_the_json(ids: list[str], sqlite_store: Store) -
     assert {row["second_name"] for row in rows} == {"'=1+1", "plain"}
 
 
+def test_transferred_controllers_alone_and_the_best_of_them_stand_beside_the_recorded_fitness(
+    ids: list[str], sqlite_store: Store
+) -> None:
+    with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
+        probes = api.get(f"/experiments/{ids[0]}/samples", params={"kind": "probe", "limit": 1000}).json()["items"]
+        kinds = ("recorded", "transferred", "equal_chances")
+        curves = {kind: api.get("/curves", params={"experiment": ids, "fitness": kind}).json() for kind in kinds}
+        pairs = {kind: api.get("/comparisons", params={"experiment": ids, "fitness": kind}).json() for kind in kinds}
+        figure = api.get("/figures/curves", params={"experiment": ids, "format": "json"}).json()
+
+    alone = {(each["repetition"], each["iteration"]): each["fitness"] for each in probes}
+    values = {kind: [point["values"] for point in found[0]["points"]] for kind, found in curves.items()}
+    for count in range(len(values["recorded"])):
+        assert values["transferred"][count] == [alone[each, count] for each in range(4)]
+        measured = [[alone[each, before] for before in range(count + 1)] for each in range(4)]
+        best = [max((one for one in each if one is not None), default=None) for each in measured]
+        assert values["equal_chances"][count] == best  # a failed controller is never the best
+    for kind, found in pairs.items():
+        means = [each["points"][found[0]["to_evaluations"]]["mean"] for each in curves[kind][:2]]
+        assert (found[0]["fitness"], found[0]["difference"]) == (kind, pytest.approx(means[0] - means[1]))
+    assert "Thin lines: transferred controllers alone." in figure["caption"]
+
+
 def test_latex_prints_names_as_they_are_and_rounds_p_as_papers_do() -> None:
     test = Test(statistic=3.0, p=0.0001, p_holm=0.0003)
     estimate, nothing = Estimate(value=0.125, lower=0.05, upper=0.2), Estimate()

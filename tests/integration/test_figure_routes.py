@@ -131,7 +131,7 @@ def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api
     labels = [found["figure"]["layout"]["xaxis"]["title"]["text"] for found in (plain, rollouts, time)]
     assert labels == ["Number of real-world evaluations", "Rollouts in simulation", "Time (s)"]
     assert "at 30\N{NO-BREAK SPACE}s each" in time["caption"]
-    assert "Thin lines" in each["caption"]
+    assert "Faint lines" in each["caption"]
     assert len(each["figure"]["data"]) == len(plain["figure"]["data"]) + 1
 
 

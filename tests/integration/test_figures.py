@@ -1,5 +1,6 @@
 """The figure of curves: what is in it."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -34,6 +35,15 @@ def test_a_curve_becomes_a_line_with_its_interval_and_the_baseline_a_level_with_
     assert panel.y.label == "Fitness in reality (m/s)"
     assert panel.x.label == "Number of real-world evaluations"
     assert panel.x.limits == pytest.approx((-0.04, 2.04))
+
+
+def test_transferred_controllers_alone_are_thin_lines_beside_the_recorded_ones() -> None:
+    alone = curve("simulated_fit", point(0, 0.9), point(1, 1.0), point(2, 1.1))
+    figure = curves_figure([RISING, DIRECT], beside=[alone])
+
+    recorded, thin = lines(figure)
+    assert (thin.y, thin.style, recorded.style.thin) == ((0.9, 1.0, 1.1), replace(recorded.style, thin=True), False)
+    assert figure.caption.count("Thin lines: transferred controllers alone.") == 1
 
 
 def test_fewer_than_five_repetitions_are_drawn_with_their_sd() -> None:
@@ -79,7 +89,7 @@ def test_each_repetition_has_a_thin_line_behind_the_mean_if_asked_for() -> None:
     (thin,) = [mark for mark in lines(figure) if mark.faint]
     assert thin.x == (0, 1, None, 0, 1, None)
     assert thin.y == (0.8, 1.1, None, 1.0, None, None)
-    assert "Thin lines: single repetitions." in figure.caption
+    assert "Faint lines: single repetitions." in figure.caption
 
 
 def test_curves_are_drawn_against_what_they_cost_where_that_is_known() -> None:

@@ -1,8 +1,9 @@
 """What was submitted can be submitted again: from the service, from an archive, and with the same bits."""
 
 import json
+import os
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -12,10 +13,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.arithmetic import chosen, has_avx2
+from gaplab.arithmetic import chosen, has
+from gaplab.schemas.archives import RepetitionRerun
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.archives import export_study
-from gaplab.services.archives.recomputing import Recorded, difference, rerun
+from gaplab.services.archives import export_study, rerunning
+from gaplab.services.archives.recomputing import Recorded, difference, rerun, result_of
 from gaplab.services.archives.rerunning import rerun_all, submitted_spec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict
@@ -180,12 +182,31 @@ def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
 
 
 @pytest.mark.release
-@pytest.mark.skipif(not has_avx2(), reason="no code is chosen on such a processor")
+@pytest.mark.skipif(not has("avx2"), reason="no code is chosen on such a processor")
 def test_code_that_an_archive_does_not_name_is_named(gaplab: Gaplab) -> None:
     said = gaplab("rerun", str(FOLDER / "cma_es.zip"), "--verify", "--repetitions", "1")
 
     assert said.code == 0
     assert f"OPENBLAS_CORETYPE: none in the archive, {chosen()['OPENBLAS_CORETYPE']} here" in said.out
+
+
+def test_what_differs_is_tried_again_with_the_code_for_avx512_which_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a processor that has it, as a fake says; the one of two repetitions whose number is odd needs it."""
+
+    def computed(recorded: Sequence[Recorded], _: int | None) -> Iterator[RepetitionRerun]:
+        other = os.environ["OPENBLAS_CORETYPE"] == "SkylakeX"
+        for each in recorded:
+            yield result_of(each, "same" if other == bool(each.number % 2) else "different", 3, None)
+
+    monkeypatch.setattr(rerunning, "has", lambda _: True)
+    monkeypatch.setattr(rerunning, "rerun_all", computed)
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
+    with (FOLDER / "cma_es.zip").open("rb") as file:
+        found = rerunning.verify(file)
+
+    assert found.different == 0
+    assert {(each.repetition % 2, each.code) for each in found.repetitions} == {(0, None), (1, "AVX-512")}
+    assert os.environ["OPENBLAS_CORETYPE"] == "Haswell"
 
 
 def test_the_first_step_that_differs_is_named() -> None:

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from gaplab.arithmetic import FIXED, chosen, fix_arithmetic, has_avx2
+from gaplab.arithmetic import FIXED, chosen, fix_arithmetic, has
 from gaplab.services.running.versions import provenance
 from tests.arithmetic import code_of_numpy
 
 ROOT = Path(__file__).parents[2]
-pytestmark = pytest.mark.skipif(not has_avx2(), reason="the processor has no AVX2")
+pytestmark = pytest.mark.skipif(not has("avx2"), reason="the processor has no AVX2")
 FREE = {name: value for name, value in os.environ.items() if name not in FIXED}
 
 
@@ -40,7 +40,7 @@ def test_the_tests_themselves_run_the_code_for_avx2() -> None:
 
 
 def test_nothing_is_chosen_on_a_processor_without_avx2(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gaplab.arithmetic.has_avx2", lambda: False)
+    monkeypatch.setattr("gaplab.arithmetic.has", lambda _: False)
     for name in FIXED:
         monkeypatch.delenv(name)
 

@@ -18,10 +18,28 @@ export const BANDS = { "": "automatic", interval: "95 % interval of the mean", s
 export const bandSelect = (attributes = {}) =>
   h("select", attributes, ...Object.entries(BANDS).map(([value, label]) => h("option", { value }, label)));
 
-/** Return the options of a figure of curves: each repetition behind the mean, and the band. `change` is the event of a choice. */
+/**
+ * Whose fitness counts; by default the recorded one, with thin lines for transferred controllers alone.
+ *
+ * @type {Record<string, string>}
+ */
+export const FITNESS = {
+  "": "recorded, and transferred alone", recorded: "recorded, as in the paper", transferred: "of transferred controllers alone",
+  equal_chances: "best of the transferred ones: equal chances",
+};
+
+/**
+ * Return a list to choose the fitness from.
+ *
+ * @param {Page.Attributes} [attributes]
+ */
+export const fitnessSelect = (attributes = {}) =>
+  h("select", attributes, ...Object.entries(FITNESS).map(([value, label]) => h("option", { value }, label)));
+
+/** Return the options of a figure of curves: whose fitness, each repetition behind the mean, and the band. `change` is the event of a choice. */
 export function curveOptions() {
   const each = h("input", { type: "checkbox" });
-  const band = bandSelect();
-  const element = h("p", { class: "options" }, h("label", {}, each, " Each repetition"), h("label", {}, "Band ", band));
-  return { element, query: () => ({ band: band.value, each: each.checked || null }) };
+  const [fitness, band] = [fitnessSelect(), bandSelect()];
+  const element = h("p", { class: "options" }, h("label", {}, "Fitness ", fitness), h("label", {}, each, " Each repetition"), h("label", {}, "Band ", band));
+  return { element, query: () => ({ fitness: fitness.value, band: band.value, each: each.checked || null }) };
 }

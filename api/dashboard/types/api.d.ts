@@ -128,6 +128,7 @@ declare namespace Api {
     student: Test;
     welch: Test;
     mann_whitney: Test;
+    fitness: Fitness;
     caution: string | null;
     lower: number | null;
     upper: number | null;
@@ -175,6 +176,7 @@ declare namespace Api {
     strategy: string;
     state: State;
     unit: string;
+    fitness: Fitness;
     direct: boolean;
     level: boolean;
     points: Array<CurvePoint>;
@@ -332,6 +334,7 @@ declare namespace Api {
     empty: boolean;
     table: TableRead | null;
   }
+  type Fitness = "recorded" | "transferred" | "equal_chances";
   interface FitnessRead {
     evaluations: number;
     n: number;

@@ -92,6 +92,7 @@ declare namespace Page {
     x: string;
     cost_s: number;
     band: string;
+    fitness: string;
     each: boolean;
     test: "trusted" | "student" | "welch" | "mann_whitney" | "paired_t" | "wilcoxon" | "brown_forsythe";
     from: number | null;

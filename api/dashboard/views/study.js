@@ -61,10 +61,10 @@ function curves({ id, signal, sections: parts }) {
   const downloads = h("div");
   const draw = plot(place, "curves", signal);
   const options = curveOptions();
-  const csv = /** @type {const} */ (["CSV", `/studies/${id}/curves`, { format: "csv" }, `gaplab-${id}-curves.csv`]);
   const load = async () => {
     const query = { study: id, ...options.query() };
-    downloads.replaceChildren(figureDownloads("curves", query, `gaplab-${id}-curves`, [...csv]));
+    downloads.replaceChildren(figureDownloads("curves", query, `gaplab-${id}-curves`,
+      ["CSV", `/studies/${id}/curves`, { format: "csv", fitness: query.fitness }, `gaplab-${id}-curves.csv`]));
     return await draw(query) ? undefined : "failed";
   };
   options.element.addEventListener("change", parts.add(place, CURVE_KINDS, load));

@@ -1,10 +1,10 @@
 """Curves: recorded fitness against its cost, as in the paper's Fig. 4."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
-from gaplab.schemas.curves import Curve, CurvePoint
+from gaplab.schemas.curves import Curve, CurvePoint, Fitness
 from gaplab.services.figures.kinds.best_of import best_of_in_words, best_of_line
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Line, Mark, Panel, Table, faint_lines
 from gaplab.services.figures.style import INK, Dash, Style, strategy_styles
@@ -53,8 +53,9 @@ def curves_figure(
     band: Band | None = None,
     against: CostAxis | None = None,
     each: bool = False,
+    beside: Sequence[Curve] = (),
 ) -> FigureDefinition:
-    """Return a figure of the recorded fitness against the number of real-world evaluations, or their cost.
+    """Return a figure of fitness in reality against the number of real-world evaluations, or their cost.
 
     A point without a mean, or with one too large to compute with, is left out. A band needs two repetitions.
 
@@ -64,7 +65,8 @@ def curves_figure(
         band: band around the lines; by default the interval, or the SD if few repetitions would make the interval fill
             the figure. Levels, like the direct baseline, always have their SD, as in the paper.
         against: the horizontal axis; by default the number of real-world evaluations.
-        each: draw a thin line for every repetition.
+        each: draw a faint line for every repetition.
+        beside: curves of transferred controllers alone, to draw as thin lines beside those of the same experiments.
     """
     curves = [_drawable(one) for one in curves]
     band = band or _default_band(curves)
@@ -77,13 +79,14 @@ def curves_figure(
     marks += [
         _repetitions(one, against, style) for one, style in zip(lines, styles, strict=True) if each and one.points
     ]
-    marks += [_level(one, style) for one, style in zip(levels, _level_styles(levels), strict=True)]
+    thin = [mark for one, style in zip(lines, styles, strict=True) for mark in _thin(one, beside, against, style)]
+    marks += [*thin, *(_level(one, style) for one, style in zip(levels, _level_styles(levels), strict=True))]
     span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
     best_of = _best_of_lines(levels, span) if lines and not against else []
     marks += best_of
     x = Axis(against.label if against else EVALUATIONS, (-0.02 * span, 1.02 * span), whole=against is None)
     y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
-    caption = _caption(lines, levels, BANDS[band], against, each=each)
+    caption = _caption(lines, levels, BANDS[band], against, each=each, thin=bool(thin))
     return FigureDefinition(
         name="curves",
         title=heading(title),
@@ -146,6 +149,15 @@ def _repetitions(one: _Placed, against: CostAxis | None, style: Style) -> Line:
     return faint_lines(one.name, places, rows, style)
 
 
+def _thin(one: _Placed, beside: Sequence[Curve], against: CostAxis | None, style: Style) -> list[Mark]:
+    """Return the thin line beside a curve; nothing without points."""
+    same = (each for each in beside if each.experiment == one.curve.experiment)
+    found = [each for curve in same for each in _placed(one.name, _drawable(curve), against).points]
+    hover = tuple(f"transferred alone: {_written(point, n='n = ')}" for _, _, point in found)
+    x, y = tuple(x for x, _, _ in found), tuple(mean for _, mean, _ in found)
+    return [Line(one.name, x, y, replace(style, thin=True), hover=hover, markers=False)] if found else []
+
+
 def _level(one: _Placed, style: Style) -> Level:
     ((_, mean, point), *_) = one.points
     return Level(one.name, mean, style, *_ends(point, "sd"), marked=not style.ink)
@@ -182,12 +194,14 @@ def _limits(marks: Sequence[Mark]) -> tuple[float, float]:
 
 
 def _caption(
-    lines: Sequence[_Placed], levels: Sequence[_Placed], band: str, against: CostAxis | None, *, each: bool
+    lines: Sequence[_Placed], levels: Sequence[_Placed], band: str, against: CostAxis | None, *, each: bool, thin: bool
 ) -> str:
     counts = [point.n for one in lines for _, _, point in one.points]
     bands = f"; bands: {band}" if any(point.sd is not None for one in lines for _, _, point in one.points) else ""
     parts = [f"Mean over {number_of('repetition', *counts)}{bands}."] if counts else []
-    parts += ["Thin lines: single repetitions."] if counts and each else []
+    parts += sorted({f"{one.curve.fitness.words}." for one in lines if one.curve.fitness is not Fitness.RECORDED})
+    parts += ["Thin lines: transferred controllers alone."] if thin else []
+    parts += ["Faint lines: single repetitions."] if counts and each else []
     parts += [against.note] if against else []
     origins = {True: "evolved in reality itself", False: "without samples"}
     parts += [f"{one.name}: {origins[one.curve.direct]}, {_level_in_words(one)}." for one in levels]

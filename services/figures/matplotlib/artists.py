@@ -81,7 +81,8 @@ def _line(line: Line, axes: "Axes", order: float) -> None:
         return
     if line.markers:
         drawn |= {"marker": MARKERS[look.marker], "markersize": 3.6, "markeredgecolor": "white", "markeredgewidth": 0.4}
-    drawn |= {"linestyle": DASHES[look.dash], "linewidth": 1.2, "label": legend_name(line.name), "zorder": order}
+    width, name = (0.6, "_thin") if look.thin else (1.2, legend_name(line.name))
+    drawn |= {"linestyle": DASHES[look.dash], "linewidth": width, "label": name, "zorder": order}
     axes.plot(x, y, **drawn)
     if any(each is not None for each in line.lower):
         lower, upper = _ends(line.lower, line.y), _ends(line.upper, line.y)

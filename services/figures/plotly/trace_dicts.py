@@ -79,6 +79,9 @@ def _line(line: Line) -> Trace:
     if line.faint:
         trace["line"] |= {"width": 1, "dash": "solid"}
         return _quiet(trace) | {"opacity": 0.35}
+    if look.thin:
+        trace["line"] |= {"width": 1}
+        trace["showlegend"] = False
     return trace | _hover(line.hover)
 
 

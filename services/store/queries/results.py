@@ -131,6 +131,15 @@ def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str
     return session.execute(of_experiments(row, experiments, *columns).where(row.recorded_fitness.is_not(None))).all()
 
 
+def measured_fitness(
+    session: Session, experiments: Sequence[str], kind: MeasurementKind
+) -> Sequence[tuple[str, int, int, float | None]]:
+    """Return experiment, repetition, iteration and fitness of every measurement of a kind; None if it failed."""
+    row = MeasurementRow
+    columns = RepetitionRow.experiment_id, RepetitionRow.number, row.iteration, row.fitness
+    return session.execute(of_experiments(row, experiments, *columns).where(row.kind == kind, ~row.left_out)).all()
+
+
 def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, list[float]]:
     """Return the best recorded fitness of each repetition so far, by experiment."""
     found: dict[str, list[float]] = {}

@@ -1,7 +1,7 @@
 // @ts-check
 /** A comparison as an address, so that it can be shared. */
 
-import { BANDS } from "../../lib/curve_options.js";
+import { BANDS, FITNESS } from "../../lib/curve_options.js";
 
 /** @type {Record<string, string>} */
 export const AXES = { evaluations: "Real-world evaluations", rollouts: "Rollouts", time: "Time" };
@@ -34,6 +34,7 @@ export function comparisonOf(parameters) {
     x: among("x", AXES, "evaluations"),
     cost_s: nonNegative(parameters.get("cost_s")) ?? COST_S,
     band: among("band", BANDS, ""),
+    fitness: among("fitness", FITNESS, ""),
     each: parameters.get("each") === "true",
     test: among("test", TESTS, "trusted"),
     from: wholeNumber(parameters.get("from")),
@@ -48,12 +49,13 @@ export function comparisonOf(parameters) {
  *
  * @param {Page.Comparison} comparison
  */
-export function addressOf({ experiments, x, cost_s: cost, band, each, test, from, to, margin, margin_of_direct: share }) {
+export function addressOf({ experiments, x, cost_s: cost, band, fitness, each, test, from, to, margin, margin_of_direct: share }) {
   const parts = Object.entries({
     experiments: experiments.join(","),
     x: x === "evaluations" ? "" : x,
     cost_s: x === "time" ? cost : "",
     band,
+    fitness,
     each: each || "",
     test: test === "trusted" ? "" : test,
     from: from ?? "",
@@ -69,8 +71,8 @@ export function addressOf({ experiments, x, cost_s: cost, band, each, test, from
  *
  * @param {Page.Comparison} comparison
  */
-export const figureQuery = ({ experiments, x, cost_s: cost, band, each }) => ({
-  experiment: experiments, x: x === "evaluations" ? null : x, cost_s: x === "time" ? cost : null, band, each: each || null,
+export const figureQuery = ({ experiments, x, cost_s: cost, band, fitness, each }) => ({
+  experiment: experiments, x: x === "evaluations" ? null : x, cost_s: x === "time" ? cost : null, band, fitness, each: each || null,
 });
 
 /** @param {string | null} text */

@@ -1,7 +1,7 @@
 // @ts-check
 /** How the figure is drawn: against what, and with which band. */
 
-import { bandSelect } from "../../lib/curve_options.js";
+import { bandSelect, fitnessSelect } from "../../lib/curve_options.js";
 import { h } from "../../lib/dom.js";
 import { AXES } from "./address.js";
 
@@ -20,16 +20,18 @@ export function controls(view) {
   const cost = h("input", { type: "number", min: 0, step: "any", class: "short", onchange: changeCost });
   const costLabel = h("label", {}, "each real evaluation costs ", cost, " s");
   const band = bandSelect({ onchange: () => { view.change({ band: band.value }); } });
+  const fitness = fitnessSelect({ onchange: () => { view.change({ fitness: fitness.value }); } });
   const each = h("input", { type: "checkbox", onchange: () => { view.change({ each: each.checked }); } });
   const element = h("div", { class: "controls" },
     h("fieldset", {}, h("legend", {}, "Against"), ...axes, costLabel),
-    h("label", {}, "Band ", band), h("label", {}, each, " Each repetition"));
+    h("label", {}, "Fitness ", fitness), h("label", {}, "Band ", band), h("label", {}, each, " Each repetition"));
   const update = () => {
     const { choice } = view;
     for (const radio of radios) radio.checked = radio.value === choice.x;
     costLabel.hidden = choice.x !== "time";
     if (document.activeElement !== cost) cost.value = String(choice.cost_s);
     band.value = choice.band;
+    fitness.value = choice.fitness;
     each.checked = choice.each;
   };
   return { element, update };

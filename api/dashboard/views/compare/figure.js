@@ -30,7 +30,7 @@ export function figure(view) {
     if (key === lastKey || !query.experiment.length) return;
     lastKey = key;
     downloads.replaceChildren(figureDownloads("curves", query, "gaplab-curves",
-      ["CSV", "/curves", { experiment: query.experiment, format: "csv" }, "gaplab-curves.csv"]));
+      ["CSV", "/curves", { experiment: query.experiment, fitness: query.fitness, format: "csv" }, "gaplab-curves.csv"]));
     loadNow();
   };
   return { element: h("section", { class: "card", "aria-label": "Curves" }, place, downloads), update };

@@ -79,8 +79,8 @@ export function significance(view) {
  *
  * @param {Page.CompareView} view
  */
-function keyOf({ cache, choice: { experiments, from, to, test, margin, margin_of_direct: share } }) {
-  return JSON.stringify([cache.known(experiments), from, to, test, margin, share]);
+function keyOf({ cache, choice: { experiments, from, to, test, fitness, margin, margin_of_direct: share } }) {
+  return JSON.stringify([cache.known(experiments), from, to, test, fitness, margin, share]);
 }
 
 /**
@@ -124,12 +124,12 @@ async function fill(place, view, isCurrent, unfolded) {
     refill(place, String(ids.length), () => h("p", {}, `Pairs are tested for up to ${MOST} experiments; these are ${ids.length}.`));
     return;
   }
-  const { margin, margin_of_direct: share, test } = view.choice;
+  const { margin, margin_of_direct: share, test, fitness } = view.choice;
   const isOpen = (/** @type {string} */ name) => place.querySelector(`details.${name}`)?.hasAttribute("open") ?? false;
   const hasOthers = isOpen("every");
   const others = hasOthers ? ranges.filter((each) => rangeText(each) !== rangeText(range)) : [];
-  const asked = { experiment: ids, from: range[0], to: range[1], margin, margin_of_direct: share };
-  const queries = [...others.map(([from, to]) => ({ experiment: ids, from, to, intervals: false })), asked];
+  const asked = { experiment: ids, from: range[0], to: range[1], margin, margin_of_direct: share, fitness };
+  const queries = [...others.map(([from, to]) => ({ experiment: ids, from, to, fitness, intervals: false })), asked];
   const answers = await Promise.all(queries.map((query) => get("/comparisons", query, view.signal)));
   if (!isCurrent()) return;
   const results = [...others, range].map((each, index) => ({ range: each, pairs: answers[index] }));

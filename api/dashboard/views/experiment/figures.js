@@ -33,7 +33,8 @@ const OTHERS = [
  * @param {Page.ExperimentPage} page
  */
 export function curve(page) {
-  return card(page, CURVE, curveOptions(), ["CSV", `/experiments/${page.id}/curve`, { format: "csv" }, `gaplab-${page.id}-curve.csv`]);
+  return card(page, CURVE, curveOptions(), ({ fitness }) =>
+    [["CSV", `/experiments/${page.id}/curve`, { format: "csv", fitness }, `gaplab-${page.id}-curve.csv`]]);
 }
 
 /**
@@ -48,15 +49,15 @@ export const otherFigures = (page) =>
  * @param {Page.ExperimentPage} page
  * @param {Figure} figure
  * @param {{ element: HTMLElement, query: () => Page.Query } | null} [options]
- * @param {...Parameters<typeof import("../../lib/downloads.js").downloadLink>} files
+ * @param {(query: Page.Query) => Parameters<typeof figureDownloads>[3][]} [files]
  */
-function card(page, { kind, title, events, isPending }, options = null, ...files) {
+function card(page, { kind, title, events, isPending }, options = null, files = () => []) {
   const place = h("div");
   const downloads = h("div");
   const drawPlot = plot(place, kind, page.signal);
   const draw = async () => {
     const query = { experiment: page.id, ...options?.query() };
-    downloads.replaceChildren(figureDownloads(kind, query, `gaplab-${page.id}-${kind}`, ...files));
+    downloads.replaceChildren(figureDownloads(kind, query, `gaplab-${page.id}-${kind}`, ...files(query)));
     const wasPending = await isPending?.(page); // asked first: the answer continues the computation, so the figure has all that it counts
     const isCurrent = await drawPlot(query);
     if (!isCurrent) return "failed";
