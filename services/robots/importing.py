@@ -29,6 +29,9 @@ from gaplab.services.robots.xml import decoded
 URDF_STEP_S = 1 / 240
 """Time step of a URDF, which has none: Bullet's."""
 
+LARGEST_M = 10.0
+"""Place in another body, or size of a shape, beyond which a file may mean millimetres."""
+
 SAME_KG = 1e-9
 """Difference of masses that rounding explains."""
 
@@ -170,6 +173,10 @@ def _note_losses(source: Source, notes: Notes) -> None:
     """Note what a compiled model has, and a World has not."""
     model: Any = source.model
     notes.lose("collisions of the robot's bodies with each other are lost: bodies touch the ground alone")
+    carried, moving = model.body_parentid > 0, model.geom_bodyid > 0
+    largest = float(np.max([*model.geom_rbound[moving], *np.abs(model.body_pos[carried]).ravel()], initial=0.0))
+    if largest > LARGEST_M:
+        notes.lose(f"places and sizes up to {largest:.3g} m are taken as they are, not as millimetres")
     if source.is_urdf:
         return
     notes.lose("soft contacts and limits (solref, solimp, margin, condim, cone) are lost: contacts are rigid")
