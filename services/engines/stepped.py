@@ -2,7 +2,6 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from functools import partial
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -90,9 +89,10 @@ class SteppedEngine(Engine, Generic[S]):
         scene, checks_s = self._scenes[built], checked_s(world, float(motion.observe_s[-1]))
         often = motion.observed_at(np.union1d(motion.observe_s, checks_s))
         asked, checks = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, checks_s))
+        looks = (scene.pose, scene.angles, scene.torques)[: 2 + with_torques]
         try:
             advance = self._start(scene, world, motion.start_tilt_rad)
-            watched = watch(scene, advance, often, partial(_look, scene, with_torques))
+            watched = watch(scene, advance, often, lambda: np.concatenate([look() for look in looks]))
         except self.failures:
             watched = np.full((len(often.observe_s), 7 + (1 + with_torques) * len(world.joints)), np.nan)
         seen, energetic = watched[asked], watched[checks]
@@ -101,11 +101,6 @@ class SteppedEngine(Engine, Generic[S]):
             self._scenes.drop(built)  # nan persists in a PhysX scene; Bullet drops bodies that are too far away
             return np.full_like(seen, np.nan)
         return seen
-
-
-def _look(scene: SteppedScene, with_torques: bool) -> FloatArray:
-    """Return pose and angles of a scene, `(7 + joints,)`, and torques if wanted."""
-    return np.concatenate([scene.pose(), scene.angles(), *([scene.torques()] if with_torques else [])])
 
 
 def _angles(world: World, seen: FloatArray) -> FloatArray:
