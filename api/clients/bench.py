@@ -164,7 +164,7 @@ class Bench:
 
         Args:
             file: the recording; with the suffix .mcap, the extra `gaplab[mcap]` reads it.
-            topic: topic of the base's pose in MCAP; left out: the only one that has poses.
+            topic: topic of the base's pose in MCAP, or `TOPIC:BODY`; left out: the only one that has poses.
 
         Raises:
             ExtraMissing: the libraries for MCAP are not installed.

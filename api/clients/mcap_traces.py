@@ -31,11 +31,12 @@ def mcap_to_csv(file: Path, topic: str | None = None) -> str:
 
     Args:
         file: the recording.
-        topic: topic of the base's pose; None if the recording has a single topic of poses.
+        topic: topic of the base's pose, or `TOPIC:BODY` where it has several bodies, as `child_frame_id` names them;
+            None if the recording has a single topic and body.
 
     Raises:
         ExtraMissing: the libraries for MCAP are not installed.
-        ValueError: the recording has no such topic, or several.
+        ValueError: the recording has no such topic or body, or several.
     """
     try:
         from mcap.exceptions import McapError
@@ -43,18 +44,22 @@ def mcap_to_csv(file: Path, topic: str | None = None) -> str:
         from mcap_ros2.decoder import DecoderFactory
     except ImportError as error:
         raise ExtraMissing("mcap", "mcap") from error
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    name, _, body = (topic or "").partition(":")
+    poses: dict[str, list[list[float]]] = {}
     try:
         with file.open("rb") as stream:
             factories: list[Any] = [DecoderFactory(), _Json()]
             reader = make_reader(stream, decoder_factories=factories)
-            chosen = _chosen(reader.get_summary(), topic, file)
+            chosen = _chosen(reader.get_summary(), name or None, file)
             for _, _, message, decoded in reader.iter_decoded_messages(topics=[chosen]):
-                writer.writerow(_pose(decoded, message.log_time))
+                poses.setdefault(getattr(decoded, "child_frame_id", ""), []).append(_pose(decoded, message.log_time))
     except McapError as error:
         raise ValueError(f"{file.name} is no MCAP file that can be read: {error}") from error
+    if body not in poses and (body or len(poses) > 1):
+        permitted = ", ".join(f"{chosen}:{each}" for each in sorted(poses))
+        raise ValueError(f"{file.name} has poses of other or several bodies on {chosen}; permitted: {permitted}")
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([COLUMNS, *(poses.get(body) or next(iter(poses.values()), []))])
     return text.getvalue()
 
 

@@ -98,7 +98,7 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
     id: RequestId,
     files: Annotated[list[Path], typer.Argument(help="recorded motion of the base, CSV or MCAP; one for each repeat")],
     topic: Annotated[
-        str | None, typer.Option("--topic", help="topic of the base's pose in MCAP", show_default=False)
+        str | None, typer.Option("--topic", help="topic of the base's pose in MCAP, or TOPIC:BODY", show_default=False)
     ] = None,
     answer: Annotated[bool, typer.Option("--answer", help="answer the request with them")] = False,
     lag_s: Annotated[

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -55,15 +56,19 @@ def ros(file: Path, *, stamped: bool = True) -> Path:
     return file
 
 
-def foxglove(file: Path, *topics: str, schema: str = "foxglove.PoseInFrame") -> Path:
+def foxglove(file: Path, *topics: str, schema: str = "foxglove.PoseInFrame", bodies: tuple[str, ...] = ("",)) -> Path:
     with file.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
         kind = writer.register_schema(schema, "jsonschema", b"{}")
         for topic in topics:
             channel = writer.register_channel(topic, "json", kind)
-            for second in range(2):
-                body = {"timestamp": {"sec": second, "nsec": 250_000_000}, "frame_id": "map", "pose": pose(0.5)}
+            for second, name in product(range(2), bodies):
+                body = {
+                    "timestamp": {"sec": second, "nsec": 250_000_000},
+                    "child_frame_id": name,
+                    "pose": pose(len(name)),
+                }
                 writer.add_message(channel, log_time=1, data=json.dumps(body).encode(), publish_time=0)
         writer.finish()
     return file
@@ -87,6 +92,15 @@ def test_poses_of_foxglove_are_a_trace_of_the_named_topic(tmp_path: Path) -> Non
         mcap_to_csv(file)
     with pytest.raises(ValueError, match="has no poses on '/bse'; permitted: /base, /camera"):
         mcap_to_csv(file, "/bse")
+
+
+def test_one_of_several_bodies_on_a_topic_is_named(tmp_path: Path) -> None:
+    file = foxglove(tmp_path / "run.mcap", "/mocap", bodies=("wand", "trunk"))
+
+    assert read_trace(mcap_to_csv(file, "/mocap:trunk"), "/traces/0").positions_m[:, 0].tolist() == [5, 5]
+    for topic in (None, "/mocap", "/mocap:trnk"):
+        with pytest.raises(ValueError, match="bodies on /mocap; permitted: /mocap:trunk, /mocap:wand"):
+            mcap_to_csv(file, topic)
 
 
 def test_what_has_no_poses_is_told(tmp_path: Path) -> None:
