@@ -1,11 +1,16 @@
-"""The command that writes tuned values back into the file of a robot."""
+"""The command that writes tuned values back into the file of a robot, and the one that tries further tunables."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from math import nan
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
+from zipfile import ZipFile
 
 import typer
 
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.errors import ServiceError, lines_of
 from gaplab.api.commands.app import RESULTS, AsJson, ExperimentId, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json
@@ -18,6 +23,9 @@ if TYPE_CHECKING:
     from gaplab.services.core.robots.base import Robot
     from gaplab.services.core.world import World
     from gaplab.services.robots.writing import WrittenFile
+
+FURTHER = ("slope", "max_torque", "kp", "motor_gain", "delay", "mass", "joint_damping", "friction")
+"""Labels of tunables that models often lack."""
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -137,3 +145,49 @@ def _lines(output: Path, best: SimulatorRead, written: "WrittenFile", distance_m
     yield from (f"  an import computes it: {change}" for change in written.computed)
     what = "with the values that are not in it, rollouts are" if written.left_out else "rollouts are"
     yield f"Wrote {output}: in gaplab's engine, {what} within {distance_m:.2g} m of the tuned simulator's."
+
+
+@app.command(rich_help_panel=RESULTS)
+def try_tunables(
+    id: ExperimentId,
+    further: Annotated[
+        list[str] | None, typer.Argument(metavar="TUNABLE", help=f"default: {', '.join(FURTHER)}")
+    ] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Search for simulators on an experiment's samples with each of further tunables, and print which errors are left.
+
+    Each search is an experiment without real-world evaluations. The first ones add nothing, by its tuner and `search`.
+    """
+    with connect(url) as client:
+        tried = list(_tried(client, id, further or FURTHER))
+    if as_json:
+        print_json(tried)
+        return
+    for each in tried:
+        error = f"{each['error'] or nan:.3g} {each['unit']}"
+        typer.echo(f"{error} with {each['added']}, by {each['tuner']}: {each['experiment']}")
+
+
+def _tried(client: Client, id: str, further: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Submit an experiment for each tunable that robot and engine have, then yield what each leaves."""
+    (spec,), sent = client.spec(id).resolved, []
+    with TemporaryDirectory() as folder, ZipFile(client.take_home(id, Path(folder) / "home.zip")) as home:
+        driven = spec["robot"]["name"], spec["robot"]["options"], spec["controller"], spec["task"]
+        samples = client.bench.check_samples(home.extract("samples.csv", folder), *driven)
+    reality = {"kind": "physical", "samples": samples, "probes": "never"}
+    again = spec | {"iterations": 0, "repetitions": 1, "reality": reality}
+    tuners = dict.fromkeys([spec["tuner"]["name"], "search"])
+    for added, tuner in [*(("nothing", each) for each in tuners), *((each, "search") for each in further)]:
+        asked = {"name": f"with {added}", "tunables": [*spec["tunables"], *({added} - {"nothing"})]}
+        by = {} if tuner == spec["tuner"]["name"] else {"tuner": tuner}
+        try:
+            sent.append((added, tuner, client.submission.send(again | asked | by, confirm_cost=True).id))
+        except ServiceError as refused:
+            typer.echo(f"{added} is not tried: {lines_of(refused.problem)[0]}", err=True)
+    for added, tuner, made in sent:
+        client.wait(made)
+        found = client.misfit(made)
+        error, unit = found.points[-1].error.mean, found.error_unit
+        yield {"added": added, "tuner": tuner, "error": error, "unit": unit, "experiment": made}

@@ -39,6 +39,7 @@ def unlikely(trace: Trace, expected: Trace, alignment: Alignment) -> Iterator[st
     yield from _holes(trace.times_s[inside], np.hstack([trace.positions_m, trace.orientations])[inside])
     if not np.all(np.isfinite(expected.positions_m)):
         return
+    yield from _jump(trace.times_s[inside], trace.positions_m[inside], expected)
     seen = trace.at(np.clip(alignment.lag_s + expected.times_s, trace.times_s[0], trace.times_s[-1]))
     yield from _start(seen.positions_m[0, 2], expected.positions_m[0, 2], seen.orientations, expected.orientations)
     far, wanted = (_farthest(positions) for positions in (seen.positions_m, expected.positions_m))
@@ -66,6 +67,18 @@ def _holes(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
     still = ends - begins
     if still.size and still.max() > 2 * LONGEST_GAP_S:
         yield f"the pose stays the same from {begins[int(np.argmax(still))]:.10g} s for {still.max():.2g} s"
+
+
+def _jump(times_s: FloatArray, positions_m: FloatArray, expected: Trace) -> Iterator[str]:
+    """Yield the largest step that the base cannot make between two poses."""
+    (steps, durations), (wanted, times) = (
+        (np.linalg.norm(np.diff(places, axis=0), axis=1), np.diff(at))
+        for places, at in ((positions_m, times_s), (expected.positions_m, expected.times_s))
+    )
+    excess = steps - HIGHER_M - FARTHER * (wanted / times).max() * durations
+    if excess.max(initial=0.0) > 0:
+        at = int(np.argmax(excess))
+        yield f"the base jumps by {steps[at]:.2g} m at {times_s[at + 1]:.10g} s"
 
 
 def _start(height_m: float, wanted_m: float, seen: FloatArray, wanted: FloatArray) -> Iterator[str]:

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import observed_poses, observes_base
+from gaplab.services.core.kinematics import observed_poses
 from gaplab.services.core.motions import Loop, Motion, Recording, Tilt, Trajectory
+from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
+from gaplab.services.engines.exploding import checked_s, explodes
 from gaplab.services.engines.stepping import SteppedScene, WarmScenes, plausible, recording, watch
 
 Rows = NDArray[np.intp]
@@ -20,7 +22,7 @@ S = TypeVar("S", bound=SteppedScene)
 
 
 class SteppedEngine(Engine, Generic[S]):
-    """An engine with one cached scene for all worlds that are built alike; one with implausible poses is dropped.
+    """An engine with one cached scene for all worlds that are built alike; one that failed is dropped.
 
     A subclass builds scenes and starts them.
 
@@ -58,7 +60,7 @@ class SteppedEngine(Engine, Generic[S]):
 
     def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
         """Return the trajectory of the observed body, `(t, 3)`; times are rounded to whole time steps."""
-        seen = self._run(world, motion, slice(None), with_joints=not observes_base(world))
+        seen = self._run(world, motion, slice(None))
         poses = _observed(world, seen)
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
@@ -66,7 +68,7 @@ class SteppedEngine(Engine, Generic[S]):
         """Return the same rollout with joint angles and torques."""
         often = motion.observed_at(np.union1d(motion.observe_s, times_s))
         observed, recorded = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, times_s))
-        seen = self._run(world, often, observed, with_joints=True)
+        seen = self._run(world, often, observed, with_torques=True)
         torques = seen[recorded, 7 + len(world.joints) :]
         torques[times_s == 0] = 0.0  # no step has ended yet
         base_and_joints = seen[recorded, : 7 + len(world.joints)]
@@ -76,29 +78,35 @@ class SteppedEngine(Engine, Generic[S]):
         """Close all scenes."""
         self._scenes.close()
 
-    def _run(self, world: World, motion: Motion | Loop, checked: slice | Rows, *, with_joints: bool) -> FloatArray:
-        """Return `(t, 7)`, or `(t, 7 + 2 · joints)` with angles and torques.
+    def _run(
+        self, world: World, motion: Motion | Loop, checked: slice | Rows, *, with_torques: bool = False
+    ) -> FloatArray:
+        """Return poses and angles `(t, 7 + joints)`, or `(t, 7 + 2 · joints)` with torques.
 
-        All is nan if the poses of the checked rows are implausible.
+        All is nan if the poses of the checked rows are implausible, or the energy explodes.
         """
         built = world.built(self.in_place)
-        scene = self._scenes[built]
-        look = (lambda: _joints_too(scene)) if with_joints else scene.pose
+        scene, checks_s = self._scenes[built], checked_s(world, float(motion.observe_s[-1]))
+        often = motion.observed_at(np.union1d(motion.observe_s, checks_s))
+        asked, checks = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, checks_s))
+        looks = (scene.pose, scene.angles, scene.torques)[: 2 + with_torques]
         try:
-            seen = watch(scene, self._start(scene, world, motion.start_tilt_rad), motion, look)
+            advance = self._start(scene, world, motion.start_tilt_rad)
+            watched = watch(scene, advance, often, lambda: np.concatenate([look() for look in looks]))
         except self.failures:
-            seen = np.full((len(motion.observe_s), 7 + with_joints * 2 * len(world.joints)), np.nan)
-        if not (plausible(seen[checked, :7]) and plausible(_observed(world, seen[checked]))):
+            watched = np.full((len(often.observe_s), 7 + (1 + with_torques) * len(world.joints)), np.nan)
+        seen, energetic = watched[asked], watched[checks]
+        is_plausible = plausible(seen[checked, :7]) and plausible(_observed(world, seen[checked]))
+        if not is_plausible or explodes(built, energetic, _angles(world, energetic), gravity_m_s2(world)):
             self._scenes.drop(built)  # nan persists in a PhysX scene; Bullet drops bodies that are too far away
             return np.full_like(seen, np.nan)
         return seen
 
 
-def _joints_too(scene: SteppedScene) -> FloatArray:
-    """Return pose, angles and torques of a scene, `(7 + 2 · joints,)`."""
-    return np.concatenate([scene.pose(), scene.angles(), scene.torques()])
+def _angles(world: World, seen: FloatArray) -> FloatArray:
+    return seen[:, 7 : 7 + len(world.joints)]
 
 
 def _observed(world: World, seen: FloatArray) -> FloatArray:
     """Return `(t, 7)`: poses of the observed body, of rows with base and joints."""
-    return observed_poses(world, seen[:, :7], seen[:, 7 : 7 + len(world.joints)])
+    return observed_poses(world, seen[:, :7], _angles(world, seen))

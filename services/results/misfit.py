@@ -62,7 +62,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
     unseen = overfitting(points[-1], error_unit) if points else ""
-    wrong = _unreproduced(spec, by_iteration[points[-1].iteration], error_unit) if points else ""
+    wrong = _unreproduced(row.id, spec, by_iteration[points[-1].iteration], error_unit) if points else ""
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
@@ -76,9 +76,10 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     )
 
 
-def _unreproduced(spec: ResolvedSpec, latest: Sequence[Tuning], error_unit: str) -> str:
+def _unreproduced(id: str, spec: ResolvedSpec, latest: Sequence[Tuning], error_unit: str) -> str:
     robot = installed_robot(spec)
-    return unreproduced(latest, None if robot is None else robot.sensors, error_unit)
+    found = unreproduced(latest, None if robot is None else robot.sensors, error_unit)
+    return f"{found}. `gaplab try-tunables {id}` tries further tunables, and `search`" if found else ""
 
 
 def misfit_csv(found: MisfitRead) -> str:

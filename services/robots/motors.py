@@ -39,11 +39,11 @@ FILTERS = {0, 2, 3}
 
 def with_motors(joints: list[Joint], source: Source, options: ImportOptions, notes: Notes) -> list[Joint]:
     """Return the joints with their motors: the file's, unless the options say which."""
-    if options.motor is None and not source.is_urdf:
-        return _of_the_file(joints, source, options, notes)
     if not joints:
         notes.refuse("no joint of the file moves, and a controller moves joints")
         return joints
+    if options.motor is None and not source.is_urdf:
+        return _of_the_file(joints, source, options, notes)
     chosen = [joint.name for joint in joints if fnmatchcase(joint.name, options.motored)]
     if not chosen:
         notes.refuse(f"no joint is called like {options.motored!r}; joints: {listed((j.name for j in joints), 30)}")

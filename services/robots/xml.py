@@ -12,6 +12,9 @@ Element: TypeAlias = Any  # lxml has no types
 _HEAD = re.compile(r"(\s|<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>\[]*(\[.*?\]\s*)?>)*", re.DOTALL)
 """What may be before the root."""
 
+_DASHES = re.compile(r"(?<=<!--)(.*?)-*(?=-->)", re.DOTALL)
+"""The inside of a comment, in which ROS reads two dashes."""
+
 _ENCODING = re.compile(r"""\A(\s*<\?xml[^>]*?\bencoding\s*=\s*["'])(?!utf-8["'])[^"']*""", re.IGNORECASE)
 """A declaration of another encoding than UTF-8."""
 
@@ -62,6 +65,7 @@ def tree(text: str) -> Element:
         SyntaxError: it is no XML; the message has the line.
     """
     text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)  # some files declare a version of XML that does not exist
+    text = _DASHES.sub(lambda found: re.sub("-(?=-)", "- ", found[1]), text)
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
     try:
         return etree.fromstring(text.encode(), parser)

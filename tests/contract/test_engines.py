@@ -19,7 +19,7 @@ from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Shape, Sphere, Vector
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Body, Inertia, Material, PDMotor, World
-from gaplab.services.engines import engines
+from gaplab.services.engines import engines, exploding
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.stepping import WARM_SCENES
 from gaplab.services.engines.uses import USES
@@ -362,6 +362,21 @@ def test_physics_that_blows_up_is_nan_and_harms_no_later_rollout(embodied: Pair,
     blown_up = embodied.roll(replace(embodied.robot.world, gravity_m_s2=gravity_m_s2))
 
     assert np.all(np.isnan(blown_up))
+    assert np.array_equal(embodied.roll(), expected)
+
+
+def test_a_rollout_whose_energy_explodes_is_nan_and_harms_no_later_one(
+    embodied: Pair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = embodied.roll()
+
+    with monkeypatch.context() as without_limbs:  # so nothing pushes the robot
+        without_limbs.setattr(
+            exploding, "_levers_m", lambda world: np.zeros((len(world.bodies), 1 + len(world.joints)))
+        )
+        exploded = embodied.roll()
+
+    assert np.all(np.isnan(exploded))
     assert np.array_equal(embodied.roll(), expected)
 
 

@@ -115,7 +115,7 @@ def test_every_command_prints_one_document_and_nothing_else(
     assert set(ask("help")) == {str(each.value) for each in Exit}
 
     # want a body, a worker, an experiment under way, a failed one, recordings, and a request that is stuck
-    elsewhere = {"simulator", "replay", "sensitivity", "accept-versions", "retry", "traces", "reopen"}
+    elsewhere = {"simulator", "replay", "sensitivity", "accept-versions", "retry", "traces", "reopen", "try-tunables"}
     assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
 
 

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.controllers.cpg import Cpg
 from gaplab.services.core.kinematics import about, body_poses
 from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Hull, Part, Sphere
-from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, World
+from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, PDMotor, World
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 from gaplab.services.specs.default_engines import default_engine
@@ -41,6 +42,42 @@ def in_material(material: Material) -> World:
 
 def path(engine: PyBullet, world: World, motion: Motion = MOTION) -> FloatArray:
     return engine.rollout(world, motion).positions_m
+
+
+def light_limbs(torque_nm: float) -> World:
+    """A robot of 2.5 kg whose motors are as strong and as stiff as a placeholder in its file says."""
+
+    def motor(kd: float) -> PDMotor:
+        return PDMotor("position", torque_nm, kp=torque_nm / 0.35, kd=kd)
+
+    bodies = [Body("trunk", 1.2, (Part(Box((0.34, 0.14, 0.06))),), inertia=Inertia((0.006, 0.01, 0.014)))]
+    joints = []
+    for leg, (x, y) in {"fl": (0.2, 0.15), "fr": (0.2, -0.15), "rl": (-0.2, 0.15), "rr": (-0.2, -0.15)}.items():
+        low, foot = (0.0, 0.0, -0.08), Part(Sphere(0.02), (0.0, 0.0, -0.16))
+        bodies += [
+            Body(f"{leg}_shoulder", 0.15, (), inertia=Inertia((3e-5, 4e-4, 4e-4))),
+            Body(f"{leg}_thigh", 0.15, (), low, inertia=Inertia((4e-4, 4e-4, 4e-5))),
+            Body(f"{leg}_shin", 0.03, (foot,), low, inertia=Inertia((1e-4, 1e-4, 1e-6))),
+        ]
+        joints += [
+            Joint(f"{leg}_haa", "trunk", f"{leg}_shoulder", (x, y, 0.0), (1.0, 0.0, 0.0), motor(3.85)),
+            Joint(f"{leg}_hfe", f"{leg}_shoulder", f"{leg}_thigh", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), motor(2.85)),
+            Joint(f"{leg}_kfe", f"{leg}_thigh", f"{leg}_shin", (0.0, 0.0, -0.16), (0.0, 1.0, 0.0), motor(0.905)),
+        ]
+    return World(tuple(bodies), tuple(joints), start_height_m=0.34, time_step_s=1 / 240)
+
+
+def test_a_robot_that_flies_off_since_its_joints_shake_failed(engine: PyBullet) -> None:
+    """Unchecked, six of these eight controllers are faster than 4 m/s, and one reaches 22 m/s."""
+    world, controller = light_limbs(1000.0), Cpg()
+    controller.prepare(world, np.array([0.5, 3.0]))
+    motions = [controller.motion(genome) for genome in controller.space.draw(8, np.random.default_rng(2))]
+
+    places = np.array([path(engine, world, motion) for motion in motions])
+    speeds = np.linalg.norm(places[:, 1, :2] - places[:, 0, :2], axis=1) / 2.5
+
+    assert np.isnan(speeds).sum() >= 4
+    assert not np.any(speeds > 4.0)
 
 
 def test_a_robot_with_more_links_than_bullet_permits_is_refused(engine: PyBullet) -> None:

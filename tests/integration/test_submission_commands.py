@@ -1,6 +1,7 @@
 """Submission from a terminal: the cost is shown first, and a person is asked before hours of computation."""
 
 import json
+import threading
 from collections.abc import Callable
 
 import pexpect
@@ -14,6 +15,7 @@ from gaplab.schemas.estimates import EstimateRead
 from gaplab.services.experiments import listing
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
+from tests.integration.test_bench import compute
 
 SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
 
@@ -38,6 +40,31 @@ def test_a_dry_run_prints_the_complete_spec_and_submits_nothing(gaplab: Gaplab, 
     assert json.loads(text.out)["engine"]["name"] == "analytic"
     assert "Nothing was submitted" in text.err
     assert json.loads(document.out)["specs"] == [json.loads(text.out)]
+
+
+def test_further_tunables_are_tried_on_the_samples_of_an_experiment(gaplab: Gaplab, sqlite_store: Store) -> None:
+    spec = SMALL | {"tunables": ["static_friction", "dynamic_friction"], "repetitions": 1}
+    id = gaplab("submit", "-", stdin=json.dumps(spec)).out.strip()
+    compute(sqlite_store)
+    ended = threading.Event()
+
+    def work() -> None:
+        while not ended.wait(0.1):
+            compute(sqlite_store)
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    said = gaplab("try-tunables", id, "restitution", "mass", "--json")
+    ended.set()
+    worker.join()
+
+    assert said.code == 0, said.err
+    assert "mass is not tried: " in said.err
+    assert [(each["added"], each["tuner"], each["unit"]) for each in json.loads(said.out)] == [
+        ("nothing", "search", "m/s"),
+        ("restitution", "search", "m/s"),
+    ]
+    assert all(each["error"] >= 0 for each in json.loads(said.out))
 
 
 def test_a_program_without_a_terminal_is_not_asked(gaplab: Gaplab, sqlite_store: Store) -> None:

@@ -101,6 +101,10 @@ def test_macros_that_were_not_expanded_are_refused_by_that_word(tmp_path: Path, 
         imported(tmp_path, edits={"</robot>": f"{macro}</robot>"})
 
 
+def test_a_comment_may_have_dashes(tmp_path: Path) -> None:
+    assert imported(tmp_path, edits={LEG: f"<!--- a -- b --- c --->{LEG}"}).robot.world.joints
+
+
 def test_a_prefix_need_not_be_declared(tmp_path: Path) -> None:
     found = imported(tmp_path, edits={"</robot>": "<gazebo><sensor:camera/></gazebo></robot>"}).robot
 
@@ -126,8 +130,13 @@ def test_an_error_of_mujoco_has_the_line_of_the_file(tmp_path: Path) -> None:
 
 
 def test_a_robot_whose_joints_are_all_fixed_is_refused_by_that(tmp_path: Path) -> None:
+    file = tmp_path / "still.xml"
+    file.write_text('<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>')
+
     with pytest.raises(InvalidRobot, match="no joint of the file moves"):
         imported(tmp_path, edits={"revolute": "fixed"})
+    with pytest.raises(InvalidRobot, match="no joint of the file moves"):
+        import_robot(file, ImportOptions())
 
 
 def test_numbers_that_no_robot_has_are_told_and_taken(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.core.motions import Trajectory
 from gaplab.services.core.robot_files import RobotFile, read_robot_file
+from gaplab.services.core.tunables.labels import tunable_of
 from gaplab.services.core.world import Body, Inertia, Joint, World
 from gaplab.services.engines.base import Engine
 from gaplab.services.robots.changes import changes
@@ -166,8 +167,7 @@ def test_an_mjcf_whose_inertia_is_of_its_shapes_has_stated_ones_after(tmp_path: 
     robot = import_robot(original, ImportOptions()).robot
     tuned = moved(heavier(robot.world, "aux_2", 1.5), "torso", [0.02, 0.0, -0.01])
     tuned = with_joint(tuned, "hip_2", armature=0.3, damping=0.6, limits=(-0.4, 0.45), motor={"max_torque_nm": 90.0})
-    material = replace(tuned.material, static_friction=0.6, dynamic_friction=0.6)
-    tuned = replace(tuned, material=material, time_step_s=0.005, gravity_m_s2=9.7)
+    tuned = tunable_of("friction").edit(replace(tuned, time_step_s=0.005, gravity_m_s2=9.7), 0.6)
 
     written = write_xml(Tuning(robot, tuned, COMMENTS), original, output, fine)
     model = mujoco.MjModel.from_xml_path(str(output))

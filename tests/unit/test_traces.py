@@ -46,6 +46,12 @@ def cut(trace: Trace, begin_s: float, end_s: float) -> Trace:
     return Trace(trace.times_s[kept], trace.positions_m[kept], trace.orientations[kept])
 
 
+def jumping(trace: Trace, at_s: float) -> Trace:
+    """As a tracker that takes another marker for the base."""
+    away = np.outer(trace.times_s > at_s - 0.001, [0.3, 0.0, 0.0])
+    return Trace(trace.times_s, frozen(trace.positions_m + away), trace.orientations)
+
+
 def frozen_from(trace: Trace, begin_s: float, end_s: float) -> Trace:
     held = np.clip(trace.times_s, None, begin_s)
     inside = (trace.times_s > begin_s) & (trace.times_s <= end_s)
@@ -101,6 +107,7 @@ def test_the_start_is_where_a_base_at_rest_begins_to_move_however_it_moves_then(
         (lambda trace: frozen_from(trace, 6.0, 7.0), "the pose stays the same from 6 s for 1 s"),
         (lambda trace: moved(trace, [0.0, 0.0, 230.0]), "the base begins 230 m high, and the simulators expect 0.17 m"),
         (lambda trace: scaled(trace, 1000.0), "are these millimetres (`x [mm]`)?"),
+        (lambda trace: jumping(trace, 6.5), "the base jumps by 0.3 m at 6.5 s"),
         (lambda trace: on_its_side(trace), "the base begins tilted by 90° from what the simulators expect"),
         (lambda trace: still(trace), "the base does not move"),
     ],

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.registry import Plugin
-from gaplab.services.core.world import World
+from gaplab.services.core.world import Material, World
 
 LONGEST_PATTERN = 80
 
@@ -118,14 +118,18 @@ class MaterialTunable(Tunable):
 
     def edit(self, world: World, value: float) -> World:
         """Return the world with the coefficient replaced."""
-        change = {self._coefficient: float(value)}
         if not self.options.of:
-            return replace(world, material=replace(world.material, **change))
+            return replace(world, material=self.changed(world.material, value))
         chosen = matching(self.options.of, [name for name, _ in world.surfaces])
         surfaces = tuple(
-            (name, replace(material, **change) if name in chosen else material) for name, material in world.surfaces
+            (name, self.changed(material, value) if name in chosen else material) for name, material in world.surfaces
         )
         return world.edited("surfaces", surfaces=surfaces)
+
+    def changed(self, material: Material, value: float) -> Material:
+        """Return a material with the coefficient replaced."""
+        change = {self._coefficient: float(value)}
+        return replace(material, **change)
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
         """Return that the robot has no such surface."""

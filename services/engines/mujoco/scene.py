@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import observed_poses, observes_base
 from gaplab.services.core.motions import Loop, Motion
+from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.world import World
+from gaplab.services.engines.exploding import checked_s, explodes
 from gaplab.services.engines.mujoco.controls import Controls
 from gaplab.services.engines.mujoco.law import drive_torques
 from gaplab.services.engines.mujoco.looping import Looping
@@ -76,7 +78,9 @@ class MuJoCoScene:
         looked = states[chosen]
         seen = np.hstack([self.states.base(looked), self.states.angles(looked)])
         torques = self._torques(prepared, controls[0], states)[chosen]
-        return self._checked(states[None, observed], states[None, -1], steps)[0], seen, torques
+        checks = self.steps(checked_s(world, float(motion.observe_s[-1])))
+        poses = self._checked([prepared], states[None, observed], states[None, checks], states[None, -1], steps)
+        return poses[0], seen, torques
 
     def close(self) -> None:
         """End the threads."""
@@ -90,31 +94,39 @@ class MuJoCoScene:
         self, prepared: Sequence[Prepared], motions: Sequence[Motion | Loop], steps: NDArray[np.int_]
     ) -> FloatArray:
         """Return `(n · m, t, 7)`: poses after the given steps, by motion and world."""
-        last = max(1, int(steps[-1]))
+        last, checks = max(1, int(steps[-1])), self.steps(checked_s(self.world, float(motions[0].observe_s[-1])))
         loops = [motion for motion in motions if isinstance(motion, Loop)]
         if loops:
-            states = self._looping.run(prepared, loops, np.append(steps, last))
-            return self._checked(states[:, :-1], states[:, -1], last)
+            kept = np.union1d(np.append(steps, last), checks)
+            states = self._looping.run(prepared, loops, kept)
+            seen, checked = (states[:, np.searchsorted(kept, each)] for each in (steps, checks))
+            return self._checked(prepared, seen, checked, states[:, -1], last)
         controls = self.controls.of(
             [motion for motion in motions if isinstance(motion, Motion)], last, [each.delays for each in prepared]
         )
         models = [each.model for each in prepared] * len(motions)
         starts = self.states.starts(motions, len(prepared))
         states = self.pool.rolled(models, starts, controls)
-        seen = states[:, steps - 1]
-        seen[:, steps == 0] = starts[:, None]
-        return self._checked(seen, states[:, -1], last)
+        seen, checked = states[:, steps - 1], states[:, checks - 1]
+        seen[:, steps == 0] = checked[:, checks == 0] = starts[:, None]
+        return self._checked(prepared, seen, checked, states[:, -1], last)
 
-    def _checked(self, seen: FloatArray, last: FloatArray, steps: int) -> FloatArray:
-        """Return `(rows, t, 7)`: observed poses in states; nan if MuJoCo stopped or a pose is implausible.
+    def _checked(
+        self, prepared: Sequence[Prepared], seen: FloatArray, checked: FloatArray, last: FloatArray, steps: int
+    ) -> FloatArray:
+        """Return `(rows, t, 7)`: observed poses in states; nan if MuJoCo stopped, or a rollout failed.
 
         Args:
+            prepared: m worlds, to which the rows belong in turns.
             seen: `(rows, t, state)`: states.
+            checked: `(rows, c, state)`: states in which energy is checked.
             last: `(rows, state)`: states at the end.
             steps: number of steps until then.
         """
         poses = self.states.base(seen)
         failed = ~((last[:, TIME] > (steps - 0.5) * self.world.time_step_s) & plausible(poses))
+        gravity = np.tile([gravity_m_s2(each.world) for each in prepared], (len(seen) // len(prepared), 1))
+        failed |= explodes(self.world, self.states.base(checked), self.states.angles(checked), gravity)
         if not observes_base(self.world):
             rows = len(seen) * seen.shape[1]
             angles = self.states.angles(seen).reshape(rows, -1)

@@ -1,0 +1,44 @@
+"""Which rollouts have an energy that neither their joints nor a fall can have given."""
+
+import numpy as np
+import pytest
+
+from gaplab.services.core.observations import gravity_m_s2
+from gaplab.services.core.shapes import Box, Sphere
+from gaplab.services.core.world import Body, Joint, World
+from gaplab.services.engines.exploding import checked_s, explodes
+
+HOPPER = World(
+    bodies=(Body("base", 1.0, Box((0.2, 0.1, 0.1))), Body("leg", 0.1, Sphere(0.02), (0.0, 0.0, -0.28))),
+    joints=(Joint("hip", "base", "leg", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),),
+)
+TIMES_S = checked_s(HOPPER, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "joint_rad_s", "climb_m_s", "expected"),
+    [
+        (1.0, 0.0, 0.0, False),
+        (5.0, 0.0, 0.0, True),
+        (5.0, 20.0, 0.0, False),
+        (0.0, 0.0, -9.0, False),  # it falls for a second, at first from rest
+        (0.0, 0.0, 9.0, True),
+        (np.nan, 0.0, 0.0, False),  # fails for another reason
+    ],
+)
+def test_a_base_is_as_fast_as_its_joints_sweep_and_as_gravity_pulls(
+    speed_m_s: float, joint_rad_s: float, climb_m_s: float, expected: bool
+) -> None:
+    poses = np.zeros((len(TIMES_S), 7))
+    poses[:, 0], poses[:, 2] = speed_m_s * TIMES_S, climb_m_s * TIMES_S**2 / 2
+    angles = joint_rad_s * TIMES_S[:, None]
+
+    assert explodes(HOPPER, poses, angles, gravity_m_s2(HOPPER)) == expected
+
+
+def test_a_joint_that_only_shakes_makes_no_base_fast() -> None:
+    poses, angles = np.zeros((len(TIMES_S), 7)), np.zeros((len(TIMES_S), 1))
+    poses[:, 0] = 5.0 * TIMES_S
+    angles[1::2] = 0.1
+
+    assert explodes(HOPPER, poses, angles, gravity_m_s2(HOPPER))
