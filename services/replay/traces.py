@@ -43,13 +43,11 @@ class Expected:
         spec: resolved spec, as JSON.
         genome: genome of the controller.
         parameters: parameters of the simulator.
-        until_s: length of the motion.
     """
 
     spec: SentSpec
     genome: tuple[float, ...]
     parameters: tuple[float, ...]
-    until_s: float
 
 
 def evaluate_traces(
@@ -85,10 +83,9 @@ def evaluate_traces(
     if not simulators:
         raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
     traces = [read_trace(*table) for table in tables]
-    until_s = max([float(robot.motion(frozen(genome)).observe_s[-1]), *robot.sensors.times_s.tolist()])
-    wanted = Expected(sent(resolved), genome, tuple(simulators[0]), until_s)
-    expected = _trace_of(*process.call(expected_motion, wanted))
-    return _evaluated(robot, frozen(genome), traces, expected, spec)
+    wanted = Expected(sent(resolved), genome, tuple(simulators[0]))
+    expected = process.call(expected_motion, wanted)
+    return evaluated(robot, frozen(genome), traces, expected, spec)
 
 
 def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec: MeasurementSpec) -> TracesRead | None:
@@ -98,19 +95,20 @@ def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec
     return evaluate_traces(store, process, request, TracesSpec(traces=spec.traces, lags_s=spec.lags_s), answer=True)
 
 
-def expected_motion(wanted: Expected) -> tuple[FloatArray, FloatArray]:
-    """Return times `(k,)` and poses `(k, 7)` of a controller in a simulator; nan if the physics failed."""
-    spec, genome = received(wanted.spec), np.array(wanted.genome)
+def expected_motion(wanted: Expected) -> Trace:
+    """Return the motion of a controller in a simulator; nan if the physics failed."""
+    spec = received(wanted.spec)
     robot = robot_of(spec)
-    end_s = min(wanted.until_s, float(robot.motion(genome).observe_s[-1]))
-    times = np.unique(np.append(np.arange(int(end_s * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S, end_s))
     simulation = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
-    _, recording = simulation.record(genome, np.array(wanted.parameters), times)
-    return times, recording.poses
+    return expected_in(simulation, robot, np.array(wanted.genome), np.array(wanted.parameters))
 
 
-def _trace_of(times_s: FloatArray, poses: FloatArray) -> Trace:
-    return Trace(times_s, poses[:, :3], poses[:, 3:])
+def expected_in(simulation: Simulation, robot: Robot, genome: FloatArray, parameters: FloatArray) -> Trace:
+    """Return the motion of a genome `(g,)` in a simulator `(p,)`, to its last observation."""
+    end_s = float(robot.motion(genome).observe_s[-1])
+    times = np.unique(np.append(np.arange(int(end_s * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S, end_s))
+    _, recording = simulation.record(genome, parameters, times)
+    return Trace(times, recording.poses[:, :3], recording.poses[:, 3:])
 
 
 def refuse_other_bodies(world: World) -> None:
@@ -147,9 +145,14 @@ def _tables(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) -
     return found
 
 
-def _evaluated(
+def evaluated(
     robot: Robot, genome: FloatArray, traces: Sequence[Trace], expected: Trace, spec: TracesSpec
 ) -> TracesRead:
+    """Return what traces say about a genome `(g,)`, beside the expected motion.
+
+    Raises:
+        InvalidSpec: a trace does not contain the motion; all errors are named.
+    """
     aligned, values, readings, violations, doubts = [], list[float](), [], list[Violation](), list[str]()
     lags = spec.lags_s or (None,) * len(traces)
     observe_s, sensors = robot.motion(genome).observe_s, robot.sensors
