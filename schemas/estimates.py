@@ -28,6 +28,7 @@ class ExperimentCost(Frozen):
     rollouts: int = Field(
         description="upper bound over all repetitions; rollouts that cannot change a number are saved"
     )
+    runs: int = Field(default=0, description="runs of the physical robot, with probes and repeats; 0: it is simulated")
     core_seconds: float = Field(examples=[166_400.0])
 
 

@@ -80,11 +80,13 @@ class FitnessRead(Frozen):
 class BestRead(FitnessRead):
     """The fittest experiment of a study, after the last number of real-world evaluations that its experiments share.
 
-    An experiment without samples takes part with its only value; the direct baseline, only if there is no other.
+    It is the fittest of those with the most repetitions. An experiment without samples takes part with its only value;
+    the direct baseline, only if there is no other.
     """
 
     experiment: Id
     name: Name
+    strategy: Name
 
 
 class Kept(Frozen):

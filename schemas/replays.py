@@ -132,8 +132,10 @@ class Prediction(Frozen):
     """Fitness of one sample in the simulators before and after it; null where the physics failed."""
 
     repetition: int
-    iteration: int = Field(description="iteration in which the sample was measured, from 1")
-    simulated_before: Statistic = Field(description="fitness in the best simulator before the measurement")
+    iteration: int = Field(description="iteration in which the sample was measured; 0: before the experiment")
+    simulated_before: Statistic = Field(
+        description="fitness in the best simulator before the measurement; null in iteration 0"
+    )
     simulated_after: Statistic = Field(
         description="fitness in the best simulator tuned on this sample and all before it"
     )

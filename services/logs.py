@@ -133,12 +133,12 @@ class Json(logging.Formatter):
 
 
 def _rewrite_requests(record: logging.LogRecord) -> bool:
-    """Rewrite records of Uvicorn's access log: parts by name, no query, and no record of a successful probe."""
+    """Rewrite records of Uvicorn's access log: parts by name, no query, and no successful probe or asset."""
     if record.name != _ACCESS or not isinstance(record.args, tuple) or len(record.args) != 5:
         return True
     client, method, target, _, status = record.args
     path = str(target).partition("?")[0]
-    if path in _PROBES and status == 200:
+    if (path in _PROBES and status == 200) or (path.startswith("/assets/") and status in {200, 304}):
         return False
     record.msg, record.args = "%s %s %s from %s", (method, path, status, client)
     record.method, record.path, record.status = method, path, status

@@ -49,7 +49,7 @@ def curve(name: str, *points: CurvePoint, direct: bool = False, unit: str = "m/s
     return Curve(
         experiment=f"id-of-{name[:20]}",
         name=name,
-        strategy="s",
+        strategy=name if name.isidentifier() else "s",
         state=State.RUNNING,
         unit=unit,
         direct=direct,

@@ -31,7 +31,9 @@ def sentence(estimate: EstimateRead) -> str:
     pace = "" if measured else ", at the engine's usual pace"
     cores = _count(estimate.cores, "core")
     waiting = "" if estimate.supervisors else "; no supervisor runs, so nothing starts yet"
-    return f"{size}: at most {estimate.rollouts:,} rollouts, {duration(estimate.seconds)} on {cores}{pace}{waiting}"
+    runs = sum(experiment.runs for experiment in estimate.experiments)
+    size += f": {_count(runs, 'run')} of the robot, " if runs else ": "
+    return f"{size}at most {estimate.rollouts:,} rollouts, {duration(estimate.seconds)} on {cores}{pace}{waiting}"
 
 
 def duration(seconds: float) -> str:

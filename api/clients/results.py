@@ -33,7 +33,7 @@ class Results:
             id: id of the experiment.
         """
         simulators = self._connection.items(Page[SimulatorRead], f"/experiments/{segment(id)}/simulators", limit=PAGE)
-        best = [each for each in simulators if each.rank == 0 and each.iteration > 0 and each.error is not None]
+        best = [each for each in simulators if each.rank == 0 and each.error is not None]
         latest = max((each.iteration for each in best), default=0)
         return min(
             (each for each in best if each.iteration == latest),

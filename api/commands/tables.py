@@ -17,6 +17,7 @@ from gaplab.schemas.misfit import MisfitRead, TunableDistribution
 from gaplab.schemas.plugin import Catalogue, PluginRead
 from gaplab.schemas.records import ExperimentRead, RepetitionRead, StudyRead
 from gaplab.schemas.sensitivity import Sensitivity, SensitivityRead
+from gaplab.services.figures.words import titled
 
 
 def overview(records: Iterable[Record]) -> Table:
@@ -42,7 +43,7 @@ def curves(found: Sequence[Curve]) -> Table:
         (f"{count}", *(_mean(points.get((curve.experiment, count))) for curve in lines))
         for count in sorted({count for _, count in points})
     ]
-    made = table(("after", *(escape(curve.name.replace("_", " ")) for curve in lines)), rows)
+    made = table(("after", *(escape(titled(curve.name, curve.strategy)) for curve in lines)), rows)
     made.collapse_padding, made.show_edge = True, False
     return made
 

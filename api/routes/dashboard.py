@@ -11,6 +11,7 @@ from fastapi.responses import HTMLResponse
 
 from gaplab.api.http.assets import Assets, modules_of, version_of
 from gaplab.api.http.security_headers import page
+from gaplab.services.figures.words import PROPER
 
 FILES: Final = Path(__file__).parents[1] / "dashboard"
 SCRIPT: Final = "app.js"
@@ -38,4 +39,5 @@ def _html() -> str:
     }
     preloads = "\n".join(f'  <link rel="modulepreload" href="assets/dashboard/{path}">' for path in always[1:])
     html = (FILES / "index.html").read_text(encoding="utf-8").replace("{plotly}", version("plotly"))
-    return html.replace("  <!-- preloads -->", preloads).replace("{modules}", json.dumps(views))
+    html = html.replace("{names}", json.dumps(PROPER)).replace("{modules}", json.dumps(views))
+    return html.replace("  <!-- preloads -->", preloads)

@@ -18,7 +18,7 @@ from gaplab.services.figures.kinds.predictions import predictions_figure
 from gaplab.services.figures.kinds.simulators import simulators_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.marks import FigureDefinition
-from gaplab.services.figures.words import TITLE, spoken
+from gaplab.services.figures.words import TITLE, titled
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.results import curves
 from gaplab.services.results.coordinates import experiment_coordinates, simulator_coordinates
@@ -91,7 +91,7 @@ class SimulatorsDrawing(ExperimentDrawing):
 
 @router.get("/curves", summary="Draw curves", response_model=FigureRead, responses=responses())
 def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Response:
-    """Draw the paper's Fig. 4 for any studies and experiments: curves with bands, and levels with their SD."""
+    """Draw the paper's Fig. 4 for any studies and experiments: curves and levels with bands."""
     return answer(_curves(store, query), query)
 
 
@@ -171,7 +171,8 @@ def _refuse_unknown(kind: str, request: Request) -> None:
 def _title(store: Store, query: ExperimentDrawing) -> str:
     if query.title is not None:
         return query.title
-    return spoken(reading.read_experiment(store, query.experiment).name, TITLE)
+    experiment = reading.read_experiment(store, query.experiment)
+    return titled(experiment.name, experiment.strategy, TITLE)
 
 
 def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition) -> FigureDefinition:

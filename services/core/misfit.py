@@ -171,7 +171,7 @@ def _many(count: int, what: str) -> str:
 def _gaps(first: MisfitPoint, last: MisfitPoint, unit: str) -> tuple[str, ...]:
     if last.gap.mean is None:
         return ()
-    before = f", and by {first.gap.mean:.2g} before tuning" if first.gap.mean is not None and first is not last else ""
+    before = f", and by {first.gap.mean:.2g} before tuning" if first.gap.mean is not None and not first.error.n else ""
     return (f"the controller evolved in them differs by {last.gap.mean:.2g} {unit} in reality{before}",)
 
 

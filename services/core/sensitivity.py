@@ -37,10 +37,7 @@ NOTHING = 0.01
 
 ROUGH = 0.5
 """Roughness above which the verdict is rough. Nothing happens there suddenly: tuned values grow less certain from
-`NOTEWORTHY` on, up to chance at 1. Source: docs/decisions/sensitivity.md."""
-
-NOTEWORTHY = 0.4
-"""Roughness above which a warning says how uncertain tuned values are."""
+0.4 on, up to chance at 1. Source: docs/decisions/sensitivity.md."""
 
 VERSION = 1
 """Version of this module; a result of another version is another check."""
@@ -188,11 +185,11 @@ def warning(found: Sensitivity) -> str | None:
             return f"{where} does nothing: its effect on fitness is {share:.2g} % of the spread between controllers"
         case Verdict.UNKNOWN:
             return f"{where} is unknown: physics failed in {found.failures} of the check's rollouts"
-    return _noise(found, where) if (found.roughness or 0.0) > NOTEWORTHY else None
+    return _noise(found, where) if found.verdict is Verdict.ROUGH else None
 
 
 def _noise(found: Sensitivity, where: str) -> str:
-    """Return what roughness means for the tuned value: the same sentence on both sides of the verdict's limit."""
+    """Return what roughness means for the tuned value."""
     share, limit = 100 * (found.roughness or 0.0), 100 * ROUGH
     return (
         f"{where}: {share:.0f} % of its effect on fitness is noise between neighbouring values; the larger this share, "

@@ -116,6 +116,13 @@ def _cost(spec: ResolvedSpec, measured: Mapping[Key, float]) -> EngineCost:
     return EngineCost(engine=engine.name, seconds_per_rollout=known or usual, measured=known is not None)
 
 
+def _runs(spec: ResolvedSpec) -> int:
+    """Return the runs of the physical robot in one repetition; 0 if reality is simulated."""
+    reality, samples = spec.reality, spec.iterations if takes_samples(spec) else 0
+    probes = {"each": samples + 1, "last": 1, "never": 0}[reality.probes]
+    return (samples + probes) * reality.repeats if reality.kind == "physical" else 0
+
+
 def _experiment(spec: ResolvedSpec, cost: EngineCost) -> ExperimentCost:
     rollouts = expected_rollouts(spec) * spec.repetitions
     return ExperimentCost(
@@ -125,5 +132,6 @@ def _experiment(spec: ResolvedSpec, cost: EngineCost) -> ExperimentCost:
         repetitions=spec.repetitions,
         iterations=spec.iterations if takes_samples(spec) else 0,
         rollouts=rollouts,
+        runs=_runs(spec) * spec.repetitions,
         core_seconds=rollouts * cost.seconds_per_rollout,
     )

@@ -35,6 +35,8 @@ def points_at(session: Session, counts: Mapping[str, int]) -> dict[str, FitnessR
 def best_of(session: Session, studies: Mapping[str, Sequence[ExperimentRead]]) -> dict[str, BestRead]:
     """Return the fittest experiment of each study, after the last number of evaluations that its experiments share.
 
+    It is the fittest of those with the most repetitions.
+
     Args:
         session: session of a transaction.
         studies: experiments by study.
@@ -61,5 +63,5 @@ def _rivals(experiments: Sequence[ExperimentRead]) -> list[ExperimentRead]:
 
 
 def _fittest(points: Sequence[tuple[ExperimentRead, FitnessRead]]) -> BestRead:
-    experiment, point = max(points, key=lambda each: each[1].mean)
-    return BestRead(**point.model_dump(), experiment=experiment.id, name=experiment.name)
+    experiment, point = max(points, key=lambda each: (each[1].n, each[1].mean))  # of few, the best is luck
+    return BestRead(**point.model_dump(), experiment=experiment.id, name=experiment.name, strategy=experiment.strategy)

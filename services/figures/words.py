@@ -12,10 +12,19 @@ LARGEST = 1e300  # of values that are drawn: sums and margins of them stay finit
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
+PROPER = {"cma_es": "CMA-ES", "abc_smc": "ABC-SMC", "gauss_newton": "Gauss-Newton", "cpg": "CPG", "mlp": "MLP"}
+PROPER |= {"mujoco": "MuJoCo", "pybullet": "PyBullet", "physx": "PhysX"}
+
+
 def spoken(name: str, longest: int = LONGEST) -> str:
-    """Return an identifier like `known_fit` as *Known fit*, and any other name unchanged."""
+    """Return an identifier like `known_fit` as *Known fit*, `cma_es` as *CMA-ES*, and any other name unchanged."""
     identifier = re.fullmatch(r"[a-z][a-z0-9_]*", name)
-    return printable(name.replace("_", " ").capitalize() if identifier else name, longest)
+    return PROPER.get(name) or printable(name.replace("_", " ").capitalize() if identifier else name, longest)
+
+
+def titled(name: str, strategy: str, longest: int = LONGEST) -> str:
+    """Return the name of an experiment as a person wrote it; that of its strategy, which it has by default, spoken."""
+    return spoken(name, longest) if name == strategy else printable(name, longest)
 
 
 def heading(text: str) -> str:
@@ -29,13 +38,13 @@ def printable(text: str, longest: int = LONGEST) -> str:
     return shown if len(shown) <= longest else f"{shown[: longest - 1]}…"
 
 
-def distinct_names(named: Sequence[tuple[str, str]]) -> list[str]:
-    """Return readable, distinct names from pairs of name and id: equal names are followed by their ids."""
-    names = [spoken(name) for name, _ in named]
+def distinct_names(named: Sequence[tuple[str, str, str]]) -> list[str]:
+    """Return distinct names from names, strategies and ids of experiments: equal names are followed by their ids."""
+    names = [titled(name, strategy) for name, strategy, _ in named]
     often = Counter(names)
     return [
         f"{name} ({identity[:8]})" if often[name] > 1 else name
-        for name, (_, identity) in zip(names, named, strict=True)
+        for name, (*_, identity) in zip(names, named, strict=True)
     ]
 
 

@@ -99,8 +99,10 @@ def predict(spec: SentSpec, samples: Sequence[TunedSample], seconds: float) -> l
     found: list[Pair] = []
     until = monotonic() + seconds
     for sample in samples:
-        before, after = simulate(np.array([sample.genome]), np.array([sample.before, sample.after]))[0].tolist()
-        found.append((_finite(before), _finite(after)))
+        before, after = simulate(np.array([sample.genome]), np.array([sample.before or sample.after, sample.after]))[
+            0
+        ].tolist()
+        found.append((_finite(before) if sample.before else None, _finite(after)))
         if monotonic() > until:
             break
     return found

@@ -69,7 +69,7 @@ def evaluate_traces(
     traces = [read_trace(*table) for table in tables]
     times_s, poses, _ = process.call(expected_motion, sent(resolved), genome, tuple(simulators[0]))
     expected = Trace(times_s, poses[:, :3], poses[:, 3:])
-    return _evaluated(robot, frozen(genome), traces, expected, spec)
+    return evaluated(robot, frozen(genome), traces, expected, spec)
 
 
 def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec: MeasurementSpec) -> TracesRead | None:
@@ -82,13 +82,20 @@ def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec
 def expected_motion(
     sent_spec: SentSpec, genes: Sequence[float], parameters: Sequence[float]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return times `(k,)`, poses `(k, 7)` and fitness of a controller in a simulator; nan if the physics failed."""
-    spec, genome = received(sent_spec), np.array(genes)
+    """Return what `expected_in` does, in a simulator of a spec."""
+    spec = received(sent_spec)
     robot = robot_of(spec)
+    simulation = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
+    return expected_in(simulation, robot, np.array(genes), np.array(parameters))
+
+
+def expected_in(
+    simulation: Simulation, robot: Robot, genome: FloatArray, parameters: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return times `(k,)`, poses `(k, 7)` and fitness of a genome in a simulator; nan if the physics failed."""
     end_s = float(robot.motion(genome).observe_s[-1])
     times = np.unique(np.append(np.arange(int(end_s * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S, end_s))
-    simulation = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
-    _, recording = simulation.record(genome, np.array(parameters), times)
+    _, recording = simulation.record(genome, parameters, times)
     return times, recording.poses, float(robot.fitness(recording.trajectory))
 
 
@@ -126,9 +133,14 @@ def _tables(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) -
     return found
 
 
-def _evaluated(
+def evaluated(
     robot: Robot, genome: FloatArray, traces: Sequence[Trace], expected: Trace, spec: TracesSpec
 ) -> TracesRead:
+    """Return what traces say about a genome `(g,)`, beside the expected motion.
+
+    Raises:
+        InvalidSpec: a trace does not contain the motion; all errors are named.
+    """
     aligned, values, readings, violations, doubts = [], list[float](), [], list[Violation](), list[str]()
     lags = spec.lags_s or (None,) * len(traces)
     observe_s, sensors = robot.motion(genome).observe_s, robot.sensors

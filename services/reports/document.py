@@ -4,7 +4,7 @@ from gaplab.schemas.reports import VerdictRead
 from gaplab.services.core.comparisons import POOLED
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
-from gaplab.services.figures.words import number_of, spoken
+from gaplab.services.figures.words import number_of, titled
 from gaplab.services.reports import compared, tables
 from gaplab.services.reports.blocks import Block, Bullets, Drawing, Paragraph, Report, Section
 from gaplab.services.reports.content import Facts, Subject, facts_of
@@ -33,7 +33,7 @@ def report_on(store: Store, subject: Subject, margin: Margin | None = None) -> R
     repetitions = sum(experiment.progress.completed for experiment in facts.experiments)
     return Report(
         id=facts.id,
-        title=facts.name if facts.study else spoken(facts.name, 200),
+        title=facts.name if facts.study else titled(facts.name, facts.experiments[0].strategy, 200),
         subtitle=f"{'Study' if facts.study else 'Experiment'} {facts.id}: {kind}, "
         f"{number_of('completed repetition', repetitions)}",
         headline=facts.verdict.headline,

@@ -47,7 +47,7 @@ def judged_curves(
     curves: Sequence[Curve], experiments: Sequence[ExperimentRead], count: int | None
 ) -> tuple[Judged, ...]:
     """Return the curves of experiments with their distinct names, their ends, and their points at the common count."""
-    names = distinct_names([(curve.name, curve.experiment) for curve in curves])
+    names = distinct_names([(curve.name, curve.strategy, curve.experiment) for curve in curves])
     found = zip(names, curves, experiments, strict=True)
     return tuple(_judged(name, curve, experiment, count) for name, curve, experiment in found)
 

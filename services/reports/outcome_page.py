@@ -2,7 +2,7 @@
 
 from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.figures.kinds.curves import curves_figure
-from gaplab.services.figures.words import number, number_of, spoken, with_unit
+from gaplab.services.figures.words import number, number_of, spoken, titled, with_unit
 from gaplab.services.reports import tables
 from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Grid, Paragraph, Report, Section
 from gaplab.services.reports.numbers import MISSING
@@ -28,8 +28,8 @@ def outcome_report(outcome: ExperimentOutcome) -> Report:
     robot = spoken(outcome.robot.label)
     return Report(
         id=experiment.id,
-        title=spoken(experiment.name, 200),
-        subtitle=f"Experiment {experiment.id}: {robot}, simulated in {outcome.spec.engine.name}, "
+        title=titled(experiment.name, experiment.strategy, 200),
+        subtitle=f"Experiment {experiment.id}: {robot}, simulated in {spoken(outcome.spec.engine.name)}, "
         f"{number_of('measurement', len(outcome.measured))}",
         headline=outcome.facts.verdict.headline,
         sections=tuple(sections),

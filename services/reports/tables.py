@@ -50,7 +50,7 @@ def sensitivity(check: SensitivityRead) -> Grid:
         )
         for found in check.tunables
     )
-    return Grid(f"Check of {label_of(check.spec.robot)} in {check.spec.engine.name}", head, rows)
+    return Grid(f"Check of {label_of(check.spec.robot)} in {spoken(check.spec.engine.name)}", head, rows)
 
 
 def cost(facts: Facts) -> Grid:
@@ -153,6 +153,8 @@ def _values(values: Sequence[Any]) -> str:
 
 
 def _value(value: Any) -> str:  # noqa: ANN401 - JSON
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return f"{len(value):,}, listed in the spec"
     if isinstance(value, list):
         return ", ".join(map(_value, value))
     if value is None or isinstance(value, bool):

@@ -77,7 +77,7 @@ def experiment_coordinates(
         axes,
         shades=[each.fitness.mean for each in kept if each.fitness],
         shades_label="Final fitness",
-        hover=distinct_names([(each.name, each.id) for each in kept]),
+        hover=distinct_names([(each.name, each.strategy, each.id) for each in kept]),
         what="experiment",
         title=title,
     )

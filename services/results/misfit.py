@@ -68,12 +68,18 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         unit=unit(spec),
         error_unit=error_unit,
         points=points,
-        remarks=tuple(filter(None, [wrong, *remarks(points, unit(spec), error_unit), unseen])),
+        remarks=tuple(filter(None, [wrong, _known(measured), *remarks(points, unit(spec), error_unit), unseen])),
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
         verdicts=verdicts(points, samples, _means(spec), unreproduced=bool(wrong)),
     )
+
+
+def _known(measured: MeasuredIterations) -> str:
+    counts = ((measured.known, "tuned on"), (measured.known_held_out, "held out"))
+    told = ", ".join(f"{count} {what}" for count, what in counts if count)
+    return f"samples from before the experiment: {told}" if told else ""
 
 
 def _unreproduced(id: str, spec: ResolvedSpec, latest: Sequence[Tuning], error_unit: str) -> str:

@@ -14,6 +14,7 @@ from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.experiments import hiding
+from gaplab.services.figures.words import titled
 from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
 from gaplab.services.specs.resolution import is_direct
 from gaplab.services.specs.robots import robot_of
@@ -135,7 +136,7 @@ def _toy(
     best = simulators[0] if simulators and samples else None
     return ToyIteration(
         experiment=found.row.id,
-        name=found.row.name,
+        name=titled(found.row.name, found.row.strategy),
         repetition=repetition,
         iteration=iteration,
         unit=found.robot.unit,

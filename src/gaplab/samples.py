@@ -12,25 +12,31 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sample_tables import read_samples as read_table
 from gaplab.services.plugins import folders
+from gaplab.services.replay.earlier_traces import with_traces
 from gaplab.services.specs.robots import robot_of_file
 
 
-def read_samples(path: str | Path, robot: str | Path, options: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+def read_samples(
+    path: str | Path, robot: str | Path, options: Mapping[str, Any] | None = None, *, confirmed: bool = False
+) -> list[dict[str, Any]]:
     """Return the samples of a CSV file, for `reality.samples` of a spec.
 
         spec["reality"] = {"kind": "physical", "samples": gaplab.read_samples("runs.csv", "quadruped")}
 
     The columns are `gene_0`, `gene_1` and so on; `value`, or `value_1`, `value_2` and so on for repeats; and optionally
-    readings like `roll@0.75`, or `roll@0.75#2` of repeat 2.
+    readings like `roll@0.75`, or `roll@0.75#2` of repeat 2. In place of values and readings, `trace`, or `trace_1`,
+    `trace_2` and so on, may name recordings of the robot's base beside the file, from which its code computes both;
+    `lag_s`, or `lag_s_1` and so on, may state when the motion began on their clocks.
 
     Args:
         path: the file.
         robot: name of the robot that was measured: gaplab's own, or one of GAPLAB_PLUGINS; or its robot file, like
             `"my_bot.json"`. `client.bench.check_samples` knows the robots that a service has, and other controllers.
         options: its options, which one from a file does not have; left out: their defaults.
+        confirmed: take traces that are unlikely: with gaps, with another start, or of another drive.
 
     Raises:
-        InvalidSamples: the file has errors; all are named.
+        InvalidSamples: the file or a trace has errors, or a trace is unlikely and not `confirmed`; all are named.
         InvalidSpec: the robot does not exist, or refuses its options.
         TypeError: the robot is neither a name nor a file.
     """
@@ -38,7 +44,8 @@ def read_samples(path: str | Path, robot: str | Path, options: Mapping[str, Any]
         raise TypeError(f"a robot is its name or its file, not {robot!r:.100}; give its options as `options`")
     file = Path(path)
     folders.find()
-    return read_table(file.read_text("utf-8", "replace"), _robot(robot, dict(options or {}), file)).checked(file)
+    measured = _robot(robot, dict(options or {}), file)
+    return read_table(with_traces(file, measured, confirmed=confirmed), measured).checked(file)
 
 
 def _robot(robot: str | Path, options: dict[str, Any], table: Path) -> Robot:

@@ -49,7 +49,7 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api: Any, writ
         steps(written, claim, islice(log, 3))  # number 0
     page = visit(address(api, submitted.id))
     page.evaluate("() => { window.untouched = true; }")
-    expect(page.get_by_role("heading", level=1)).to_have_text("Growing")
+    expect(page.get_by_role("heading", level=1)).to_have_text("growing")
     expect(page.locator(".state-now")).to_contain_text("running")
     expect(page.locator(".figure-curves .point")).to_have_count(1)
 

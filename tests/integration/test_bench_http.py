@@ -11,12 +11,16 @@ import pytest
 import yaml
 from httpx2 import MockTransport, Request, Response
 
+import gaplab
 from gaplab import Client, InvalidSamples, ServiceError, ServiceUnreachable
 from gaplab.api.clients import driving
 from gaplab.api.clients.journal import Journal
 from gaplab.schemas.access import Role
 from gaplab.schemas.measurements import RequestRead
+from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services import access
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
 from tests.experiments import toy
 from tests.integration.test_bench import compute, truth
@@ -489,6 +493,35 @@ def test_repeats_and_the_noise_are_shown(client: Client) -> None:
     assert samples["standard_error"].tolist() == pytest.approx([0.1] * len(samples))
     assert samples["fitness"].tolist() == [0.5] * len(samples)
     assert client.misfit(experiment.id).noise == pytest.approx(0.02**0.5)
+
+
+def test_traces_of_earlier_runs_become_samples_without_a_request(tmp_path: Path) -> None:
+    genome = Quadruped().known.tolist()
+    whole, late = traces_of(genome, tmp_path)
+    lines = late.read_text().splitlines()
+    (tmp_path / "holed.csv").write_text("\n".join(lines[:150] + lines[200:]))
+    table = tmp_path / "runs.csv"
+    head = ",".join([*(f"gene_{place}" for place in range(len(genome))), "trace_1", "trace_2", "lag_s_2"])
+    genes = ",".join(map(str, genome))
+
+    table.write_text(f"{head}\n{genes},{whole.name},{late.name},7.5\n{genes},{whole.name},,\n")
+    both, once = gaplab.read_samples(table, "quadruped")
+
+    assert [len(both[part]) for part in ("values", "readings")] == [2, 2]
+    assert both["values"] == pytest.approx([both["values"][0]] * 2, rel=0.02)
+    assert (once["values"], once["readings"]) == (both["values"][:1], both["readings"][:1])
+    reality = {"kind": "physical", "samples": [both, once]}
+    resolve_experiment(ExperimentSpec.model_validate(SPEC | {"robot": "quadruped", "reality": reality}))
+
+    table.write_text(f"{head}\n\n{genes},holed.csv,,\n{genes},none.csv,,\n")
+    with pytest.raises(InvalidSamples) as refused:
+        gaplab.read_samples(table, "quadruped")
+    assert [(each.line, each.message[:33]) for each in refused.value.errors] == [
+        (3, "ValueError: trace 1: there is no "),
+        (4, "FileNotFoundError: [Errno 2] No s"),
+    ]
+    table.write_text(f"{head}\n{genes},holed.csv,,\n")
+    assert len(gaplab.read_samples(table, "quadruped", confirmed=True)) == 1
 
 
 def traces_of(genome: Any, folder: Path) -> Iterator[Path]:

@@ -156,3 +156,15 @@ def test_a_best_fitness_of_nothing_has_no_sign_whichever_zero_a_database_takes_f
     run(store, one, (replace(step, recorded=-0.0) if isinstance(step, Probed) else step for step in some_log()))
 
     assert copysign(1.0, reading.read_experiment(store, made.id).best_fitness) == 1.0
+
+
+def test_an_estimate_says_how_often_the_real_robot_runs(sqlite_store: Store) -> None:
+    spec = {"robot": "toy_function", "strategies": ["random"], "iterations": 3, "repetitions": 2, "budget": "smoke"}
+    runs = {}
+    for probes in ("each", "last", "never"):
+        reality = {"kind": "physical", "repeats": 5, "probes": probes}
+        (cost,) = estimate(sqlite_store, StudySpec.model_validate(spec | {"reality": reality})).experiments
+        runs[probes] = cost.runs
+
+    assert runs == {"each": 2 * 5 * (3 + 4), "last": 2 * 5 * (3 + 1), "never": 2 * 5 * 3}
+    assert estimate(sqlite_store, StudySpec.model_validate(spec)).experiments[0].runs == 0

@@ -89,7 +89,7 @@ def test_a_reality_of_another_engine_has_no_place_among_the_simulators(store: St
 
     assert truth == {}
     assert REALITY not in marks(figure)
-    assert "Reality is the engine a_lab: no setting of the simulators is reality." in figure.caption
+    assert "Reality is the engine A lab: no setting of the simulators is reality." in figure.caption
 
 
 def test_of_very_many_simulators_the_first_repetitions_are_drawn() -> None:

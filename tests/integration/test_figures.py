@@ -10,7 +10,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.figures.kinds.curves import CostAxis, curves_figure
 from gaplab.services.figures.marks import Arrow, Axis, Bars, FigureDefinition, Label, Level, Line, Points
 from gaplab.services.figures.style import COLORS, STRATEGIES, strategy_style, strategy_styles, style_of
-from gaplab.services.figures.words import limits, power
+from gaplab.services.figures.words import limits, power, spoken
 from tests.figures import DIRECT, RISING, curve, point
 
 
@@ -22,7 +22,7 @@ def levels(figure: FigureDefinition) -> list[Level]:
     return [mark for mark in figure.panels[0].marks if isinstance(mark, Level)]
 
 
-def test_a_curve_becomes_a_line_with_its_interval_and_the_baseline_a_level_with_its_sd() -> None:
+def test_a_curve_becomes_a_line_with_its_interval_and_the_baseline_a_level_with_its_own() -> None:
     figure = curves_figure([RISING, DIRECT])
 
     (line,), (level,), (panel,) = lines(figure), levels(figure), figure.panels
@@ -30,7 +30,7 @@ def test_a_curve_becomes_a_line_with_its_interval_and_the_baseline_a_level_with_
     assert (line.x, line.y) == ((0, 1, 2), (0.9, 1.2, 1.3))
     assert line.upper[1] == pytest.approx(1.4)
     assert line.hover[0] == "0.900 ± 0.100 (n = 30)"
-    assert (level.value, level.lower, level.upper) == pytest.approx((1.33, 1.23, 1.43))
+    assert (level.value, level.lower, level.upper) == pytest.approx((1.33, 1.13, 1.53))
     assert level.style.ink
     assert panel.y.label == "Fitness in reality (m/s)"
     assert panel.x.label == "Number of real-world evaluations"
@@ -195,6 +195,13 @@ def test_experiments_of_one_name_are_told_apart_by_their_ids() -> None:
     names = [each.name for each in lines(curves_figure([first, second]))]
 
     assert names == ["Simulated fit (id-of-si)", "Simulated fit (another-)"]
+
+
+def test_a_name_that_a_person_gave_is_shown_as_it_is() -> None:
+    named = [RISING.model_copy(update={"name": name}) for name in ("run_a1_v2", "simulated_fit")]
+
+    assert [each.name for each in lines(curves_figure(named))] == ["run_a1_v2", "Simulated fit"]
+    assert [spoken(each) for each in ("cma_es", "mujoco", "known_fit")] == ["CMA-ES", "MuJoCo", "Known fit"]
 
 
 def test_units_are_shown_only_where_all_curves_share_one() -> None:

@@ -159,7 +159,7 @@ def test_a_message_of_any_length_is_logged_in_little_time_and_space() -> None:
 
 
 def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_carry_to_itself(tmp_path: Path) -> None:
-    """The real process: every line of it is JSON, probes are left out, and no secret that it was given is in any."""
+    """The real process: every line is JSON, probes and assets are left out, and no secret is in any."""
     log = tmp_path / "log"
     script = (
         "import sys; from gaplab.api.process import service; from gaplab.api.process.server import listen\n"
@@ -176,6 +176,7 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
         with httpx2.Client(base_url=f"http://127.0.0.1:{place.read_text()}", timeout=LONGEST_S) as http:
             wait_until(lambda: http.get("/readyz").status_code == 200)
             secret = {"Authorization": f"Bearer {SECRET}", "X-Token": SECRET}
+            assert http.get("/assets/dashboard/app.js").status_code == 200
             assert http.get("/experiments/abc", headers=secret).status_code == 401
             assert http.get("/experiments/abc").status_code == 404
             assert http.get("/experiments", params={"token": SECRET, "x": SECRET}).status_code == 422

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
+import httpx2
 import numpy as np
 import pytest
 from fastapi import FastAPI
@@ -14,6 +15,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import update
 
 from gaplab.api.app import create_app
+from gaplab.api.clients.client import Client
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import Replay
 from gaplab.schemas.spec import ExperimentSpec
@@ -390,6 +392,37 @@ def test_samples_that_no_tuning_sees_have_no_predictions(sqlite_store: Store, ap
 
     assert [each.iteration for each in found.items] == [1, 3]
     assert (found.pending, found.left_out) == (0, 0)
+
+
+def test_an_experiment_without_iterations_shows_what_samples_from_before_gave(
+    sqlite_store: Store, app: Any, api: Any
+) -> None:
+    known = [{"genome": [gene], "values": [gene + 0.1]} for gene in (0.2, 0.5, 0.8)]
+    reality = {"kind": "physical", "samples": known}
+    experiment = submission.submit_experiment(
+        sqlite_store, toy(repetitions=1, iterations=0, held_out=0.4, reality=reality)
+    ).id
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    for step in repetition(setting(claim.spec, 0)):
+        assert execution.record(sqlite_store, claim, step)
+
+    found = predictions(sqlite_store, app.state.rollout_process, experiment, seconds=LONGEST_S)
+    forward = httpx2.MockTransport(lambda asked: httpx2.Response(200, json=api.get(asked.url.raw_path.decode()).json()))
+    with Client("http://127.0.0.1:1", transport=forward) as client:
+        best = client.results.best_simulator(experiment)
+
+    assert best is not None
+    assert best.iteration == 0
+    assert [(each.iteration, each.simulated_before, each.fitness) for each in found.items] == [
+        (0, None, 0.2 + 0.1),
+        (0, None, 0.5 + 0.1),
+    ]
+    errors = [(each.simulated_after - each.fitness) ** 2 for each in found.items]
+    assert sum(errors) == pytest.approx(best.squared_error)
+    caption = api.get(f"/figures/predictions?format=json&experiment={experiment}").json()["caption"]
+    assert f"tuning on it: root-mean-square error {best.error:.2g}\N{NO-BREAK SPACE}m/s" in caption
+    remarks = api.get(f"/experiments/{experiment}/misfit").json()["remarks"]
+    assert remarks[0] == "samples from before the experiment: 2 tuned on, 1 held out"
 
 
 def test_predictions_take_a_while_and_are_pending_meanwhile(sqlite_store: Store, app: Any) -> None:

@@ -132,6 +132,21 @@ def test_the_best_of_a_study_is_the_highest_curve_at_the_last_shared_number_with
     assert listing.list_studies(store).items[0].best == ended
 
 
+def test_the_best_of_a_study_is_one_of_those_with_the_most_repetitions(store: Store) -> None:
+    made = study(store, "simulated_fit", "random", repetitions=2)
+    fit, random = (each.id for each in made.experiments)
+    found = claims(store)
+    for number in range(2):
+        record(store, found[fit][number], 0.1, 0.5, 0.4)
+    record(store, found[random][0], 0.9, 0.9, 0.9)
+    cancel(store, random)
+
+    best = reading.read_study(store, made.id).best
+
+    assert best
+    assert (best.name, best.n) == ("simulated_fit", 2)
+
+
 def test_the_baseline_alone_is_the_best_of_its_study(store: Store) -> None:
     made = study(store, "direct")
     record(store, claims(store)[made.experiments[0].id][0], 2.0)

@@ -119,6 +119,6 @@ test("steps of a closed branch are told as their events, with the repeats", () =
 test("worlds are the engines, or the bench", () => {
   const spec = (reality) => ({ engine: { name: "fast" }, reality });
   assert.deepEqual([{ engine: { name: "fast" } }, { engine: { name: "slow" } }, { kind: "physical", engine: null, bench: "leg" }].map((reality) => worldsText(spec(reality))),
-    ["fast", "fast, reality in slow", "fast, reality on the bench “leg”"]);
+    ["Fast", "Fast, reality in Slow", "Fast, reality on the bench “leg”"]);
   assert.deepEqual([isPhysical({ spec: { reality: { kind: "simulated" } } }), isPhysical({ spec: { reality: { kind: "physical" } } })], [false, true]);
 });

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { age, count, duration, fixed, number, percent, readableName, threeDigits, timeBetween } from "../../api/dashboard/lib/format.js";
+import { age, count, duration, fixed, number, percent, readableName, threeDigits, timeBetween, titleOf } from "../../api/dashboard/lib/format.js";
 
 test("a missing value is a dash, in every format", () => {
   for (const format of [number, fixed, threeDigits, count, duration]) assert.deepEqual([format(null), format(undefined)], ["–", "–"]);
@@ -38,4 +38,5 @@ test("100 % is shown once all is done, and not before", () => {
 
 test("names of plug-ins become readable, and names that people gave stay", () => {
   assert.deepEqual(["simulated_fit", "a2", "My study", "weights_A", ""].map(readableName), ["Simulated fit", "A2", "My study", "weights_A", ""]);
+  assert.deepEqual([["simulated_fit", "simulated_fit"], ["run_a1_v2", "simulated_fit"]].map(([name, strategy]) => titleOf({ name, strategy })), ["Simulated fit", "run_a1_v2"]);
 });

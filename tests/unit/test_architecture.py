@@ -79,7 +79,7 @@ ARROWS = {
     ),
     "api": (("services", "api.process"), set()),
     "src": (
-        ("schemas", "services.core", "services.engines", "services.plugins", "services.specs", "api", "samples"),
+        ("schemas", *map("services.{}".format, ("core", "engines", "plugins", "specs", "replay")), "api", "samples"),
         set(),
     ),
     "migrations": (

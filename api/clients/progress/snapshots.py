@@ -33,8 +33,9 @@ class RecordProgress:
 
     @property
     def name(self) -> str:
-        """The name with spaces, where a line can break."""
-        return self.record.name.replace("_", " ")
+        """The name; that of a strategy, which an experiment has by default, with spaces, where a line can break."""
+        name = self.record.name
+        return name.replace("_", " ") if name == getattr(self.record, "strategy", None) else name
 
     @property
     def done(self) -> float:

@@ -96,11 +96,21 @@ export const timeBetween = (start, end) => duration(start && end ? (Date.parse(e
  */
 export const age = (time) => `${duration(Math.max(0, (Date.now() - Date.parse(time)) / 1000))} ago`;
 
+/** @type {Record<string, string>} */
+const PROPER = JSON.parse(globalThis.document?.documentElement.dataset.names ?? "{}");
+
 /**
- * Write `some_name` as *Some name*; a name that a person gave stays.
+ * Write the name of a plug-in: `some_name` as *Some name*, and a proper name as it is.
  *
  * @param {string} name
  */
 export function readableName(name) {
-  return /^[a-z][a-z0-9_]*$/.test(name) ? (name[0].toUpperCase() + name.slice(1)).replaceAll("_", " ") : name;
+  return PROPER[name] ?? (/^[a-z][a-z0-9_]*$/.test(name) ? (name[0].toUpperCase() + name.slice(1)).replaceAll("_", " ") : name);
 }
+
+/**
+ * Write the name of an experiment as a person gave it; that of its strategy, which it has by default, is written as of a plug-in.
+ *
+ * @param {{ name: string, strategy: string }} experiment
+ */
+export const titleOf = ({ name, strategy }) => (name === strategy ? readableName(name) : name);

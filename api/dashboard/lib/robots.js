@@ -1,6 +1,8 @@
 // @ts-check
 /** What the catalogue says of the robots of experiments. */
 
+import { readableName } from "./format.js";
+
 /** @typedef {Api.ExperimentRead | undefined} Experiment */
 
 /**
@@ -34,6 +36,6 @@ export const isPhysical = ({ spec }) => spec.reality.kind === "physical";
  * @param {Record<string, any>} spec resolved
  */
 export function worldsText({ engine, reality }) {
-  if (reality.kind === "physical") return `${engine.name}, reality on the bench “${reality.bench}”`;
-  return reality.engine.name === engine.name ? engine.name : `${engine.name}, reality in ${reality.engine.name}`;
+  if (reality.kind === "physical") return `${readableName(engine.name)}, reality on the bench “${reality.bench}”`;
+  return `${readableName(engine.name)}${reality.engine.name === engine.name ? "" : `, reality in ${readableName(reality.engine.name)}`}`;
 }

@@ -54,6 +54,7 @@ declare namespace Api {
     sd: number | null;
     experiment: string;
     name: string;
+    strategy: string;
   }
   interface BranchRead {
     repetition: number;
@@ -271,6 +272,7 @@ declare namespace Api {
     repetitions: number;
     iterations: number;
     rollouts: number;
+    runs: number;
     core_seconds: number;
   }
   interface ExperimentRead {

@@ -62,15 +62,15 @@ def curves_figure(
     Args:
         curves: curves in the order of the legend.
         title: text above the figure; empty for none.
-        band: band around the lines; by default the interval, or the SD if few repetitions would make the interval fill
-            the figure. Levels, like the direct baseline, always have their SD, as in the paper.
+        band: band around lines and levels; by default the interval, or the SD if few repetitions would make the
+            interval fill the figure.
         against: the horizontal axis; by default the number of real-world evaluations.
         each: draw a faint line for every repetition.
         beside: curves of transferred controllers alone, to draw as thin lines beside those of the same experiments.
     """
     curves = [_drawable(one) for one in curves]
     band = band or _default_band(curves)
-    names = distinct_names([(one.name, one.experiment) for one in curves])
+    names = distinct_names([(one.name, one.strategy, one.experiment) for one in curves])
     placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
     lines = [one for one in placed if not one.curve.level]
     levels = [one for one in placed if one.curve.level and one.points]
@@ -80,7 +80,7 @@ def curves_figure(
         _repetitions(one, against, style) for one, style in zip(lines, styles, strict=True) if each and one.points
     ]
     thin = [mark for one, style in zip(lines, styles, strict=True) for mark in _thin(one, beside, against, style)]
-    marks += [*thin, *(_level(one, style) for one, style in zip(levels, _level_styles(levels), strict=True))]
+    marks += [*thin, *(_level(one, band, style) for one, style in zip(levels, _level_styles(levels), strict=True))]
     span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
     best_of = _best_of_lines(levels, span) if lines and not against else []
     marks += best_of
@@ -121,7 +121,7 @@ def _place(curve: Curve, point: CurvePoint, against: CostAxis | None) -> float |
 
 
 def _default_band(curves: Sequence[Curve]) -> Band:
-    counts = [point.n for one in curves if not one.level for point in one.points if point.n]
+    counts = [point.n for one in curves for point in one.points if point.n]
     return "interval" if min(counts, default=FEW) >= FEW else "sd"
 
 
@@ -158,9 +158,9 @@ def _thin(one: _Placed, beside: Sequence[Curve], against: CostAxis | None, style
     return [Line(one.name, x, y, replace(style, thin=True), hover=hover, markers=False)] if found else []
 
 
-def _level(one: _Placed, style: Style) -> Level:
+def _level(one: _Placed, band: Band, style: Style) -> Level:
     ((_, mean, point), *_) = one.points
-    return Level(one.name, mean, style, *_ends(point, "sd"), marked=not style.ink)
+    return Level(one.name, mean, style, *_ends(point, band), marked=not style.ink)
 
 
 def _best_of_lines(levels: Sequence[_Placed], last: float) -> list[Line]:

@@ -9,6 +9,7 @@ from gaplab.services.figures.style import INK, Style, style_of
 from gaplab.services.figures.words import drawable, heading, limits, number, number_of, printable, with_unit
 
 BEFORE, AFTER = "Before tuning on it", "After tuning on it"
+KNOWN = "From before the experiment, after tuning on it"
 
 
 Pair = tuple[float, float]
@@ -35,8 +36,9 @@ def predictions_figure(
     ends = limits(values)
     marks = (
         Diagonal("Simulation agrees with reality", Style(INK, "dashed", "circle")) if values else None,
-        _points(BEFORE, drawn[BEFORE], told, style_of(1), hollow=True),
-        _points(AFTER, drawn[AFTER], told, style_of(0), hollow=False),
+        _points(BEFORE, drawn, told, style_of(1), hollow=True),
+        _points(AFTER, drawn, told, style_of(0), hollow=False),
+        _points(KNOWN, drawn, told, style_of(2), hollow=False) if drawn[KNOWN] else None,
     )
     panel = Panel(
         tuple(mark for mark in marks if mark is not None),
@@ -55,20 +57,24 @@ def predictions_figure(
     )
 
 
-def _pairs(items: Sequence[Prediction]) -> tuple[list[str], dict[str, list[Pair]]]:
-    told, drawn = list[str](), {BEFORE: list[Pair](), AFTER: list[Pair]()}
+def _pairs(items: Sequence[Prediction]) -> tuple[dict[bool, list[str]], dict[str, list[Pair]]]:
+    told, drawn = {True: list[str](), False: list[str]()}, {name: list[Pair]() for name in (BEFORE, AFTER, KNOWN)}
     for each in items:
         before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))
-        if before is not None and after is not None and real is not None:
-            told.append(f"repetition {each.repetition}, iteration {each.iteration}")
+        if after is None or real is None or (before is None and each.iteration):
+            continue
+        told[each.iteration == 0].append(f"repetition {each.repetition}, iteration {each.iteration}")
+        drawn[AFTER if each.iteration else KNOWN].append((after, real))
+        if before is not None:
             drawn[BEFORE].append((before, real))
-            drawn[AFTER].append((after, real))
     return told, drawn
 
 
-def _points(name: str, pairs: Sequence[Pair], told: Sequence[str], style: Style, *, hollow: bool) -> Points:
-    simulated, real = tuple(each for each, _ in pairs), tuple(each for _, each in pairs)
-    return Points(name, real, simulated, style, hover=tuple(told), hollow=hollow)
+def _points(
+    name: str, drawn: dict[str, list[Pair]], told: dict[bool, list[str]], style: Style, *, hollow: bool
+) -> Points:
+    simulated, real = tuple(each for each, _ in drawn[name]), tuple(each for _, each in drawn[name])
+    return Points(name, real, simulated, style, hover=tuple(told[name == KNOWN]), hollow=hollow)
 
 
 def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], unit: str, pending: int, left_out: int) -> str:
@@ -77,13 +83,13 @@ def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], unit: st
     repetitions = len({each.repetition for each in items})
     parts = [
         f"{number_of('sample', len(items))} of {number_of('repetition', repetitions)}, each in the best simulator "
-        "before it was measured, and in the best simulator after tuning on it."
+        f"{'before it was measured, and in the best simulator ' if drawn[BEFORE] else ''}after tuning on it."
     ]
     shown = f"\N{NO-BREAK SPACE}{printable(unit)}" if unit not in {"", "1"} else ""
     parts += [
         f"{name}: root-mean-square error {number(_error(pairs), 2)}{shown}." for name, pairs in drawn.items() if pairs
     ]
-    failed = len(items) - len(drawn[BEFORE])
+    failed = len(items) - len(drawn[AFTER]) - len(drawn[KNOWN])
     parts += [f"{number_of('sample', failed)} left out: a measurement or the physics failed."] if failed else []
     parts += [f"{number_of('sample', left_out)} of later repetitions left out: there are too many."] if left_out else []
     parts += [f"{number_of('sample', pending)} still being computed."] if pending else []

@@ -6,7 +6,7 @@ from itertools import combinations
 
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Mark, Panel, Points, Table
 from gaplab.services.figures.style import INK, Style
-from gaplab.services.figures.words import heading, limits, number, number_of, printable, spoken, with_unit
+from gaplab.services.figures.words import heading, limits, number, number_of, spoken, with_unit
 
 IN_PAIRS = 3
 """Most tunables that are drawn pair by pair; of more, each has a panel against iterations."""
@@ -145,10 +145,10 @@ def _caption(
     of = f" of {all_}" if all_ > repetitions else ""
     parts = [
         f"The best simulator after each iteration of {number_of('repetition', repetitions)}{of}, within the bounds of "
-        "tuning; those before the first sample are random."
+        "tuning; those tuned on no sample are random."
     ]
     if real_engine:
-        parts.append(f"Reality is the engine {printable(real_engine)}: no setting of the simulators is reality.")
+        parts.append(f"Reality is the engine {spoken(real_engine)}: no setting of the simulators is reality.")
     elif truth is None:
         parts.append("Reality is shown once its experiments have ended.")
     return " ".join(parts)

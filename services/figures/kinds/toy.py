@@ -6,7 +6,7 @@ from gaplab.schemas.toy import ToyIteration
 from gaplab.services.figures.kinds.squared_error import summed
 from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Line, Mark, Panel, Points, Table
 from gaplab.services.figures.style import COLORS, INK, Style
-from gaplab.services.figures.words import heading, number, number_of, spoken, with_unit
+from gaplab.services.figures.words import heading, number, number_of, with_unit
 
 REALITY = Style(INK, "dashed", "circle")
 SIMULATION = Style(COLORS[0], "solid", "circle")
@@ -26,7 +26,7 @@ def toy_figure(toys: Sequence[ToyIteration], *, title: str | None = None) -> Fig
     """
     several = len(toys) > 1
     first = toys[0]
-    own = f"{spoken(first.name)}, repetition {first.repetition}{'' if several else f', iteration {first.iteration}'}"
+    own = f"{first.name}, repetition {first.repetition}{'' if several else f', iteration {first.iteration}'}"
     return FigureDefinition(
         name="toy",
         title=heading(own if title is None else title),

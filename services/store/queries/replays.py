@@ -1,7 +1,9 @@
 """Rows for replays and predictions: controllers, their simulators, and their fitness in reality."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import starmap
+from statistics import fmean
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, aliased
@@ -25,13 +27,14 @@ class TunedSample:
 
     Attributes:
         fitness: fitness in reality; None if the measurement failed.
+        before: None of a sample from before the experiment, which is one of iteration 0.
     """
 
     repetition: int
     iteration: int
     genome: list[float]
     fitness: float | None
-    before: list[float]
+    before: list[float] | None
     after: list[float]
 
 
@@ -49,7 +52,18 @@ def tuned_samples(session: Session, experiment: ExperimentRow) -> tuple[TunedSam
         query = query.join(found, best)
     share, known = experiment.spec["held_out"], len(experiment.spec["reality"]["samples"])
     samples = starmap(TunedSample, session.execute(query.order_by(RepetitionRow.number, row.iteration)))
-    return tuple(each for each in samples if not is_held_out(known + each.iteration, share))
+    seen = (each for each in samples if not is_held_out(known + each.iteration, share))
+    return (*_known_samples(session, experiment), *seen)
+
+
+def _known_samples(session: Session, experiment: ExperimentRow) -> Iterator[TunedSample]:
+    row, share = SimulatorRow, experiment.spec["held_out"]
+    tuned = (row.iteration == 0) & (row.rank == 0) & row.squared_error.is_not(None)
+    query = of_experiments(row, [experiment.id], RepetitionRow.number, row.parameters).where(tuned)
+    for repetition, after in session.execute(query.order_by(RepetitionRow.number)):
+        for number, known in enumerate(experiment.spec["reality"]["samples"], 1):
+            if not is_held_out(number, share):
+                yield TunedSample(repetition, 0, known["genome"], fmean(known["values"]), None, after)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 /** The experiments and studies that are chosen or found, each loaded once. */
 
 import { get } from "../../lib/api.js";
-import { readableName } from "../../lib/format.js";
+import { titleOf } from "../../lib/format.js";
 
 const NOT_FOUND = 404;
 
@@ -64,7 +64,7 @@ export function experimentCache(signal) {
   }
 
   /** @param {string} id */
-  const nameOf = (id) => readableName(experiments.get(id)?.name ?? id);
+  const nameOf = (id) => titleOf(experiments.get(id) ?? { name: id, strategy: "" });
 
   return {
     addExperiment, addStudy, loadStudy, reload, load, nameOf,

@@ -3,7 +3,7 @@
 
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
-import { age, count, readableName } from "../../lib/format.js";
+import { age, count, titleOf } from "../../lib/format.js";
 
 const PAUSE_MS = 150;
 const STUDIES = 5;
@@ -114,7 +114,7 @@ async function search({ cache, choice }, text, signal) {
       name: study.name, description: `study, all ${count(study.experiments.length)} experiments`, item: study, ids: study.experiments.map(({ id }) => id),
     })),
     ...left.map((experiment) => ({
-      name: readableName(experiment.name), description: cache.studyName(experiment.id) ?? experiment.id, item: experiment, ids: [experiment.id],
+      name: titleOf(experiment), description: cache.studyName(experiment.id) ?? experiment.id, item: experiment, ids: [experiment.id],
     })),
   ];
 }

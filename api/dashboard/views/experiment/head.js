@@ -5,7 +5,7 @@ import { get } from "../../lib/api.js";
 import { h, refill, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
-import { age, count, evaluationsText, fixed, percent, readableName, timeBetween } from "../../lib/format.js";
+import { age, count, evaluationsText, fixed, percent, readableName, timeBetween, titleOf } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
 import { keepingButtons } from "../../lib/keeping.js";
 import { notesBlock } from "../../lib/markdown.js";
@@ -38,7 +38,7 @@ export function head(page) {
   const update = () => {
     const { experiment } = page;
     const { progress, warnings, reasons } = experiment;
-    setText(title, readableName(experiment.name));
+    setText(title, titleOf(experiment));
     const done = ENDED.includes(experiment.state) ? "" : `${percent(fraction(progress))} · `;
     document.title = `${done}${title.textContent} · gaplab`;
     notes.update(experiment.notes);

@@ -10,7 +10,7 @@ import { table } from "../../lib/table.js";
 import { REWRITES } from "./event_words.js";
 
 const KINDS = ["tuned", "probed", ...REWRITES];
-const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Simulators before the first sample are random.";
+const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Simulators tuned on no sample are random.";
 
 const VERDICT_NOTE = "100 % is as uncertain as before any sample. The largest counts of the spread over repetitions, the tuner’s 95 % intervals, and its posterior. Agreement is not truth: simulators that lack an effect agree on a value that makes up for it.";
 
@@ -59,7 +59,7 @@ function identified(verdicts) {
 /** @type {(point: Api.MisfitPoint, hasUnseen: boolean) => Page.Child[]} */
 function row({ iteration, error, held_out_error: unseen, gap, tunables }, hasUnseen) {
   const tuned = tunables.map((tunable) => `${meanAndSd(tunable)}${boundShare(tunable.at_lower, "⊣")}${boundShare(tunable.at_upper, "⊢")}`);
-  return [iteration, meanAndSd(error), ...(hasUnseen ? [meanAndSd(unseen)] : []), meanAndSd(gap), ...tuned, gap.n];
+  return [iteration, meanAndSd(error), ...(hasUnseen ? [meanAndSd(unseen)] : []), meanAndSd(gap), ...tuned, gap.n || error.n];
 }
 
 /** @param {Api.Distribution} distribution */

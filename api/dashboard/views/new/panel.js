@@ -3,7 +3,7 @@
 
 import { copyButton } from "../../lib/copy.js";
 import { h } from "../../lib/dom.js";
-import { count, duration, readableName } from "../../lib/format.js";
+import { count, duration, readableName, titleOf } from "../../lib/format.js";
 import { stringify } from "../../lib/json.js";
 import { framed, table } from "../../lib/table.js";
 import { tabs } from "../../lib/tabs.js";
@@ -78,14 +78,16 @@ export function pythonLines(base, json) {
 /** @param {Api.EstimateRead} estimate */
 function costBlocks({ rollouts, seconds, cores, core_seconds: coreSeconds, engines, experiments, supervisors }) {
   const time = h("p", { class: "big" }, h("strong", {}, duration(seconds)), ` on ${count(cores)} ${cores === 1 ? "core" : "cores"}`);
+  const runs = experiments.reduce((sum, each) => sum + each.runs, 0);
+  const real = runs ? [h("p", { class: "big" }, h("strong", {}, `${count(runs)} ${runs === 1 ? "run" : "runs"}`), " of the real robot")] : [];
   const work = h("p", {}, `${count(rollouts)} rollouts at most: ${duration(coreSeconds)} of one core, if nothing else is waiting.`);
   const paces = engines.map(({ engine, seconds_per_rollout: pace, measured }) =>
     h("p", { class: "note" }, `${readableName(engine)}: ${milliseconds(pace)} a rollout, ${measured ? "measured here" : "the usual time; not measured here yet"}.`));
   const waiting = supervisors ? [] : [h("p", { class: "remark" }, NO_WORKERS)];
-  const rows = experiments.map((experiment) => [readableName(experiment.name),
+  const rows = experiments.map((experiment) => [titleOf(experiment),
     `${count(experiment.repetitions)} ×`, count(experiment.rollouts), duration(experiment.core_seconds)]);
   const costs = table("Cost of each experiment", ["Experiment", "Repetitions", "Rollouts", "One core"], rows);
-  return [time, work, ...waiting, ...paces, h("details", {}, h("summary", {}, "By experiment"), costs)];
+  return [...real, time, work, ...waiting, ...paces, h("details", {}, h("summary", {}, "By experiment"), costs)];
 }
 
 /** @param {number} seconds */

@@ -32,7 +32,8 @@ export function realityPart(form) {
   const set = (/** @type {string} */ kind) => {
     bench.isPhysical = kind === "physical";
     const baselines = catalogue.strategies.filter(({ details }) => details.baseline).map(({ name }) => name);
-    for (const strategy of strategies) strategy.on &&= !(bench.isPhysical && baselines.includes(strategy.name));
+    const one = strategies.find(({ name, on }) => on && !baselines.includes(name));
+    if (bench.isPhysical) for (const strategy of strategies) strategy.on = strategy === one;
     form.remake();
   };
   return part("Reality",
@@ -72,7 +73,7 @@ function physical(form) {
     pointer: `/reality/limits/${name}`, places, placeholder: "not checked" }));
   const isOpen = Object.values(bench.limits).some((value) => value !== "") || bench.beyond !== "";
   return [
-    h("p", { class: "note" }, "Measurements are requested on the page “Bench”, and repetitions wait for them, for a year if need be. The direct baseline would need thousands of them, so it is unticked."),
+    h("p", { class: "note" }, "Measurements are requested on the page “Bench”, and repetitions wait for them, for a year if need be. Each strategy needs runs of its own, so one is ticked."),
     field({ label: "Name of the bench", hint: "one measurement is taken at a time on it", value: bench.bench, set: form.setter(bench, "bench"), pointer: "/reality/bench", places, maxlength: 200, placeholder: robot.name }),
     numberField({ label: "Repeats of each measurement", hint: "their mean is the fitness, their spread the noise", value: bench.repeats, set: form.setter(bench, "repeats"), pointer: "/reality/repeats", places, placeholder: "1" }),
     probesField(form, "last"),

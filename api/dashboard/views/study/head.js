@@ -4,7 +4,7 @@
 import { h, refill, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
-import { age, count, evaluationsText, fixed, readableName } from "../../lib/format.js";
+import { age, count, evaluationsText, fixed, titleOf } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
 import { keepingButtons } from "../../lib/keeping.js";
 import { notesBlock } from "../../lib/markdown.js";
@@ -83,7 +83,7 @@ function factsOf({ study, unit }) {
  */
 function bestFact({ best }, unit) {
   if (!best) return [];
-  return [["Best fitness", `${fixed(best.mean)} ${unit} by ${readableName(best.name)}, after ${evaluationsText(best.evaluations)} (mean of ${best.n})`]];
+  return [["Best fitness", `${fixed(best.mean)} ${unit} by ${titleOf(best)}, after ${evaluationsText(best.evaluations)} (mean of ${best.n})`]];
 }
 
 /**
