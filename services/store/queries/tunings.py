@@ -54,7 +54,7 @@ def best_simulators(session: Session, experiment: str) -> tuple[BestSimulator, .
     query = of_experiments(row, [experiment], RepetitionRow.number, row.number, *columns)
     query = query.join(found, best).outerjoin(probe, probed & (probe.kind == MeasurementKind.PROBE))
     ordered = session.execute(query.order_by(RepetitionRow.number, row.number))
-    return tuple(BestSimulator(*each, fit=fit_of(fit)) for *each, fit in ordered)
+    return tuple(BestSimulator(*(*each, fit_of(fit))) for *each, fit in ordered)
 
 
 def intervals(
