@@ -181,7 +181,7 @@ def test_a_base_begins_turned(engine: Engine) -> None:
 
 def test_a_tilted_start_is_on_the_ground_and_is_forgotten_afterwards(engine: Engine) -> None:
     body = Body("body", 1.0, Box((0.4, 0.2, 0.1)), (0.03, 0.0, 0.02), inertia=Inertia((0.02, 0.03, 0.04), QUARTER))
-    world = block(body, start_height_m=0.03, start_turn=QUARTER)
+    world = block(body, start_height_m=0.1, start_turn=QUARTER)
     tilted = replace(world, noise=Noise(start_tilt_rad=0.1))
     honoured(engine, tilted)
     level = held(np.array([0.0, 0.5]))
@@ -198,7 +198,7 @@ def test_a_tilted_start_is_on_the_ground_and_is_forgotten_afterwards(engine: Eng
         assert Rotation.from_quat(turn).as_rotvec() == pytest.approx([x, y, 0.0], abs=1e-6)
         height = clearances_m(world.bodies[0], alone.positions_m[:1], alone.orientations[:1])
         assert height == pytest.approx(
-            clearances_m(world.bodies[0], np.array([[0, 0, 0.03]]), np.array([QUARTER])), abs=1e-6
+            clearances_m(world.bodies[0], np.array([[0, 0, 0.1]]), np.array([QUARTER])), abs=1e-6
         )
     assert np.array_equal(seen.positions_m[0], seen.positions_m[-1])
     assert np.abs(seen.positions_m[1:-1, :, 1] - seen.positions_m[1:-1, :, 0]).max() > 0.005
