@@ -62,7 +62,7 @@ class MeasurementRow(Base):
     fitness: Mapped[float | None]
     readings: Mapped[list[float | None] | None]
     repeats: Mapped[list[float] | None]
-    left_out: Mapped[bool] = mapped_column(default=False, server_default="0")
+    left_out: Mapped[bool] = mapped_column(server_default="0")
     measured_by: Mapped[str] = mapped_column(String(100))
     measured_at: Mapped[datetime] = mapped_column(default=now())
 
