@@ -107,7 +107,7 @@ function holder(request, view) {
         view.refresh();
       },
     }, view.signal);
-    return [h("p", { class: "remark warned" }, `${by} has taken it until ${timeOf(request)}. `, button("End that take…", async () => end(), "quiet small")), failure,
+    return [h("p", { class: "remark warned" }, `${by} has taken it until ${timeOf(request)}. `, h("button", { type: "button", class: "quiet small", onclick: end }, "End that take…")),
       h("details", {}, h("summary", {}, "Answer it all the same"), h("p", { class: "note" }, "A person then decides which answer counts."), form)];
   }
   if (state === "stuck") {
