@@ -108,6 +108,7 @@ def test_a_phone_is_told_that_readings_are_needed_and_sends_traces(
     experiment, request = asked(written, "camera", **walker, reality={"repeats": 2})
     taking.take(written, request.id, TakeSpec(operator="Eve", lease_s=600.0), FREELY)
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
+    page.get_by_role("button", name="Show Quadruped").click()
     expect(page.get_by_text("send a trace of the base for each repeat")).to_be_visible()
     expect(page.get_by_text("move the joints slowly to the start pose")).to_be_visible()
 
@@ -115,7 +116,9 @@ def test_a_phone_is_told_that_readings_are_needed_and_sends_traces(
     page.get_by_label("Your name").last.fill("Ada")
     page.get_by_label("Why?").last.fill("her phone is dead")
     page.get_by_role("button", name="End it").click()
-    take(page)
+    expect(page.get_by_label("Your name")).to_have_value("Ada")
+    page.get_by_role("button", name="Take it").click()
+    page.get_by_text("You have it, as Ada.").wait_for()
     page.get_by_label("Traces (CSV) in place of values").set_input_files([*traces_of(request.genome, tmp_path)])
     page.get_by_text("✓").nth(1).wait_for()
     send = page.get_by_role("button", name="Send 2 values")

@@ -104,6 +104,7 @@ function holder(request, view) {
       fields: [{ name: "operator", label: "Your name", value: operatorName(), required: true, maxlength: 200 }, REASON], action: "End it",
       act: async (given) => {
         await post(`/requests/${id}/release`, { take: request.takes, ...given });
+        browserStore("operator").write("name", given.operator);
         view.refresh();
       },
     }, view.signal);
