@@ -31,14 +31,10 @@ def main() -> None:
     for name in arguments.names or MEASUREMENTS:
         console.print(f"measuring {name} ...")
         for row in MEASUREMENTS[name](arguments.rounds):
-            table.add_row(*_cells(row))
-            console.print("  " + ", ".join(filter(None, _cells(row))), style="dim", highlight=False)
+            cells = row.figure, row.value, f"{row.ratio:.3g}", row.reference, row.target
+            table.add_row(*cells)
+            console.print("  " + ", ".join(filter(None, cells)), style="dim", highlight=False)
     console.print(table)
-
-
-def _cells(row: Row) -> tuple[str, ...]:
-    shown = "" if row.ratio is None else f"{row.ratio:.3f}" if row.ratio < 0.1 else f"{row.ratio:.2f}"
-    return row.figure, row.value, shown, row.reference, row.target
 
 
 if __name__ == "__main__":

@@ -3,15 +3,14 @@
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import replace
-from statistics import median
 
 import numpy as np
 import pybullet
 from mujoco import mjtState
 from mujoco import rollout as library
 
-from benchmarks.measure import Row, rates, ratio
-from gaplab.services.core.arrays import Genomes, Parameters
+from benchmarks.measure import Row, compared
+from gaplab.services.core.arrays import Genomes
 from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
@@ -28,7 +27,7 @@ from gaplab.services.specs.simulation import Simulation
 
 ROBOT = Quadruped()
 TUNED = ("static_friction", "dynamic_friction", "restitution")
-SWITCHING, EQUAL = np.array([[1.0, 0.8, 0.0]]), np.array([[0.8, 0.8, 0.0]])
+SWITCHING = np.array([[1.0, 0.8, 0.0]])
 GENOMES, MANY = 12, 96
 """Genomes of a round, and of a batch: enough to keep two threads busy to the end."""
 STEPS = 5_000  # of evolution in a round
@@ -38,17 +37,12 @@ Work = Callable[[], int]
 PYBULLET = "PyBullet, static ≠ dynamic friction (stick-slip switching)"
 COMPARED = (
     (PYBULLET, "PyBullet, bare loop of steps", "≥ 0.85"),
-    ("PyBullet, static = dynamic friction", "PyBullet, bare loop of steps", "≥ 0.93"),
-    ("PhysX", "PhysX, bare loop of steps", "≥ 0.85"),
     ("PhysX", PYBULLET, ""),
     ("MuJoCo, one genome a call", PYBULLET, "≥ 5"),
     (f"MuJoCo, {MANY} genomes a call", PYBULLET, "≥ 5"),
-    ("MuJoCo without Simulate, one motion a call", "bare mujoco.rollout", "≥ 0.9"),
     (f"MuJoCo, {MANY} genomes a call", "bare mujoco.rollout", "≥ 0.9"),
     ("the same on 2 threads", "bare mujoco.rollout on 2", "≥ 0.9"),
     ("the same on 2 threads", f"MuJoCo, {MANY} genomes a call", "cores"),
-    ("PyBullet, with readings of sensors", PYBULLET, "≥ 0.97"),
-    ("MuJoCo, with readings of sensors", "MuJoCo, one genome a call", "≥ 0.97"),
     ("a step of the paper's evolution, without physics", PYBULLET, "≥ 100"),
 )
 """What is measured, what it is compared with, and the ratio that it should have."""
@@ -60,21 +54,15 @@ def genomes(count: int = GENOMES) -> Genomes:
     return drawn
 
 
-def simulation(engine: Engine | None = None) -> Simulation:
-    """Return the quadruped with the paper's three tunables, by default in PyBullet."""
-    return Simulation(ROBOT, engine or PyBullet(), [tunables[name]() for name in TUNED])
+def simulation(engine: Engine) -> Simulation:
+    """Return the quadruped with the paper's three tunables in an engine."""
+    return Simulation(ROBOT, engine, [tunables[name]() for name in TUNED])
 
 
-def through_simulate(engine: Engine, at: Parameters = SWITCHING, count: int = GENOMES, *, batch: bool = False) -> Work:
+def through_simulate(engine: Engine, count: int = GENOMES, *, batch: bool = False) -> Work:
     """Return work: rollouts through `Simulate`, one genome a call, as the paper's evolution does, or all in one."""
     simulate, drawn = simulation(engine), genomes(count)
-    return lambda: sum(simulate(each, at).size for each in ([drawn] if batch else drawn[:, None]))
-
-
-def with_readings(engine: Engine, count: int) -> Work:
-    """Return work: rollouts through `Simulate` that sensors read too, one genome a call."""
-    simulate, drawn = simulation(engine), genomes(count)
-    return lambda: len([simulate.sense(each, SWITCHING) for each in drawn[:, None]])
+    return lambda: sum(simulate(each, SWITCHING).size for each in ([drawn] if batch else drawn[:, None]))
 
 
 def evolution() -> int:
@@ -104,26 +92,6 @@ def bare_pybullet() -> Work:
     return work
 
 
-def bare_physx() -> Work:
-    """Return work: `PhysxCpuSystem.step` in a loop, with new drive targets at pulse edges only."""
-    scene = PhysX()._scenes[ROBOT.world]
-    system, joints, start = scene._system, scene.robot.joints, scene._initial
-    scene.start(ROBOT.world)
-    plans = [edges(open_loop(ROBOT.motion(genome))) for genome in genomes()]
-
-    def work() -> int:
-        for commands, steps in plans:
-            system.unpack(start)
-            for step in range(steps):
-                for actuator, target in commands.get(step, ()):
-                    joints[actuator].set_drive_target(target)
-                system.step()
-            scene.articulation.root_pose.p.sum()
-        return len(plans)
-
-    return work
-
-
 def bare_mujoco(threads: int) -> Work:
     """Return work: `mujoco.rollout` of the same motions, model and contact law, with precomputed inputs."""
     engine = MuJoCo(MuJoCo.Options(threads=threads))
@@ -143,12 +111,6 @@ def bare_mujoco(threads: int) -> Work:
     return work
 
 
-def mujoco_alone() -> Work:
-    """Return work: rollouts by MuJoCo without `Simulate`, one precomputed motion a call."""
-    engine, motions = MuJoCo(), [open_loop(ROBOT.motion(genome)) for genome in genomes(MANY)]
-    return lambda: len([engine.rollout(ROBOT.world, motion) for motion in motions])
-
-
 def edges(motion: Motion) -> tuple[dict[int, list[tuple[int, float]]], int]:
     """Return the new targets of motors by step, and the number of steps."""
     commands: dict[int, list[tuple[int, float]]] = defaultdict(list)
@@ -166,22 +128,13 @@ def rows(rounds: int) -> list[Row]:
     competitors = {
         "PyBullet, bare loop of steps": bare_pybullet(),
         PYBULLET: through_simulate(PyBullet()),
-        "PyBullet, static = dynamic friction": through_simulate(PyBullet(), EQUAL),
         "MuJoCo, one genome a call": through_simulate(MuJoCo(), count=MANY),
-        "MuJoCo without Simulate, one motion a call": mujoco_alone(),
         f"MuJoCo, {MANY} genomes a call": through_simulate(MuJoCo(), count=MANY, batch=True),
         "bare mujoco.rollout": bare_mujoco(1),
         "the same on 2 threads": through_simulate(on_two, count=MANY, batch=True),
         "bare mujoco.rollout on 2": bare_mujoco(2),
-        "PyBullet, with readings of sensors": with_readings(PyBullet(), GENOMES),
-        "MuJoCo, with readings of sensors": with_readings(MuJoCo(), MANY),
         "a step of the paper's evolution, without physics": evolution,
     }
     if PhysX.available():
-        competitors |= {"PhysX, bare loop of steps": bare_physx(), "PhysX": through_simulate(PhysX())}
-    measured = rates(competitors, rounds)
-    return [
-        Row(one, f"{1e3 / median(measured[one]):.2f} ms each", ratio(measured[one], measured[to]), to, target)
-        for one, to, target in COMPARED
-        if one in measured
-    ]
+        competitors["PhysX"] = through_simulate(PhysX())
+    return compared(competitors, COMPARED, rounds)

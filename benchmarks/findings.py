@@ -27,13 +27,10 @@ from gaplab.services.store.session import Store
 
 WIDTH_IN = 7.2
 
-Imported = dict[str, str]
-"""Labels of experiments by their ids: the study's file, and the strategy."""
 
-
-def imported(store: Store, archives: Sequence[Path]) -> Imported:
-    """Import archives, and return the labels of their experiments."""
-    labels: Imported = {}
+def imported(store: Store, archives: Sequence[Path]) -> dict[str, str]:
+    """Import archives; return labels of their experiments by their ids: the study's file, and the strategy."""
+    labels = dict[str, str]()
     for path in archives:
         ids = import_file(store, path).experiments
         with store.reading() as session:
@@ -96,7 +93,7 @@ def _found(best: Sequence[BestSimulator], truth: FloatArray, extent: FloatArray)
     return Found(away, (upper - lower) / extent, ((lower <= truth) & (truth <= upper)).astype(float))
 
 
-def tuned_table(store: Store, labels: Imported) -> Table:
+def tuned_table(store: Store, labels: dict[str, str]) -> Table:
     """Return the tunables of the best simulators, and their error per sample: mean and SD over repetitions.
 
     Here reality may have other coefficients than the simulators, or none.
@@ -118,7 +115,7 @@ def _errors(tuned: TunedSimulators, iteration: int) -> FloatArray:
     return np.array([tuned.error.per_sample(total / count) for total, count in pairs if total is not None and count])
 
 
-def distance_table(store: Store, labels: Imported) -> Table:
+def distance_table(store: Store, labels: dict[str, str]) -> Table:
     """Return medians over repetitions of the distances, and the coverage of intervals."""
     columns = "study", "after", "n", "together", "each tunable", "truth in interval", "each", "median width"
     table = Table(*columns, title="Median distance from the truth, as a share of the bounds; 95 % intervals")
@@ -128,7 +125,7 @@ def distance_table(store: Store, labels: Imported) -> Table:
     return table
 
 
-def fitness_table(store: Store, labels: Imported) -> Table:
+def fitness_table(store: Store, labels: dict[str, str]) -> Table:
     """Return recorded fitness in reality after each number of real-world evaluations."""
     table = Table("study", "after", "n", "mean", "SD", title="Recorded fitness in reality")
     for curve in curves(store, list(labels)):
@@ -138,7 +135,7 @@ def fitness_table(store: Store, labels: Imported) -> Table:
     return table
 
 
-def difference_table(store: Store, labels: Imported, counts: Sequence[int]) -> Table:
+def difference_table(store: Store, labels: dict[str, str], counts: Sequence[int]) -> Table:
     """Return the differences of all pairs after each number of evaluations, and of their means over all of them.
 
     Each p has Holm's correction over the pairs of a row's number or range.

@@ -11,11 +11,12 @@ import json
 import os
 import platform
 import random
-import threading
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from http.client import HTTPConnection, HTTPException
 from pathlib import Path
 from statistics import median, quantiles
@@ -66,13 +67,10 @@ class Clients:
 
     def run(self) -> "Clients":
         """Run all clients to their end."""
-        clients = [threading.Thread(target=self._read, args=(number,)) for number in range(READERS)]
-        clients += [threading.Thread(target=self._submit) for _ in range(SUBMITTERS)]
-        clients += [threading.Thread(target=self._follow) for _ in range(STREAMS)]
-        for client in clients:
-            client.start()
-        for client in clients:
-            client.join()
+        work: list[Callable[[], None]] = [partial(self._read, number) for number in range(READERS)]
+        work += [self._submit] * SUBMITTERS + [self._follow] * STREAMS
+        with ThreadPoolExecutor(len(work)) as clients:
+            list(clients.map(lambda client: client(), work))
         return self
 
     def told(self, kind: str) -> str:

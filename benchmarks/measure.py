@@ -11,9 +11,9 @@ class Row(NamedTuple):
 
     figure: str
     value: str
-    ratio: float | None = None
-    reference: str = ""
-    target: str = ""
+    ratio: float
+    reference: str
+    target: str
 
 
 def rates(competitors: dict[str, Callable[[], int]], rounds: int) -> dict[str, list[float]]:
@@ -28,6 +28,16 @@ def rates(competitors: dict[str, Callable[[], int]], rounds: int) -> dict[str, l
     return measured
 
 
-def ratio(ours: Sequence[float], theirs: Sequence[float]) -> float:
-    """Return the median of the ratios in each round."""
-    return median(our / their for our, their in zip(ours, theirs, strict=True))
+def compared(
+    competitors: dict[str, Callable[[], int]], pairs: Sequence[tuple[str, str, str]], rounds: int
+) -> list[Row]:
+    """Return the median of the ratios in each round of pairs of competitors, whose third part is the target.
+
+    Pairs of which a competitor is missing are left out.
+    """
+    measured, rows = rates(competitors, rounds), []
+    for one, to, target in pairs:
+        if {one, to} <= measured.keys():
+            ratio = median(ours / theirs for ours, theirs in zip(measured[one], measured[to], strict=True))
+            rows.append(Row(one, f"{median(measured[one]):.4g} a second", ratio, to, target))
+    return rows

@@ -29,7 +29,6 @@ from gaplab.workers.pool import LEAST_S
 CORES = (2, 16, 64, 1_000)
 FIGURE_4 = StudySpec(direct_repetitions=100)
 LEND_S = 0.001  # to send work to another core and receive the result; measured: 0.4 to 1 ms
-
 TURNS, MANY = 12, 20
 
 

@@ -7,12 +7,11 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
-from statistics import median
 from tempfile import TemporaryDirectory
 from time import sleep
 from typing import Any
 
-from benchmarks.measure import Row, rates, ratio
+from benchmarks.measure import Row, compared
 from gaplab.api.clients.client import Client
 from gaplab.api.process.local_service import start_service
 from gaplab.schemas.spec import ExperimentSpec
@@ -30,6 +29,12 @@ MANY: Mapping[str, Any] = {
 SHARED = {"controller_evaluations": 160, "selection_evaluations": 160, "simulator_evaluations": 40}
 ONE = {**MANY, "strategy": "informative", "repetitions": 1, "budget": SHARED}
 """Its selection has nine tenths of the rollouts, 20 a newcomer, as at the paper's budgets."""
+COMPARED = (
+    ("8 repetitions in two processes", "8 repetitions on one core", "2 if cores are free"),
+    ("8 repetitions through HTTP, Ray, SQLite", "8 repetitions in two processes", "≥ 0.93"),
+    ("8 repetitions through HTTP, Ray, SQLite", "8 repetitions on one core", "≥ 1.85"),
+    ("one repetition of informative through them", "one on one core", "≥ 1.7"),
+)
 CORES = 2
 LOOK_S = 0.5
 """Interval between looks at the progress: each takes 10 ms of the cores that the experiment needs."""
@@ -68,22 +73,10 @@ def rows(rounds: int) -> list[Row]:
     numbers = range(MANY["repetitions"])
     with service() as client, get_context("spawn").Pool(CORES) as bare:
         competitors = {
-            "one core": lambda: sum(map(alone, numbers)),
-            "two processes": lambda: sum(bare.map(alone, numbers, chunksize=1)),
-            "service": through(client, MANY),
-            "one repetition, one core": lambda: alone(0, ONE),
-            "one repetition, service": through(client, ONE),
+            "8 repetitions on one core": lambda: sum(map(alone, numbers)),
+            "8 repetitions in two processes": lambda: sum(bare.map(alone, numbers, chunksize=1)),
+            "8 repetitions through HTTP, Ray, SQLite": through(client, MANY),
+            "one on one core": lambda: alone(0, ONE),
+            "one repetition of informative through them": through(client, ONE),
         }
-        measured = rates(competitors, rounds)
-
-    def row(figure: str, ours: str, theirs: str, target: str) -> Row:
-        return Row(
-            figure, f"{median(measured[ours]):.1f} rollouts/s", ratio(measured[ours], measured[theirs]), theirs, target
-        )
-
-    return [
-        row("8 repetitions, two processes", "two processes", "one core", "2 if cores are free"),
-        row("8 repetitions through HTTP, Ray, SQLite", "service", "two processes", "≥ 0.93"),
-        row("8 repetitions through HTTP, Ray, SQLite", "service", "one core", "≥ 1.85"),
-        row("one repetition of informative", "one repetition, service", "one repetition, one core", "≥ 1.7"),
-    ]
+        return compared(competitors, COMPARED, rounds)

@@ -48,13 +48,9 @@ def main() -> None:
     parser = ArgumentParser(prog="python -m benchmarks.reproduction", description=__doc__)
     several = "archives of studies, in the order of the page; commas between those of one study"
     once = "archive of a control, repeatable; it may be a study as well"
+    output = f"file of the first page; beside it are {CLAIMS_PAGE} and the pictures in figures/"
     parser.add_argument("archives", nargs="+", type=archives_of, help=several)
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        help=f"file of the first page; beside it are {CLAIMS_PAGE} and the pictures in figures/",
-    )
+    parser.add_argument("-o", "--output", type=Path, help=output)
     parser.add_argument("--control", action="append", type=archives_of, default=[], help=once)
     arguments = parser.parse_args()
     every = list(dict.fromkeys([*arguments.archives, *arguments.control]))

@@ -86,21 +86,22 @@ def numbers(studies: Sequence[Study], others: Sequence[Study]) -> dict[str, str]
     def each(of: Callable[[Study], str]) -> str:
         return "; ".join(f"{of(study)} in {ENGINES.get(study.reality, study.reality)}" for study in studies)
 
-    told = {f"spread_{kind}": listed([_spread(kind, study) for study in studies]) for kind in results.KINDS}
+    spreads = {kind: [results.spread(study, kind).partition(" ")[0] for study in studies] for kind in results.KINDS}
+    told = {f"spread_{kind}": listed(each) for kind, each in spreads.items()}
     told |= {f"means_{kind}": each(partial(_means, kind)) for kind in results.KINDS}
-    samples = [(study, found.told(".2f")) for study in others if (found := _one_sample(study))]
+    samples = [
+        f"{found.told('.2f')} in {study.archives[0].stem}, {number_of('repetition', study.of([BEST])[0].repetitions)}"
+        for study in others
+        if (found := _one_sample(study))
+    ]
     return told | {
         "engines": listed([ENGINES.get(study.reality, study.reality) for study in studies]),
         "counts": each(_counts),
         "over": each(_over),
         "alone": each(_alone),
-        "one_sample": "; ".join(f"{mean} in {_label(study)}, {_repetitions(study)}" for study, mean in samples),
+        "one_sample": "; ".join(samples),
         "origins": "; ".join(_origins(study) for study in (*studies, *others)),
     }
-
-
-def _spread(kind: str, study: Study) -> str:
-    return results.spread(study, kind).partition(" ")[0]
 
 
 def _means(kind: str, study: Study) -> str:
@@ -118,10 +119,6 @@ def _alone(study: Study) -> str:
     return f"{min(means):.2f} to {max(means):.2f}"
 
 
-def _repetitions(study: Study) -> str:
-    return number_of("repetition", study.of([BEST])[0].repetitions)
-
-
 def _counts(study: Study) -> str:
     """Return after which numbers of samples a lead of transferred controllers alone is shown."""
     found = {count: results.lead(study, "transferred", count, count) for count in range(1, study.last + 1)}
@@ -129,10 +126,6 @@ def _counts(study: Study) -> str:
     return f"after {listed(counts)}" if counts else "nowhere"
 
 
-def _label(study: Study) -> str:
-    return study.archives[0].stem
-
-
 def _origins(study: Study) -> str:
     known, changed, before = (sum(each) for each in zip(*(arm.origins for arm in study.arms), strict=True))
-    return f"{_label(study)} {before} and {changed} of {known}"
+    return f"{study.archives[0].stem} {before} and {changed} of {known}"

@@ -48,7 +48,7 @@ def best_of(study: Study) -> list[str]:
 def _ratios(study: Study, arm: Arm, counts: Sequence[int]) -> tuple[str, ...]:
     each = [arm.values(count, count) / study.unit for count in counts]
     sizes = sorted({len(values) for values in each} - {0})
-    told = " to ".join(map(str, [sizes[0], sizes[-1]] if len(sizes) > 1 else sizes or [0]))
+    told = " to ".join(map(str, dict.fromkeys([sizes[0], sizes[-1]] if sizes else [0])))
     return f"{spoken(arm.read.name)} ({told})", *(_mean(values, spread=True) for values in each)
 
 
@@ -124,16 +124,12 @@ def leads(study: Study) -> str:
     """Return the lead of simulated fit by number of samples, and over all from the third on, for each kind."""
     counts = range(study.last + 1)
     spans = [(count, count) for count in counts] + [(FIRST, study.last)] * (study.last >= FIRST)
-    head = (
-        "lead",
-        *map(str, counts),
-        *([f"{FIRST} to {study.last}", "ratio of deviations"] if len(spans) > len(counts) else []),
-    )
+    over = [f"{FIRST} to {study.last}", "ratio of deviations"] if len(spans) > len(counts) else []
     rows = []
     for kind, words in KINDS.items():
         cells = [found.told() if (found := lead(study, kind, *span)) else MISSING for span in spans]
-        rows.append((words, *cells, *([spread(study, kind)] if len(spans) > len(counts) else [])))
-    return table(head, rows)
+        rows.append((words, *cells, *([spread(study, kind)] if over else [])))
+    return table(("lead", *map(str, counts), *over), rows)
 
 
 def both_sides(study: Study, kind: str, first: int, last: int) -> list[list[FloatArray]]:

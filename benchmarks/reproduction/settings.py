@@ -27,17 +27,6 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
 
 
-def in_words(study: Study) -> str:
-    """Return robot, engines, budget and repetitions of a study in words."""
-    spec = study.spec
-    search, selection = spec.budget.controller_evaluations, spec.budget.selection_evaluations
-    selections = "" if search == selection else f", samples from searches of {selection:,} evaluations"
-    return (
-        f"{spec.robot.name}: {spec.engine.name} for a reality in {study.reality}, budget {spec.budget.preset}, "
-        f"controllers by {spec.controller_optimizer.name}{selections}, repetitions: {_repetitions(study)}"
-    )
-
-
 def row(study: Study, links: Sequence[str]) -> tuple[str, ...]:
     """Return what a study is, after links to its archives; the first has its label in this document."""
     spec, budget = study.spec, study.spec.budget
@@ -68,20 +57,13 @@ def _repetitions(study: Study) -> str:
     counts = [(arm.repetitions, arm.spec.repetitions) for arm in study.arms]
     usual, planned = max(counts, key=lambda count: (counts.count(count), count))
     unusual = (arm for arm in study.arms if arm.repetitions != usual or arm.read.state is not State.COMPLETED)
-    others = "; ".join(_exception(arm, planned) for arm in unusual)
-    return _of_planned(usual, planned) + (f" ({others})" if others else "")
-
-
-def _exception(arm: Arm, planned: int) -> str:
-    """Return the repetitions of an experiment, where most of its study are planned with this number."""
-    state = "" if arm.read.state is State.COMPLETED else f", {arm.read.state.value}"
-    own = arm.spec.repetitions
-    count = f"{arm.repetitions}" if own == planned else _of_planned(arm.repetitions, own)
-    return f"{spoken(arm.read.name).lower()} {count}{state}"
-
-
-def _of_planned(count: int, planned: int) -> str:
-    return f"{count} of {planned}" if count < planned else f"{count}"
+    others = []
+    for arm in unusual:
+        own, state = arm.spec.repetitions, "" if arm.read.state is State.COMPLETED else f", {arm.read.state.value}"
+        short = f" of {own}" if own != planned and arm.repetitions < own else ""
+        others.append(f"{spoken(arm.read.name).lower()} {arm.repetitions}{short}{state}")
+    told = f"{usual} of {planned}" if usual < planned else f"{usual}"
+    return f"{told} ({'; '.join(others)})" if others else told
 
 
 def _weightiest(arm: Arm) -> str:

@@ -154,13 +154,9 @@ def read_study(store: Store, archives: Sequence[Path]) -> Study:
     times = Counter(arm.strategy for arm in arms)
     names = {arm.read.id: arm.strategy if times[arm.strategy] == 1 else arm.read.name for arm in arms}
     named = [replace(arm, read=arm.read.model_copy(update={"name": names[arm.read.id]})) for arm in arms]
-    return Study(
-        archives,
-        parts[0][0],
-        named,
-        [curve.model_copy(update={"name": names[curve.experiment]}) for curve in curves(store, list(names))],
-        curves(store, list(names), Fitness.TRANSFERRED),
-    )
+    recorded, transferred = (curves(store, list(names), kind) for kind in (Fitness.RECORDED, Fitness.TRANSFERRED))
+    drawn = [curve.model_copy(update={"name": names[curve.experiment]}) for curve in recorded]
+    return Study(archives, parts[0][0], named, drawn, transferred)
 
 
 def _part(store: Store, archive: Path) -> tuple[str, tuple[ExperimentRead, ...]]:
@@ -189,23 +185,15 @@ def _arms(store: Store, reads: Sequence[ExperimentRead]) -> list[Arm]:
             samples[id_][number, iteration] = np.nan if value is None else value
         for read in reads:
             spec = spec_of(experiments.get_experiment(session, read.id).spec)
-            uses = provenance.uses(session, read.id)
+            uses = [(use.repetitions, use.provenance) for use in provenance.uses(session, read.id)]
             engine = spec.reality.engine if read.direct else spec.engine
             cores = int(engine.options.get("threads", 1)) if engine else 1
-            arm = Arm(
-                read=read,
-                spec=spec,
-                recorded=fitness[Fitness.RECORDED][read.id],
-                transferred=fitness[Fitness.TRANSFERRED][read.id],
-                chances=fitness[Fitness.EQUAL_CHANCES][read.id],
-                samples=samples[read.id],
-                tuned=tuned[read.id],
-                core_hours=work[read.id].seconds * cores / 3600,
-                origins=(
-                    sum(use.repetitions for use in uses),
-                    sum(use.repetitions for use in uses if use.provenance.dirty),
-                    sum(use.repetitions for use in uses if CODE not in use.provenance.libraries),
-                ),
+            origins = (
+                sum(count for count, _ in uses),
+                sum(count for count, code in uses if code.dirty),
+                sum(count for count, code in uses if CODE not in code.libraries),
             )
-            arms.append(arm)
+            recorded, transferred, chances = (fitness[kind][read.id] for kind in Fitness)
+            seen = recorded, transferred, chances, samples[read.id]
+            arms.append(Arm(read, spec, *seen, tuned[read.id], work[read.id].seconds * cores / 3600, origins))
     return arms

@@ -76,14 +76,11 @@ def _judged(examined: Examined) -> Judged:
     elif len(shown) < len(evidence):
         why = f"{_undecided([each for each in evidence if each not in shown])} {lacking}".strip()
     elif not lacking:
-        verdict, why = _reproduced([each for each in evidence if significant(each.tested.smaller) or each in too_small])
+        smaller = [each for each in evidence if significant(each.tested.smaller) or each in too_small]
+        verdict, why = Verdict.REPRODUCED, "Every statement is shown."
+        if smaller:
+            verdict, why = Verdict.SMALLER, f"{why[:-1]}, but smaller than in the paper: {_some(smaller)}."
     return Judged(verdict, examined, _careful(evidence, shown, refuted), why)
-
-
-def _reproduced(smaller: Sequence[Evidence]) -> tuple[Verdict, str]:
-    if not smaller:
-        return Verdict.REPRODUCED, "Every statement is shown."
-    return Verdict.SMALLER, f"Every statement is shown, but smaller than in the paper: {_some(smaller)}."
 
 
 def significant(p: float | None) -> bool:
