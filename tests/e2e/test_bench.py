@@ -59,6 +59,8 @@ def driving(service: LocalService, experiment: str, journal: Path, **settings: A
             journal,
             "--lease-s",
             "2",
+            "--limit-s",
+            str(LONGEST_S),
         ],
         env=os.environ | {SETTINGS: json.dumps({"engine": "mujoco"} | settings), "GAPLAB_URL": service.url},
         cwd=journal.parent,
