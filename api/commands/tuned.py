@@ -41,7 +41,10 @@ def simulator(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Write the best tuned simulator as a robot file, or into the URDF or MJCF of the robot. It is compared before."""
+    """Write the best tuned simulator as a robot file, or into the URDF or MJCF of the robot. It is compared before.
+
+    A .xml without --from is an MJCF of the simulator for MuJoCo alone, which has one friction and no restitution.
+    """
     from gaplab.services.core import robot_library
     from gaplab.services.core.stored_specs import spec_of
     from gaplab.services.plugins import folders
@@ -54,16 +57,16 @@ def simulator(
     if best is None:
         raise CommandError(f"{id} has no tuned simulators yet", Exit.CONFLICT)
     try:
-        written, distance_m = _written(id, spec, best, (output, original), partial=partial)
+        written, *distances_m = _written(id, spec, best, (output, original), partial=partial)
     except InvalidRobot as error:
         typer.echo(f"gaplab: {output} was not written:", err=True)
         for reason in error.reasons:
             typer.echo(f"  - {reason}", err=True)
         raise typer.Exit(Exit.INVALID) from error
     if as_json:
-        print_json(_facts(output, best, written, distance_m))
+        print_json(_facts(output, best, written, distances_m))
     else:
-        for line in _lines(output, best, written, distance_m):
+        for line in _lines(output, best, written, distances_m):
             typer.echo(line)
 
 
@@ -74,11 +77,11 @@ def _written(
     files: tuple[Path, Path | None],
     *,
     partial: bool,
-) -> tuple["WrittenFile", float]:
-    """Write the file; return what is in it, and the largest distance in rollouts."""
+) -> tuple["WrittenFile", float, float | None]:
+    """Write the file; return what is in it, and the largest distances in rollouts, here and in MuJoCo alone."""
     from gaplab.services.core.arrays import frozen
-    from gaplab.services.robots.comparing import check_rollouts
-    from gaplab.services.robots.writing import Tuning, write_json, write_xml
+    from gaplab.services.robots.comparing import check_rollouts, plain_distance_m
+    from gaplab.services.robots.writing import Tuning, write_json, write_plain, write_xml
     from gaplab.services.specs.assembly import edits_of, engine_of
     from gaplab.services.specs.robots import robot_of
     from gaplab.services.specs.simulation import Simulation
@@ -97,10 +100,16 @@ def _written(
 
     tuning = Tuning(file, tuned, (_headline(id, best), *comments), partial)
     if output.suffix.lower() == ".json":
-        return write_json(tuning, output, accept), max(distances)
-    if original is None:
-        raise InvalidRobot([f"{output.name} is a copy of the robot's file: give that with --from, or write a .json"])
-    return write_xml(tuning, original, output, accept), max(distances)
+        written = write_json(tuning, output, accept)
+    elif original is not None:
+        written = write_xml(tuning, original, output, accept)
+    elif output.suffix.lower() == ".xml":
+        written = write_plain(tuning, output)
+    else:
+        raise InvalidRobot(
+            [f"{output.name} is a copy of the robot's file: give that with --from, or write a .json or .xml"]
+        )
+    return written, max(distances), plain_distance_m(tuned, engine, file.usual_controller, file.usual_task)
 
 
 def _robot_file(spec: ResolvedSpec, robot: "Robot") -> "RobotFile":
@@ -127,24 +136,32 @@ def _comment(name: str, best: SimulatorRead, before: float, unit: str) -> str:
     return f"{name} = {best.parameters[name]:.6g}{unit}, {interval}; before {before:.6g}{unit}"
 
 
-def _facts(output: Path, best: SimulatorRead, written: "WrittenFile", distance_m: float) -> dict[str, Any]:
+def _facts(
+    output: Path, best: SimulatorRead, written: "WrittenFile", distances_m: Sequence[float | None]
+) -> dict[str, Any]:
     return {
         "file": str(output),
         "simulator": best,
         "written": list(map(str, written.changes)),
         "left_out": list(map(str, written.left_out)),
         "computed": list(map(str, written.computed)),
-        "largest_distance_m": distance_m,
+        "largest_distance_m": distances_m[0],
+        "plain_mujoco_distance_m": distances_m[1],
     }
 
 
-def _lines(output: Path, best: SimulatorRead, written: "WrittenFile", distance_m: float) -> Iterator[str]:
+def _lines(
+    output: Path, best: SimulatorRead, written: "WrittenFile", distances_m: Sequence[float | None]
+) -> Iterator[str]:
     yield f"repetition {best.repetition}, iteration {best.iteration}, error {best.error:.4g} per sample"
     yield from (f"  {change}" for change in written.changes)
     yield from (f"  not in the file: {change}" for change in written.left_out)
     yield from (f"  an import computes it: {change}" for change in written.computed)
     what = "with the values that are not in it, rollouts are" if written.left_out else "rollouts are"
-    yield f"Wrote {output}: in gaplab's engine, {what} within {distance_m:.2g} m of the tuned simulator's."
+    here, plain = distances_m
+    yield f"Wrote {output}: in gaplab's engine, {what} within {here:.2g} m of the tuned simulator's."
+    if plain is not None:
+        yield f"MuJoCo alone, with one friction and no restitution, differs by up to {plain:.2g} m within a second."
 
 
 @app.command(rich_help_panel=RESULTS)

@@ -5,7 +5,6 @@ import io
 import json
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
-from math import isfinite
 from typing import Any, TypeAlias
 from zipfile import ZipFile
 
@@ -14,7 +13,7 @@ import numpy as np
 from gaplab.schemas.records import SampleRead
 from gaplab.services.bench import motions
 from gaplab.services.core import robot_library, trace_tables
-from gaplab.services.core.arrays import frozen
+from gaplab.services.core.arrays import frozen, known
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.replay.process import RolloutProcess
@@ -23,6 +22,7 @@ from gaplab.services.replay.traces import expected_motion
 from gaplab.services.reports.html import render_html
 from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
 from gaplab.services.reports.outcome_page import MOST_SHOWN, outcome_report, verdict_sentences
+from gaplab.services.reports.plain_mujoco import plain_motion, tuned_mjcf
 from gaplab.services.reports.reproduction import spec_text, submitted
 from gaplab.services.results.files import entry_of
 from gaplab.services.store.models import AttachmentRow
@@ -47,9 +47,11 @@ samples.csv        all measurements, for `reality.samples` of another spec. gapl
 samples.json       the same for programs of yours, with repetition, iteration, operator and time, and with readings in
                    units of noise; `reality.samples` takes samples.csv
 robot.json         the robot file: `gaplab robot add robot.json` first, where samples and spec are used elsewhere.
-                   `gaplab simulator {id} -o tuned.urdf --from FILE` writes the tuned URDF or MJCF
+                   `gaplab simulator {id} -o tuned.urdf --from FILE` writes tuned values into its URDF or MJCF
+tuned.xml          the tuned simulator as an MJCF for MuJoCo alone, which has one friction and no restitution
 traces/            recordings that answered, by repetition, iteration, kind and repeat
-expected/          motion of each measured controller in the tuned simulator, and fitness.json, to compare with yours
+expected/          motion of each measured controller in the tuned simulator, and fitness.json, to compare with yours;
+                   plain_mujoco_m.json: how far, at most, it is from the motion of tuned.xml in MuJoCo alone
 spec.json          the spec; `gaplab submit spec.json` runs it again
 provenance.json    versions of everything that computed it
 
@@ -113,19 +115,25 @@ def _expected(outcome: ExperimentOutcome, process: RolloutProcess) -> Iterator[t
     """Yield the motion of measured controllers in the best tuned simulator, and fitness there; nothing if none runs."""
     if not (outcome.simulators and outcome.robot.world.bodies):
         return
-    spec, fitness = sent(outcome.spec), dict[str, float | None]()
+    spec, fitness, apart_m = sent(outcome.spec), dict[str, float | None](), dict[str, float | None]()
     parameters = tuple(outcome.simulators[0].parameters[ref.name] for ref in outcome.spec.tunables)
+    tuned = process.call(tuned_mjcf, spec, parameters, f"Tuned by gaplab: experiment {outcome.experiment.id}.")
+    yield from (("tuned.xml", text) for text in [tuned] if text)
     for each in outcome.measured[:MOST_SHOWN]:
         name = f"{each.repetition}-{each.iteration}-{each.kind.value}"
         try:
             times_s, poses, expected = process.call(expected_motion, spec, each.genome, parameters)
+            plain_m = process.call(plain_motion, spec, parameters, each.genome, times_s) if tuned else None
         except GaplabError:
             return
+        if plain_m is not None:
+            apart_m[name] = known(np.linalg.norm(plain_m - poses[:, :3], axis=1).max())
         text, header = io.StringIO(), ",".join(trace_tables.COLUMNS)
         np.savetxt(text, np.column_stack([times_s, poses]), "%.9g", ",", header=header, comments="")
-        fitness[name] = expected if isfinite(expected) else None
+        fitness[name] = known(expected)
         yield f"expected/{name}.csv", text.getvalue()
     yield "expected/fitness.json", _json(fitness)
+    yield from (("expected/plain_mujoco_m.json", _json(found)) for found in [apart_m] if found)
 
 
 def _files(outcome: ExperimentOutcome, readings: Readings) -> Iterator[tuple[str, str]]:

@@ -7,12 +7,15 @@ import numpy as np
 from numpy.random import default_rng
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.arrays import FloatArray, frozen, known
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.errors import InvalidRobot
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.tasks import tasks
 from gaplab.services.core.world import World
+from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.engines.mujoco.plain import plain_positions
 
 ROLLOUTS = 5
 COMPARED_S = frozen(np.arange(1, 11) / 10)
@@ -43,10 +46,7 @@ def check_rollouts(first: World, second: World, engine: Engine, controller: Plug
         InvalidRobot: the distance is larger than rounding explains, or the physics fails in one of the worlds alone, or
             in all rollouts.
     """
-    driver = controllers.create(controller)
-    driver.prepare(first, tasks.create(task).observe_s)
-    genomes = driver.space.draw(ROLLOUTS, default_rng(0))
-    motions: Any = [driver.motion(genome).observed_at(COMPARED_S) for genome in genomes]  # all of one kind
+    motions = _motions(first, controller, task)
     paths = [engine.rollouts([world], motions).positions_m for world in (first, second)]
     if not np.array_equal(np.isnan(paths[0]), np.isnan(paths[1])):
         raise InvalidRobot(["the physics fails in the tuned world or in that of the new file, but not in both"])
@@ -60,6 +60,26 @@ def check_rollouts(first: World, second: World, engine: Engine, controller: Plug
             far = f"rollouts in the world of the new file are up to {largest:.3g} m from those in the tuned one"
             raise InvalidRobot([f"{far}; permitted: at most {permitted:.3g} m"])
     return largest
+
+
+def plain_distance_m(world: World, engine: Engine, controller: PluginRef, task: PluginRef) -> float | None:
+    """Return the largest distance of the same rollouts from those in MuJoCo alone, m.
+
+    None if the physics fails in either, if the controller observes while it acts, or without MuJoCo.
+    """
+    motions = _motions(world, controller, task)
+    if not engines["mujoco"].available() or not isinstance(motions[0], Motion):
+        return None
+    here = engine.rollouts([world], motions).positions_m[:, 0]
+    return known(np.linalg.norm([plain_positions(world, motion) for motion in motions] - here, axis=-1).max())
+
+
+def _motions(world: World, controller: PluginRef, task: PluginRef) -> Any:  # noqa: ANN401 - all of one kind
+    """Return the motions of the same genomes, observed at `COMPARED_S`."""
+    driver = controllers.create(controller)
+    driver.prepare(world, tasks.create(task).observe_s)
+    genomes = driver.space.draw(ROLLOUTS, default_rng(0))
+    return [driver.motion(genome).observed_at(COMPARED_S) for genome in genomes]
 
 
 def _distance_m(first: FloatArray, second: FloatArray) -> float:

@@ -10,6 +10,7 @@ from typing import Any, NoReturn, TypeAlias, TypeVar, cast
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot_file
 from gaplab.services.core.world import World
+from gaplab.services.engines.mujoco.plain import LOST, mjcf_of
 from gaplab.services.robots.bodies import Bodies
 from gaplab.services.robots.changes import Change, Place, changes
 from gaplab.services.robots.importing import import_robot
@@ -23,6 +24,8 @@ from gaplab.services.robots.xml import decoded
 T = TypeVar("T")
 
 _TUNED = "_tuned"
+
+NOT_HERE = "not in this file: {}"
 
 _OF_BODIES = {"mass_kg", "center_m", "inertia"}
 _COMPUTED = {"start_height_m", "swing", "motor.kp", "motor.kd", "motor.max_torque_nm"}
@@ -105,6 +108,20 @@ def write_json(tuning: Tuning, output: Path, accept: Accept) -> WrittenFile:
     return WrittenFile(tuple(changes(tuning.robot.world, tuning.world)), (), (), again)
 
 
+def write_plain(tuning: Tuning, output: Path) -> WrittenFile:
+    """Write the tuned world as an MJCF for MuJoCo alone.
+
+    Raises:
+        InvalidRobot: a tuned value has no place in it, and `partial` is false.
+    """
+    found = changes(tuning.robot.world, tuning.world)
+    lost = tuple(each for each in found if each.place[2].startswith(LOST))
+    if lost and not tuning.partial:
+        _refuse(lost, {}, "MJCF of MuJoCo alone")
+    output.write_text(mjcf_of(tuning.world, [*tuning.comments, *map(NOT_HERE.format, lost)]), encoding="utf-8")
+    return WrittenFile(tuple(each for each in found if each not in lost), lost, (), tuning.world)
+
+
 def write_xml(tuning: Tuning, original: Path, output: Path, accept: Accept) -> WrittenFile:
     """Write a copy of the file that a robot was imported from, with tuned values.
 
@@ -134,7 +151,7 @@ def write_xml(tuning: Tuning, original: Path, output: Path, accept: Accept) -> W
         _refuse(left_out, given, "URDF" if source.is_urdf else "MJCF")
     if output.absolute().parent != original.absolute().parent:
         document.move(original.absolute().parent, output.absolute().parent)
-    lines = [*tuning.comments, *(f"not in this file: {change}" for change in left_out)]
+    lines = [*tuning.comments, *map(NOT_HERE.format, left_out)]
     beside = output.with_name(f".{output.stem}.unchecked{output.suffix}")
     beside.write_text(document.text(lines), encoding="utf-8", newline="")
     try:

@@ -27,7 +27,7 @@ from tests.experiments import run
 from tests.robot_texts import MJCF
 from tests.unit.test_robot_import import path_of
 
-pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco")
 BEST = (0.9, 0.7, 0.1)
 
 
@@ -190,6 +190,21 @@ def test_the_best_simulator_is_written_as_a_robot_file(gaplab: Gaplab, tuned: st
     assert len(facts["written"]) == 3
 
 
+def test_the_best_simulator_is_written_for_mujoco_alone_with_the_distance_from_it(
+    gaplab: Gaplab, tuned: str, tmp_path: Path
+) -> None:
+    output = tmp_path / "tuned.xml"
+
+    refused = gaplab("simulator", tuned, "-o", str(output))
+    said = gaplab("simulator", tuned, "-o", str(output), "--partial")
+
+    assert (refused.code, said.code) == (5, 0)
+    assert "restitution 0 → 0.1: the MJCF of MuJoCo alone has no place for it" in refused.err
+    assert mujoco.MjModel.from_xml_path(str(output)).nu == 12
+    assert "not in this file: material.restitution 0 → 0.1" in output.read_text()
+    assert "MuJoCo alone, with one friction and no restitution, differs by up to " in said.out
+
+
 def test_a_file_that_cannot_be_written_is_refused_with_every_reason(
     gaplab: Gaplab, tuned: str, sqlite_store: Store, tmp_path: Path
 ) -> None:
@@ -198,7 +213,7 @@ def test_a_file_that_cannot_be_written_is_refused_with_every_reason(
     foreign = gaplab("simulator", tuned, "-o", str(tmp_path / "tuned.urdf"), "--from", urdf)
 
     assert (alone.code, foreign.code) == (5, 5)
-    assert "give that with --from, or write a .json" in alone.err
+    assert "give that with --from, or write a .json or .xml" in alone.err
     assert "quadruped was not imported from a file: write robot.json instead" in foreign.err
     assert not list(tmp_path.iterdir())
 

@@ -81,6 +81,7 @@ def test_everything_is_in_the_zip_and_can_be_used(store: Store, client: Client, 
         *("page.html", "README.txt", "verdict.txt", "spec.json", "provenance.json", "controller.json"),
         *("samples.csv", "samples.json", "motion.csv", "motion.json", "motion.ros2.yaml", "simulator.json"),
         *("expected/0-0-probe.csv", "expected/0-1-sample.csv", "expected/fitness.json"),
+        *("tuned.xml", "expected/plain_mujoco_m.json"),
     }
     controller = json.loads(found["controller.json"])
     assert (controller["fitness"], controller["unit"], controller["kind"]) == (0.4, "m/s", "sample")
@@ -93,6 +94,8 @@ def test_everything_is_in_the_zip_and_can_be_used(store: Store, client: Client, 
     motion, material = robot.motion(walk(1)), replace(robot.world.material, static_friction=0.9, dynamic_friction=0.4)
     path = MuJoCo().record(replace(robot.world, material=material), motion, motion.observe_s[-1:])
     assert json.loads(found["expected/fitness.json"])["0-1-sample"] == float(robot.fitness(path.trajectory))
+    assert 'friction="0.4"' in found["tuned.xml"]
+    assert 0 < json.loads(found["expected/plain_mujoco_m.json"])["0-1-sample"] < 10
     last = [float(cell) for cell in found["expected/0-1-sample.csv"].splitlines()[-1].split(",")]
     assert last == pytest.approx([motion.observe_s[-1], *path.poses[0]], abs=1e-7)
     first, second = simulator["tunables"]

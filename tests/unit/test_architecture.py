@@ -47,7 +47,7 @@ ROOMS = {
         {"numpy", "pydantic", "pyarrow"},
     ),
     "reports": (
-        ("core", "store", "figures", "specs", "experiments", "running", "bench", "results", "replay"),
+        ("core", "engines", "store", "figures", "specs", "experiments", "running", "bench", "results", "replay"),
         {"numpy", "jinja2", "fpdf", "matplotlib", "PIL"},
     ),
 }

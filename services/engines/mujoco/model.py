@@ -73,7 +73,7 @@ def compiled(mujoco: ModuleType, world: World) -> Structure:
     spec = mujoco.MjSpec()
     _set_up_physics(mujoco, spec, world)
     spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=0, conaffinity=0)
-    order = list(_outwards(world, world.bodies[0].name))
+    order = list(outwards(world, world.bodies[0].name))
     _add_bodies(mujoco, spec, world, order)
     geoms = [
         (at, _add_part(mujoco, spec, world.bodies[at].name, number, part))
@@ -159,7 +159,7 @@ def _add_bodies(mujoco: ModuleType, spec: Any, world: World, order: list[Joint])
 def _add_part(mujoco: ModuleType, spec: Any, body: str, number: int, part: Part) -> str:
     """Add a shape, and its contacts with the ground, with friction in two directions; return its name."""
     name = f"{body}/{number}"
-    _add_geom(mujoco, spec, spec.body(named(body)), name, part)
+    add_geom(mujoco, spec, spec.body(named(body)), name, part)
     spec.add_pair(
         geomname1=GROUND,
         geomname2=name,
@@ -172,28 +172,28 @@ def _add_part(mujoco: ModuleType, spec: Any, body: str, number: int, part: Part)
     return name
 
 
-def _add_geom(mujoco: ModuleType, spec: Any, body: Any, name: str, part: Part) -> None:
-    """Add a shape that collides only in declared pairs."""
+def add_geom(mujoco: ModuleType, spec: Any, body: Any, name: str, part: Part) -> Any:
+    """Add a shape without mass that collides only in declared pairs, and return it."""
     kinds, shape = mujoco.mjtGeom, part.shape
     place: dict[str, Any] = {"name": name, "pos": part.center_m, "quat": scalar_first(part.turn)}
     place |= {"mass": 0.0, "contype": 0, "conaffinity": 0}
     match shape:
         case Box():
-            body.add_geom(type=kinds.mjGEOM_BOX, size=[edge / 2 for edge in shape.size_m], **place)
+            return body.add_geom(type=kinds.mjGEOM_BOX, size=[edge / 2 for edge in shape.size_m], **place)
         case Sphere():
-            body.add_geom(type=kinds.mjGEOM_SPHERE, size=[shape.radius_m, 0.0, 0.0], **place)
+            return body.add_geom(type=kinds.mjGEOM_SPHERE, size=[shape.radius_m, 0.0, 0.0], **place)
         case Capsule():
-            body.add_geom(type=kinds.mjGEOM_CAPSULE, size=[shape.radius_m, shape.length_m / 2, 0.0], **place)
+            return body.add_geom(type=kinds.mjGEOM_CAPSULE, size=[shape.radius_m, shape.length_m / 2, 0.0], **place)
         case Cylinder():
-            body.add_geom(type=kinds.mjGEOM_CYLINDER, size=[shape.radius_m, shape.length_m / 2, 0.0], **place)
+            return body.add_geom(type=kinds.mjGEOM_CYLINDER, size=[shape.radius_m, shape.length_m / 2, 0.0], **place)
         case Hull():
             spec.add_mesh(name=name, uservert=np.ravel(shape.points_m).astype(float))
-            body.add_geom(type=kinds.mjGEOM_MESH, meshname=name, **place)
+            return body.add_geom(type=kinds.mjGEOM_MESH, meshname=name, **place)
 
 
-def _outwards(world: World, parent: str) -> Iterator[Joint]:
+def outwards(world: World, parent: str) -> Iterator[Joint]:
     """Yield the joints in MuJoCo's order: depth first."""
     for joint in world.joints:
         if joint.parent == parent:
             yield joint
-            yield from _outwards(world, joint.child)
+            yield from outwards(world, joint.child)

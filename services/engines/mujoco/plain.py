@@ -1,0 +1,124 @@
+"""A world as a file for MuJoCo alone, without the law of this engine, and the motions that it has there.
+
+MuJoCo's own contacts have one friction and no restitution: the file has each body's dynamic friction. Servos are stiff
+PD motors there.
+"""
+
+from collections.abc import Sequence
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.motions import Motion
+from gaplab.services.core.observations import gravity_m_s2
+from gaplab.services.core.world import Joint, Motor, PDMotor, World
+from gaplab.services.engines.mujoco.logs import unlogged
+from gaplab.services.engines.mujoco.model import GROUND, add_geom, outwards, scalar_first
+from gaplab.services.engines.mujoco.values import ROTOR, inertial
+
+LOST = ("material.static_friction", "material.restitution", "motor.delay_s", "noise.")
+"""How names of values begin that the file has no place for."""
+
+SPINNING_ROLLING = (0.005, 0.0001)
+"""MuJoCo's own frictions of spinning and rolling, which these contacts do not use."""
+
+
+def mjcf_of(world: World, comments: Sequence[str] = ()) -> str:
+    """Return a world with bodies as MJCF; the control of an actuator is the target of its motor.
+
+    Args:
+        world: the world.
+        comments: lines for the start of the file.
+    """
+    mujoco = import_module("mujoco")
+    spec = mujoco.MjSpec()
+    spec.option.timestep, spec.option.gravity = world.time_step_s, gravity_m_s2(world)
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.compiler.autolimits = spec.compiler.degree = False
+    spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
+    order = list(outwards(world, world.bodies[0].name))
+    _add_bodies(mujoco, spec, world, order)
+    inertias = dict(zip((joint.name for joint in order), spec.compile().dof_M0[-len(order) :], strict=True))
+    for joint in world.actuators:
+        if joint.motor is not None:
+            _add_motor(mujoco, spec, spec.joint(joint.name), joint.motor, inertias[joint.name], world.time_step_s)
+    spec.compile()
+    told = "\n".join(f"  {line.replace('--', '- -')}" for line in comments)
+    return f"<!--\n{told}\n-->\n{spec.to_xml()}" if told else str(spec.to_xml())
+
+
+def plain_positions(world: World, motion: Motion) -> FloatArray:
+    """Return `(t, 3)`: where a motion's observed body is in MuJoCo alone, m."""
+    mujoco = import_module("mujoco")
+    model = mujoco.MjModel.from_xml_string(mjcf_of(world))
+    data = mujoco.MjData(model)
+    for joint in world.joints:
+        data.joint(joint.name).qpos = joint.start
+    observed, step_s = world.observed or world.bodies[0].name, world.time_step_s
+    steps, commands = (np.rint(each / step_s).astype(int) for each in (motion.observe_s, motion.times_s))
+    found = np.empty((len(steps), 3))
+    with unlogged(mujoco):
+        for step in range(steps[-1] + 1):
+            if len(here := np.flatnonzero(steps == step)):
+                mujoco.mj_kinematics(model, data)
+                found[here] = data.body(observed).xpos
+            data.ctrl[:] = motion.targets[np.searchsorted(commands, step, side="right") - 1]
+            mujoco.mj_step(model, data)
+    return found
+
+
+def _add_bodies(mujoco: ModuleType, spec: Any, world: World, order: Sequence[Joint]) -> None:
+    base, made, kinds = world.bodies[0].name, {}, mujoco.mjtJoint
+    start = {"pos": [0.0, 0.0, world.start_height_m], "quat": scalar_first(world.start_turn)}
+    made[base] = spec.worldbody.add_body(name=base, **start)
+    if not world.fixed:
+        made[base].add_freejoint()
+    for joint in order:
+        made[joint.child] = body = made[joint.parent].add_body(
+            name=joint.child, pos=joint.origin_m, quat=scalar_first(joint.turn)
+        )
+        body.add_joint(
+            name=joint.name,
+            type=kinds.mjJNT_SLIDE if joint.slides else kinds.mjJNT_HINGE,
+            axis=joint.axis,
+            limited=joint.limits is not None,
+            range=joint.limits or (0.0, 0.0),
+            damping=[joint.damping, 0.0, 0.0],
+            frictionloss=joint.dry_friction,
+            armature=joint.armature,
+        )
+    surfaces = dict(world.surfaces)
+    for each in world.bodies:
+        body = made[each.name]
+        body.ipos, body.inertia, axes = inertial(each)
+        body.mass, body.iquat, body.explicitinertial = each.mass_kg, scalar_first(axes), True
+        friction = surfaces.get(each.surface, world.material).dynamic_friction
+        for number, part in enumerate(each.parts):
+            geom = add_geom(mujoco, spec, body, f"{each.name}/{number}", part)
+            geom.priority, geom.friction, geom.conaffinity = 1, (friction, *SPINNING_ROLLING), int(part.collides)
+
+
+def _add_motor(
+    mujoco: ModuleType, spec: Any, joint: Any, motor: Motor | PDMotor, inertia: float, step_s: float
+) -> None:
+    """Add a motor; a servo closes its share of the error in a step, as far as its rotor's inertia permits."""
+    if isinstance(motor, PDMotor):
+        kp, kd = motor.kp, motor.kd
+        gain, kp, kd = {"position": (kp, kp, kd), "velocity": (kd, 0.0, kd), "torque": (1.0, 0.0, 0.0)}[motor.follows]
+    else:
+        kd = ROTOR * inertia / step_s
+        joint.armature += ROTOR * inertia
+        gain = kp = motor.position_gain * kd / step_s
+    spec.add_actuator(
+        name=joint.name,
+        target=joint.name,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        gainprm=[gain, *[0.0] * 9],
+        biasprm=[0.0, -kp, -kd, *[0.0] * 7],
+        forcelimited=True,
+        forcerange=(-motor.max_torque_nm, motor.max_torque_nm),
+    )

@@ -1,0 +1,37 @@
+"""The tuned simulator of a spec in MuJoCo alone; a process for rollouts calls these functions."""
+
+from collections.abc import Sequence
+
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.motions import Motion
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.world import World
+from gaplab.services.engines import engines
+from gaplab.services.engines.mujoco.plain import LOST, mjcf_of, plain_positions
+from gaplab.services.replay.sent_specs import SentSpec, received
+from gaplab.services.specs.assembly import edits_of, engine_of
+from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.simulation import Simulation
+
+
+def tuned_mjcf(sent_spec: SentSpec, parameters: Sequence[float], headline: str) -> str:
+    """Return a simulator as MJCF, with a line at its start; "" without MuJoCo."""
+    if not engines["mujoco"].available():
+        return ""
+    _, world = _tuned(sent_spec, parameters)
+    return mjcf_of(world, [headline, f"Not in this file: {', '.join(LOST)}"])
+
+
+def plain_motion(
+    sent_spec: SentSpec, parameters: Sequence[float], genome: Sequence[float], times_s: FloatArray
+) -> FloatArray | None:
+    """Return `(t, 3)`: where the body that counts is in MuJoCo alone, m; None of a controller that observes."""
+    robot, world = _tuned(sent_spec, parameters)
+    motion = robot.motion(frozen(genome)).observed_at(times_s)
+    return plain_positions(world, motion) if isinstance(motion, Motion) else None
+
+
+def _tuned(sent_spec: SentSpec, parameters: Sequence[float]) -> tuple[Robot, World]:
+    spec = received(sent_spec)
+    robot, edits = robot_of(spec), edits_of(ref.name for ref in spec.tunables)
+    return robot, Simulation(robot, engine_of(spec.engine), edits).world(frozen(parameters))
