@@ -41,9 +41,10 @@ controller.json    genome and fitness of the best measured controller
 motion.*           its motion as CSV, JSON and a ROS 2 JointTrajectory; none if the controller observes while it acts
 simulator.json     the tuned simulator with its intervals, and the rest of the ensemble
 verdict.txt        what can be concluded, in sentences
-samples.csv        all measurements, for `reality.samples` of another spec. gaplab.read_samples("samples.csv", ROBOT)
-                   reads them for gaplab's own robots, those of GAPLAB_PLUGINS, and robot files; for all robots of a
-                   service client.bench.check_samples("samples.csv", ROBOT) does
+samples.csv        samples from before and all measurements, for `reality.samples` of another spec.
+                   gaplab.read_samples("samples.csv", ROBOT) reads them for gaplab's own robots, those of
+                   GAPLAB_PLUGINS, and robot files; for all robots of a service
+                   client.bench.check_samples("samples.csv", ROBOT) does
 samples.json       the same for programs of yours, with repetition, iteration, operator and time, and with readings in
                    units of noise; `reality.samples` takes samples.csv
 robot.json         the robot file: `gaplab robot add robot.json` first, where samples and spec are used elsewhere.
@@ -144,9 +145,10 @@ def _files(outcome: ExperimentOutcome, readings: Readings) -> Iterator[tuple[str
     yield "verdict.txt", "\n\n".join((outcome.facts.verdict.headline, *verdict_sentences(outcome))) + "\n"
     yield "spec.json", spec_text(submitted(outcome.facts).spec) + "\n"
     yield "provenance.json", outcome.facts.provenance[experiment.id].model_dump_json(indent=1) + "\n"
+    if best is not None or outcome.spec.reality.samples:
+        yield "samples.csv", samples_csv(outcome, readings)
     if best is not None:
         yield "controller.json", _json(best.model_dump(mode="json") | {"unit": outcome.robot.unit})
-        yield "samples.csv", samples_csv(outcome, readings)
         yield "samples.json", _json([sample.model_dump(mode="json") for sample in outcome.measured])
         genome = frozen(best.genome)
         for form in motions.forms_of(outcome.robot, genome):
@@ -156,23 +158,34 @@ def _files(outcome: ExperimentOutcome, readings: Readings) -> Iterator[tuple[str
 
 
 def samples_csv(outcome: ExperimentOutcome, readings: Readings) -> str:
-    """Return the measurements as a table of samples; equal ones once, since a sample may also be a probe."""
-    samples = list({(each.genome, each.repeats, each.fitness): each for each in outcome.measured}.values())
-    repeats = max(len(each.repeats or (0,)) for each in samples)
-    sensors = outcome.robot.sensors
-    ends = ["", *(f"#{number}" for number in range(2, repeats + 1))] if any(each.readings for each in samples) else []
-    names = [f"{name}{end}" for end in ends for name in sensors.columns]
+    """Return all measurements as a table of samples, those from before the experiment first.
+
+    Equal ones are there once, since a sample may also be a probe.
+    """
+    found: dict[Any, list[float | None]]
+    found = {(each.genome, each.values): _cells(each.readings) for each in outcome.spec.reality.samples if each.values}
+    for sample in outcome.measured:
+        key = sample.genome, sample.repeats or (sample.fitness,)
+        found[key] = _cells(readings.get(key)) or (_readings(sample, outcome) if len(key[1]) == 1 else [])
+    repeats = max(len(values) for _, values in found)
+    ends = (
+        ["", *(f"#{number}" for number in range(2, repeats + 1))]
+        if any(set(told) - {None} for told in found.values())
+        else []
+    )
+    names = [f"{name}{end}" for end in ends for name in outcome.robot.sensors.columns]
     values = ["value"] if repeats == 1 else [f"value_{number}" for number in range(1, repeats + 1)]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([*(f"gene_{place}" for place in range(outcome.robot.space.size)), *values, *names])
-    for each in samples:
-        measured = each.repeats or (each.fitness,)
+    for (genome, measured), told in found.items():
         blanks = [""] * (repeats - len(measured))
-        told = [cell for table in readings.get((each.genome, measured), ()) for row in table for cell in row]
-        told = told or (_readings(each, outcome) if len(measured) == 1 else [])
-        writer.writerow([*each.genome, *measured, *blanks, *(told + [None] * len(names))[: len(names)]])
+        writer.writerow([*genome, *measured, *blanks, *(told + [None] * len(names))[: len(names)]])
     return text.getvalue()
+
+
+def _cells(readings: Sequence[Any] | None) -> list[float | None]:
+    return [cell for table in readings or () for row in table for cell in row]
 
 
 def _readings(sample: SampleRead, outcome: ExperimentOutcome) -> list[float | None]:

@@ -160,6 +160,16 @@ def test_repeats_of_a_bench_are_taken_home(store: Store, client: Client, tmp_pat
     assert "± 0.05 (standard error)" in found["page.html"]
 
 
+def test_samples_from_before_are_taken_home(store: Store, client: Client, tmp_path: Path) -> None:
+    reality = {"kind": "physical", "samples": [{"genome": [0.2], "values": [0.3]}], "probes": "never"}
+    experiment = submit_experiment(store, toy(repetitions=1, iterations=0, reality=reality))
+    compute(store)
+
+    found = files(client.take_home(experiment.id, tmp_path / "home.zip").read_bytes())
+
+    assert found["samples.csv"].splitlines() == ["gene_0,value", "0.2,0.3"]
+
+
 def test_readings_of_all_repeats_and_traces_are_taken_home(store: Store, client: Client, tmp_path: Path) -> None:
     reality = {"kind": "physical", "repeats": 2, "probes": "each"}
     experiment = submit_experiment(store, toy(**WALKING, reality=reality))
