@@ -38,11 +38,6 @@ def robot_picture(drawing: RolloutProcess, store: Store, name: str, *, dark: boo
     world = own if own is not None else stored_robot_file(stored_robots.robot_text(store, name)).world
     if not world.bodies:
         raise NotFound(f"the robot {name!r} has no body, so there is no picture of it")
-    return world_picture(drawing, world, dark=dark, width_px=width_px)
-
-
-def world_picture(drawing: RolloutProcess, world: World, *, dark: bool, width_px: int) -> bytes:
-    """Return a picture of a world with bodies as PNG; other arguments and errors are those of `robot_picture`."""
     key: Key = ("picture", sha256(repr(world).encode()).hexdigest(), dark, width_px)
     found: bytes | None = drawing.answers.get(key)
     if found is None:

@@ -3,19 +3,16 @@
 from collections.abc import Hashable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Loop
 from gaplab.services.core.observations import observations
 from gaplab.services.core.world import World
 from gaplab.services.engines.agenda import Acting, tick_steps
-from gaplab.services.engines.mujoco.controls import Controls, grouped, held
+from gaplab.services.engines.mujoco.controls import Controls, Steps, grouped, held
 from gaplab.services.engines.mujoco.models import Prepared
 from gaplab.services.engines.mujoco.pool import Continued, Pool
 from gaplab.services.engines.mujoco.states import States
-
-Steps = NDArray[np.int_]
 
 
 class Looping:

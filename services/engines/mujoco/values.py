@@ -23,9 +23,6 @@ ROTOR = 8.0
 reaches eight ninths of the target speed. The rank correlation with PyBullet over random gaits was 0.78; with 2, 4, 16
 and 32 it was 0.41, 0.72, 0.66 and 0.57."""
 
-WEAK = PDLaw(0.0, 0.0, 0.0, 0.0)
-"""The law of a motor without strength."""
-
 IN_PLACE, SAME_TURN, ANYWHERE = 1, 3, 0
 """MuJoCo's values of `sameframe`: frames are equal, only their turns are, or neither."""
 
@@ -151,7 +148,7 @@ def _motors(mujoco: ModuleType, structure: Structure, model: Any, data: Any, wor
     driven = any(isinstance(motor, PDMotor) for motor, _ in motors)
     inverses = _inverse_inertias(mujoco, structure, model, data, world) if driven else []
     return [
-        _pd(motor, dof, inverses[dof], world.time_step_s) if isinstance(motor, PDMotor) else PD(dof, WEAK, 0.0)
+        _pd(motor, dof, inverses[dof], world.time_step_s) if isinstance(motor, PDMotor) else PD(dof, PDLaw(), 0.0)
         for motor, dof in motors
         if isinstance(motor, PDMotor) or motor.max_torque_nm <= 0
     ]
