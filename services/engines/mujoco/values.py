@@ -16,7 +16,7 @@ from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.shapes import UNTURNED, Box, Quaternion, Sphere, Vector
 from gaplab.services.core.world import Body, Material, Motor, PDMotor, World
 from gaplab.services.engines.mujoco.model import Structure, scalar_first
-from gaplab.services.engines.mujoco.settings import FALL, PD, Servo, Settings, settings
+from gaplab.services.engines.mujoco.settings import FALL, PD, Servo, settings
 
 ROTOR = 8.0
 """Inertia of a servo's rotor, relative to that of what its joint carries in the zero pose: in one step a free limb
@@ -121,7 +121,7 @@ def _write_joints(mujoco: ModuleType, structure: Structure, model: Any, data: An
     for dof, damping in dampers:
         model.dof_armature[dof] += world.time_step_s * damping  # the speed after the step is damped, not that before
     mujoco.mj_setConst(model, data)
-    known = settings(world, model.nv, structure.ahead, Settings(servos, motors, dampers))
+    known = settings(world, model.nv, structure.ahead, servos, motors, dampers)
     model.numeric_data[: len(known)] = known
 
 
