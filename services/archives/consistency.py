@@ -8,8 +8,7 @@ from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
 from gaplab.schemas.spec import Schedule
-from gaplab.services.archives.checking import Row
-from gaplab.services.archives.columns import EXPERIMENT, REPETITION
+from gaplab.services.archives.columns import EXPERIMENT, REPETITION, Row
 from gaplab.services.archives.opening import OpenedArchive
 from gaplab.services.core import robot_library
 from gaplab.services.core.errors import InvalidArchive, InvalidSpec

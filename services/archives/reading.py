@@ -20,8 +20,7 @@ from gaplab.schemas.archives import ImportRead
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.measurements import RequestState
-from gaplab.services.archives.checking import Row
-from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, columns_of
+from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, Row, columns_of
 from gaplab.services.archives.consistency import check_attachments, check_logs, check_row, checked_experiments, owner_of
 from gaplab.services.archives.opening import OpenedArchive, ParquetConverter, convert_apart, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
