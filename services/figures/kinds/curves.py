@@ -74,12 +74,10 @@ def curves_figure(
     placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
     lines = [one for one in placed if not one.curve.level]
     levels = [one for one in placed if one.curve.level and one.points]
-    styles = strategy_styles([one.curve.strategy for one in lines])
-    marks: list[Mark] = [_mean(one, band, style) for one, style in zip(lines, styles, strict=True)]
-    marks += [
-        _repetitions(one, against, style) for one, style in zip(lines, styles, strict=True) if each and one.points
-    ]
-    thin = [mark for one, style in zip(lines, styles, strict=True) for mark in _thin(one, beside, against, style)]
+    styled = list(zip(lines, strategy_styles([one.curve.strategy for one in lines]), strict=True))
+    marks: list[Mark] = [_mean(one, band, style) for one, style in styled]
+    marks += [_repetitions(one, against, style) for one, style in styled if each and one.points]
+    thin = [mark for one, style in styled for mark in _thin(one, beside, against, style)]
     marks += [*thin, *(_level(one, band, style) for one, style in zip(levels, _level_styles(levels), strict=True))]
     span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
     found = [best_of_line(one.name, one.curve, span) for one in levels] if lines and not against else []
