@@ -20,11 +20,9 @@ from pydantic import (
 )
 
 from gaplab.schemas.mistakes import sentence
-from gaplab.services.archives.columns import ADDED, EXPERIMENT, columns_of
+from gaplab.services.archives.columns import ADDED, EXPERIMENT, Row, columns_of
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.store.tables import Column, Kind
-
-Row = dict[str, Any]
 
 LONGEST_LINE = 8 * 2**20
 """Most characters of one row."""
@@ -95,18 +93,14 @@ def _lines(lines: IO[str], table: str) -> Iterator[str]:
 
 def _row(line: str, place: str) -> Row:
     try:
-        row = json.loads(line, parse_constant=_refuse_constant)
-        text = json.dumps(row, ensure_ascii=False, allow_nan=False)
+        row = json.loads(line)
+        text = json.dumps(row, ensure_ascii=False, allow_nan=False)  # fails for nan and infinity
         text.encode()  # fails for half of a surrogate pair
     except (ValueError, RecursionError):
         _refuse(place, "is not JSON in ASCII, or has a number or a text that cannot be stored")
     if not isinstance(row, dict) or "\\u0000" in text:
         _refuse(place, "is not a JSON object, or has a NUL character")
     return row
-
-
-def _refuse_constant(constant: str) -> NoReturn:
-    raise ValueError(constant)
 
 
 @cache

@@ -12,6 +12,7 @@ from gaplab.services.store import tables
 from gaplab.services.store.queries.archives import EXPERIMENT as EXPERIMENT
 from gaplab.services.store.queries.archives import REPETITION as REPETITION
 from gaplab.services.store.queries.archives import REPETITION_ID
+from gaplab.services.store.queries.archives import Row as Row
 from gaplab.services.store.tables import Column, Kind
 
 EXPORTED = (

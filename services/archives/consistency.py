@@ -5,12 +5,10 @@ from collections.abc import Iterable, Mapping
 from pydantic import ValidationError
 
 from gaplab.schemas.editing import Edit
-from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
 from gaplab.schemas.spec import Schedule
-from gaplab.services.archives.checking import Row
-from gaplab.services.archives.columns import EXPERIMENT, REPETITION
+from gaplab.services.archives.columns import EXPERIMENT, REPETITION, Row
 from gaplab.services.archives.opening import OpenedArchive
 from gaplab.services.core import robot_library
 from gaplab.services.core.errors import InvalidArchive, InvalidSpec
@@ -82,7 +80,7 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
         return
     if table == "answer" and not _is_list_of_texts(row["attachments"]):
         raise InvalidArchive(f"the attachments of answer {row['id']!r} are no list of hashes")
-    owner = experiments.get(row["id"] if table == "experiment" else row.get(EXPERIMENT) or row["experiment_id"])
+    owner = experiments.get(owner_of(table, row))
     number = row.get(REPETITION, row["number"] if table == "repetition" else 0)
     iteration = row.get("iteration", row["number"] if table == "iteration" else 0)
     if (
@@ -92,6 +90,12 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
         or (table == "simulator" and len(row["parameters"]) != len(owner["spec"]["tunables"]))
     ):
         raise InvalidArchive(f"a row of {table} does not fit its experiment: {str(row)[:200]}")
+
+
+def owner_of(table: str, row: Row) -> str:
+    """Return the id of the experiment that a row belongs to."""
+    owner: str = row["id"] if table == "experiment" else row.get(EXPERIMENT) or row["experiment_id"]
+    return owner
 
 
 def check_attachments(session: Session, opened: OpenedArchive) -> None:
@@ -149,7 +153,7 @@ def _checked_spec(row: Row) -> Row:
     names = [each.name for each in spec.tunables]
     wrong = [name for name in (*truth, *names) if plain_name(name) not in tunables]
     wrong += [] if spec.robot.name in robots else [spec.robot.name]
-    if not _is_stored(spec.robot):
+    if spec.robot.name == IMPORTED and not robot_library.needed_by(spec.robot):
         msg = f"{place} names the robot {label_of(spec.robot)!r}, whose file is neither in the archive nor stored here"
         raise InvalidArchive(f"{msg}; add it before: gaplab robot add")
     if wrong or len(set(names)) < len(names) or spec.strategy.name != row["strategy"]:
@@ -160,11 +164,6 @@ def _checked_spec(row: Row) -> Row:
         raise InvalidArchive(msg)
     stored = spec.model_dump(mode="json", exclude=set(Schedule.model_fields))
     return stored | {"reality": stored["reality"] | {"parameters": truth | stored["reality"]["parameters"]}}
-
-
-def _is_stored(robot: PluginRef) -> bool:
-    """Return whether the file of a robot is in the archive or stored here, or it needs none."""
-    return robot.name != IMPORTED or bool(robot_library.needed_by(robot))
 
 
 def _iterations(spec: ResolvedSpec) -> set[int]:

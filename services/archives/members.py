@@ -7,12 +7,10 @@ from datetime import UTC, datetime
 from itertools import islice
 from typing import IO, Any
 
-from gaplab.services.archives.columns import columns_of, is_nested
+from gaplab.services.archives.columns import Row, columns_of, is_nested
 from gaplab.services.store.tables import Column, Kind
 
 MANIFEST, CURVES, SPEC = "manifest.json", "curves.json", "spec.json"
-
-Row = dict[str, Any]
 
 _FILE = re.compile(r"attachments/([0-9a-f]{64})")
 _VECTORS = {Kind.VECTOR, Kind.READINGS}

@@ -21,8 +21,8 @@ from zlib import error as ZlibError  # noqa: N812 - it is an error
 from pydantic import ValidationError
 
 from gaplab.schemas.archives import FORMAT, Manifest, Member
-from gaplab.services.archives.checking import Row, checked, first_error
-from gaplab.services.archives.columns import EXPORTED
+from gaplab.services.archives.checking import checked, first_error
+from gaplab.services.archives.columns import EXPORTED, Row
 from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, digest_of, member_of
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.settings import variable_of

@@ -20,9 +20,8 @@ from gaplab.schemas.archives import ImportRead
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.measurements import RequestState
-from gaplab.services.archives.checking import Row
-from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, columns_of
-from gaplab.services.archives.consistency import check_attachments, check_logs, check_row, checked_experiments
+from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, Row, columns_of
+from gaplab.services.archives.consistency import check_attachments, check_logs, check_row, checked_experiments, owner_of
 from gaplab.services.archives.opening import OpenedArchive, ParquetConverter, convert_apart, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.core.stored_specs import spec_of
@@ -116,8 +115,7 @@ def _check(session: Session, private: Store, opened: OpenedArchive, now: datetim
     """Store the rows of an archive in the private database, each as it will arrive except for its ids."""
     experiments = checked_experiments(opened)
     for table in EXPORTED:
-        rows = _fitting(table, opened.rows(table), experiments)
-        _insert(session, table, (_arriving(table, row, experiments, now) for row in rows))
+        _insert(session, table, (_arriving(table, row, experiments, now) for row in opened.rows(table)))
     check_attachments(session, opened)
     check_logs(session, experiments)
     study = opened.manifest.id if opened.manifest.kind == "study" else None
@@ -135,8 +133,7 @@ def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
         for table in EXPORTED:
             owners = [*studies] if table == "study" else list(ids)
             rows = archives.read_rows(source, table, [column.name for column in columns_of(table)], owners)
-            arriving = (_renamed(table, row, renamed, ids) for row in rows)
-            _insert(session, table, _with_content(checked, arriving) if table == "attachment" else arriving)
+            _insert(session, table, (_renamed(checked, table, row, renamed, ids) for row in rows))
     archives.forget_deletions(session, [*studies - taken_studies, *ids.values()])
     for id_ in ids.values():
         note(session, EventKind.IMPORTED, id_)
@@ -151,12 +148,6 @@ def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
     )
 
 
-def _fitting(table: str, rows: Iterable[Row], experiments: Mapping[str, Row]) -> Iterator[Row]:
-    for row in rows:
-        check_row(table, row, experiments)
-        yield row
-
-
 def _insert(session: Session, table: str, rows: Iterable[Row]) -> None:
     try:
         archives.insert_rows(session, table, rows)
@@ -165,15 +156,18 @@ def _insert(session: Session, table: str, rows: Iterable[Row]) -> None:
 
 
 def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetime) -> Row:
-    """Return the row with the checked spec, and without the state of work that another service had begun."""
+    """Check a row; return it with the checked spec, and without the state of work that another service had begun."""
+    check_row(table, row, experiments)
     row = dict(row)
     if table == "experiment":
         row["spec"] = experiments[row["id"]]["spec"]
     if table == "attachment":
         row["content"] = b""
-    goes_on = table not in _OF_NO_EXPERIMENT and _is_physical(experiments[_owner(table, row)])
+    goes_on = table not in _OF_NO_EXPERIMENT and _is_physical(experiments[owner_of(table, row)])
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:
-        row |= {"state": _resting(State(row["state"]))} if goes_on else {"state": State.CANCELLED, "ended_at": now}
+        is_paused = row["state"] in {State.PAUSING, State.PAUSED}
+        resting = {"state": State.PAUSED if is_paused else State.QUEUED}  # none is claimed, and what waited asks again
+        row |= resting if goes_on else {"state": State.CANCELLED, "ended_at": now}
     if table == "attempt" and row["ended_at"] is None:
         row |= {"ending": Ending.HANDED_BACK if goes_on else Ending.CANCELLED, "ended_at": now}
     if table == "request" and row["state"] == RequestState.TAKEN:
@@ -181,27 +175,16 @@ def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetim
     return row
 
 
-def _with_content(checked: CheckedArchive, rows: Iterable[Row]) -> Iterator[Row]:
-    """Yield the rows of files with their contents, one in memory at a time."""
-    for row in rows:
-        yield row | {"content": checked.attachments[row["id"]].read_bytes()}
-
-
-def _owner(table: str, row: Row) -> str:
-    owner: str = row["id"] if table == "experiment" else row.get(EXPERIMENT) or row["experiment_id"]
-    return owner
-
-
 def _is_physical(experiment: Row) -> bool:
     return bool(experiment["spec"]["reality"]["kind"] == "physical")
 
 
-def _resting(state: State) -> State:
-    """Return the state in which open work arrives: none is claimed, and what waited asks again."""
-    return {State.PAUSING: State.PAUSED, State.PAUSED: State.PAUSED}.get(state, State.QUEUED)
-
-
-def _renamed(table: str, row: Row, studies: Mapping[str, str], experiments: Mapping[str, str]) -> Row:
+def _renamed(
+    checked: CheckedArchive, table: str, row: Row, studies: Mapping[str, str], experiments: Mapping[str, str]
+) -> Row:
+    """Return a row under its ids here, that of a file with its content."""
+    if table == "attachment":
+        return row | {"content": checked.attachments[row["id"]].read_bytes()}
     if table == "study":
         return row | {"id": studies.get(row["id"], row["id"])}
     if table == "experiment":

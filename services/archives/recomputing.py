@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from math import inf, isnan
+from math import inf
 from time import time
 from typing import Any
 
@@ -130,13 +130,10 @@ def difference(stored: Step, computed: Step) -> str | None:
     before = dict(_numbers(stored))
     now = {place: number for place, number in _numbers(computed) if place in before or ".fit." not in place}
     for place in before | now:
-        if place not in before or place not in now or not _same_bits(before[place], now[place]):
-            return f"{place} is {_shown(now, place)} here, and {_shown(before, place)} in the archive"
+        here, there = (repr(numbers[place]) if place in numbers else "absent" for numbers in (now, before))
+        if here != there:  # the shortest text of a number tells all of its bits
+            return f"{place} is {here} here, and {there} in the archive"
     return None
-
-
-def _shown(numbers: Mapping[str, float], place: str) -> str:
-    return repr(numbers[place]) if place in numbers else "absent"
 
 
 def _numbers(value: object, place: str = "") -> Iterator[tuple[str, float]]:
@@ -149,7 +146,3 @@ def _numbers(value: object, place: str = "") -> Iterator[tuple[str, float]]:
             yield from _numbers(item, f"{place}[{index}]")
     elif value is not None:
         yield place, float(value)  # type: ignore[arg-type] # steps have numbers only
-
-
-def _same_bits(one: float, other: float) -> bool:
-    return np.float64(one).tobytes() == np.float64(other).tobytes() or (isnan(one) and isnan(other))

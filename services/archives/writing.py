@@ -14,8 +14,8 @@ from pydantic import TypeAdapter
 
 from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.schemas.curves import Curve
-from gaplab.services.archives.columns import EXPORTED, columns_of
-from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, Row, file_member_of, member_of, write
+from gaplab.services.archives.columns import EXPORTED, Row, columns_of
+from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, file_member_of, member_of, write
 from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
 from gaplab.services.results.files import entry_of

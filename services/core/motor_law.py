@@ -17,7 +17,7 @@ STIFFNESS, DAMPING, FEED, STRONGEST = 0, 1, 2, 3
 
 
 class PDLaw(NamedTuple):
-    """The torque of a PDMotor: stiffness (u - q) - damping c + feed u, limited to ± strongest.
+    """The torque of a PDMotor: stiffness (u - q) - damping c + feed u, limited to ± strongest; PDLaw() gives none.
 
     Attributes:
         stiffness: N·m/rad; N/m for a joint that slides, and likewise below.
@@ -26,10 +26,10 @@ class PDLaw(NamedTuple):
         strongest_nm: largest torque.
     """
 
-    stiffness: float
-    damping: float
-    feed: float
-    strongest_nm: float
+    stiffness: float = 0.0
+    damping: float = 0.0
+    feed: float = 0.0
+    strongest_nm: float = 0.0
 
 
 def pd_law(motor: PDMotor, inverse_inertia: float, step_s: float) -> PDLaw:

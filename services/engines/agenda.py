@@ -1,7 +1,7 @@
 """What is commanded in which time step: by a motion, or by a controller in a loop. All times are whole time steps."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,17 +13,6 @@ from gaplab.services.core.world import PDMotor, World
 
 Commands: TypeAlias = list[tuple[int, float]]
 """Actuators, and their new targets."""
-
-
-class Agenda(Protocol):
-    """The commands of a rollout."""
-
-    @property
-    def moments(self) -> Iterable[int]:
-        """Return the time steps, from 0, in which `commands` must be called."""
-
-    def commands(self, step: int) -> Commands:
-        """Return the new targets at the start of a time step; called once for each of the moments, ascending."""
 
 
 def steps_at(times_s: FloatArray, time_step_s: float) -> list[int]:
@@ -102,6 +91,9 @@ class MotionAgenda:
         motion: motion.
         world: world that it runs in.
 
+    Attributes:
+        moments: the time steps, from 0, with commands.
+
     Raises:
         PluginBroken: its targets are not those of the world's actuators.
     """
@@ -115,14 +107,10 @@ class MotionAgenda:
         self._commands = _before(world, late)
         for step, actuator, target in zip(steps, actuators.tolist(), targets, strict=True):
             self._commands.setdefault(step + late[actuator], []).append((actuator, target))
-
-    @property
-    def moments(self) -> Iterable[int]:
-        """Return the time steps with commands."""
-        return self._commands
+        self.moments: Iterable[int] = self._commands
 
     def commands(self, step: int) -> Commands:
-        """Return the targets that change in a time step."""
+        """Return the targets that change at the start of a time step."""
         return self._commands.get(step, [])
 
 
@@ -133,6 +121,9 @@ class LoopAgenda:
         loop: loop.
         world: world that it runs in.
         observe: function that returns the observations `(s,)` of now.
+
+    Attributes:
+        moments: the time steps, from 0, in which `commands` must be called: once in each, ascending.
     """
 
     def __init__(self, loop: Loop, world: World, observe: Callable[[], FloatArray]) -> None:

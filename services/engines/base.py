@@ -35,6 +35,24 @@ ALL_FIELDS = frozenset(
 )
 """All fields of a World that an engine can honour."""
 
+USUALLY_IN_PLACE = frozenset(
+    {
+        "body.mass_kg",
+        "joint.damping",
+        "joint.dry_friction",
+        "motor.delay_s",
+        "motor.kd",
+        "motor.kp",
+        "motor.max_speed_rad_s",
+        "motor.max_torque_nm",
+        "motor.position_gain",
+        "noise",
+        "noise.start_tilt_rad",
+        "surfaces",
+    }
+)
+"""Fields that all of gaplab's engines with bodies set in place."""
+
 
 class Engine(Plugin):
     """A physics engine.

@@ -55,8 +55,8 @@ class SteppedEngine(Engine, Generic[S]):
 
     @classmethod
     def runs(cls, world: World) -> bool:
-        """Return whether the world has bodies."""
-        return bool(world.bodies)
+        """Return whether the world has bodies, and exceeds no limit of the engine."""
+        return bool(world.bodies) and cls.exceeded(world) is None
 
     def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
         """Return the trajectory of the observed body, `(t, 3)`; times are rounded to whole time steps."""

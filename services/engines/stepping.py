@@ -12,7 +12,7 @@ from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.core.observations import Bearing, observations
 from gaplab.services.core.world import World
-from gaplab.services.engines.agenda import Agenda, LoopAgenda, MotionAgenda, steps_at
+from gaplab.services.engines.agenda import LoopAgenda, MotionAgenda, steps_at
 
 WARM_SCENES = 4
 """Largest number of cached scenes. Worlds that differ only in material, or in what is set in place, share a scene."""
@@ -127,7 +127,7 @@ def watch(
         look: function that returns the poses of the scene.
     """
     world = scene.world
-    agenda: Agenda = MotionAgenda(motion, world) if isinstance(motion, Motion) else _loop_agenda(motion, scene)
+    agenda = _loop_agenda(motion, scene) if isinstance(motion, Loop) else MotionAgenda(motion, world)
     observed = steps_at(motion.observe_s, world.time_step_s)
     poses: dict[int, FloatArray] = {}
     seen = set(observed)

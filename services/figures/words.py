@@ -7,6 +7,7 @@ from math import isfinite
 
 LONGEST = 60  # characters of a name in a figure
 TITLE = 200  # characters of a title, which may have several lines
+WIDE = 30.0  # ratio of the greatest to the least value from which their axis is logarithmic
 LARGEST = 1e300  # of values that are drawn: sums and margins of them stay finite
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -81,6 +82,12 @@ def power(value: float) -> str:
 def drawable(value: float | None) -> float | None:
     """Return the value, or None for nan, infinity and values too large to compute with."""
     return value if value is not None and abs(value) <= LARGEST else None
+
+
+def is_wide(values: Iterable[float | None]) -> bool:
+    """Return whether all values are above 0, and so far apart that their axis is logarithmic."""
+    there = [each for each in values if each is not None]
+    return bool(there) and min(there) > 0 and max(there) >= WIDE * min(there)
 
 
 def evenly(least: float, most: float) -> tuple[float, ...]:

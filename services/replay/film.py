@@ -1,6 +1,6 @@
 """Pictures of a replay: both worlds side by side, seen by one camera that follows the robot, as on the page."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,9 +87,10 @@ def pictures(replay: Replay, *, every: int, width_px: int) -> Iterator[Image.Ima
         bases = [path[frame] for path in paths]
         whole = Image.new("RGB", (size[0] * len(worlds), size[1] + _bar(size)), PAPER)
         for place, world in enumerate(worlds):
-            solids = _solids(world, frame, replay.times_s[frame])
+            down = _down(world.world, replay.times_s[frame])
+            painted = solids(world.world.shapes, world.positions[frame], world.orientations[frame], down)
             camera = camera_at(bases, size, replay.framing, world.world.slope_rad)
-            whole.paste(paint(solids, camera), (place * size[0], _bar(size)))
+            whole.paste(paint(painted, camera), (place * size[0], _bar(size)))
             _write(whole, world.title, (place * size[0] + 8, 0), size)
         _write(whole, f"{replay.times_s[frame]:.2f} s", (8, size[1] - _bar(size) // 2), size)
         yield whole
@@ -127,41 +128,40 @@ def camera_at(bases: list[FloatArray], size: tuple[int, int], framing: Framing, 
     return Camera(target + away, target, size, scale=framing.scale, slope_rad=slope_rad)
 
 
-def _solids(world: _Moving, frame: int, time_s: float) -> list[Solid]:
-    feet = list(dict.fromkeys(shape.body for shape in world.world.shapes if shape.role == "foot"))
-    down = {
-        foot
-        for foot, intervals in zip(feet, world.world.contacts, strict=False)
-        if any(begin <= time_s < end for begin, end in intervals)
-    }
-    positions, orientations = world.positions[frame], world.orientations[frame]
-    return [
-        solid(shape, positions, orientations, colour_of(shape, down))
-        for shape in world.world.shapes
-        if shape.kind != "plane"
-    ]
+def _down(world: ReplayWorld, time_s: float) -> set[int | None]:
+    """Return the feet on the ground."""
+    feet = dict.fromkeys(shape.body for shape in world.shapes if shape.role == "foot")
+    spans = zip(feet, world.contacts, strict=False)  # contacts are unknown without joint angles
+    return {foot for foot, intervals in spans if any(begin <= time_s < end for begin, end in intervals)}
 
 
-def colour_of(shape: Shape, down: Collection[int | None], look: Look = LIGHT) -> Colour:
-    """Return the colour of a shape, given the feet on the ground."""
-    return look.colours["foot on the ground" if shape.role == "foot" and shape.body in down else shape.role]
-
-
-def solid(shape: Shape, positions: FloatArray, orientations: FloatArray, colour: Colour) -> Solid:
-    """Return what is painted of a shape.
+def solids(
+    shapes: Iterable[Shape],
+    positions: FloatArray,
+    orientations: FloatArray,
+    down: Collection[int | None],
+    look: Look = LIGHT,
+) -> list[Solid]:
+    """Return what is painted of shapes.
 
     Args:
-        shape: the shape; no plane.
+        shapes: the shapes of a world.
         positions: `(bodies, 3)`: positions of the bodies.
         orientations: `(bodies, 4)`: orientations of the bodies.
-        colour: its colour.
+        down: the feet on the ground.
+        look: the colours.
     """
-    position, turn = np.array(shape.position_m), np.array(shape.orientation)
-    if shape.body is not None:
-        body = orientations[shape.body]
-        position = positions[shape.body] + rotated(body, position)
-        turn = product(body, turn)
-    return Solid(_body(shape), position, np.stack([rotated(turn, axis) for axis in np.eye(3)]), colour)
+    found = []
+    for shape in shapes:
+        if shape.kind == "plane":
+            continue
+        position, turn = np.array(shape.position_m), np.array(shape.orientation)
+        if shape.body is not None:
+            body = orientations[shape.body]
+            position, turn = positions[shape.body] + rotated(body, position), product(body, turn)
+        colour = look.colours["foot on the ground" if shape.role == "foot" and shape.body in down else shape.role]
+        found.append(Solid(_body(shape), position, np.stack([rotated(turn, axis) for axis in np.eye(3)]), colour))
+    return found
 
 
 def _body(shape: Shape) -> Polyhedron | tuple[float, float]:

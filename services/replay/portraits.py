@@ -12,7 +12,7 @@ from gaplab.services.core.robot_files import stored_robot_file
 from gaplab.services.core.robots import robots
 from gaplab.services.core.world import World
 from gaplab.services.experiments import stored_robots
-from gaplab.services.replay.film import DARK, LIGHT, camera_at, colour_of, solid
+from gaplab.services.replay.film import DARK, LIGHT, camera_at, solids
 from gaplab.services.replay.painting import paint
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.shapes import USUAL_SIZE_M, extent_of, feet_of, shapes_of
@@ -38,11 +38,6 @@ def robot_picture(drawing: RolloutProcess, store: Store, name: str, *, dark: boo
     world = own if own is not None else stored_robot_file(stored_robots.robot_text(store, name)).world
     if not world.bodies:
         raise NotFound(f"the robot {name!r} has no body, so there is no picture of it")
-    return world_picture(drawing, world, dark=dark, width_px=width_px)
-
-
-def world_picture(drawing: RolloutProcess, world: World, *, dark: bool, width_px: int) -> bytes:
-    """Return a picture of a world with bodies as PNG; other arguments and errors are those of `robot_picture`."""
     key: Key = ("picture", sha256(repr(world).encode()).hexdigest(), dark, width_px)
     found: bytes | None = drawing.answers.get(key)
     if found is None:
@@ -64,11 +59,6 @@ def portrait(world: World, dark: bool, width_px: int) -> bytes:
     size = max(float(np.linalg.norm(high - low)), 1e-3)
     framing = Framing(scale=size / USUAL_SIZE_M, height_m=float(low[2] + high[2]) / 2)
     camera = camera_at([(low + high)[:2] / 2], (width_px, width_px * 3 // 4), framing, world.slope_rad)
-    solids = [
-        solid(shape, positions[0], orientations[0], colour_of(shape, down, look))
-        for shape in shapes
-        if shape.kind != "plane"
-    ]
-    target = BytesIO()
-    paint(solids, camera, look.scenery).quantize(128).save(target, "PNG", optimize=True)
+    target, painted = BytesIO(), solids(shapes, positions[0], orientations[0], down, look)
+    paint(painted, camera, look.scenery).quantize(128).save(target, "PNG", optimize=True)
     return target.getvalue()

@@ -152,10 +152,11 @@ def _shown(robot: Robot, engine: str, world: World, recording: Recording, record
     )
     if not np.isfinite(fitness) or not np.all(np.isfinite(recording.poses)):
         return found
-    told = recording.angles_rad is not None
-    bare = world if told else _base_alone(world)
-    angles = recording.angles_rad if told else np.zeros((len(recording.times_s), 0))
-    positions, orientations = body_poses(bare, recording.poses, np.asarray(angles))
+    bare, angles = world, recording.angles_rad
+    if angles is None:  # the base alone is known
+        bare = replace(world, bodies=world.bodies[:1], joints=(), observed="", origin=None, edits=frozenset())
+        angles = np.zeros((len(recording.times_s), 0))
+    positions, orientations = body_poses(bare, recording.poses, angles)
     followed = positions[:, observed_of(bare)]
     return found.model_copy(
         update={
@@ -178,10 +179,6 @@ def _framing(*worlds: ReplayWorld | None) -> Framing:
             positions = np.array(world.positions_m[0]).reshape(-1, 3)
             return framing_of(*extent_of(world.shapes, positions, np.array(world.orientations[0]).reshape(-1, 4)))
     return Framing()
-
-
-def _base_alone(world: World) -> World:
-    return replace(world, bodies=world.bodies[:1], joints=(), observed="", origin=None, edits=frozenset())
 
 
 def _speeds(recording: Recording, positions: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from gaplab.schemas.comparison_columns import UNPAIRED, shown_tests
 from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
 from gaplab.services.reports.blocks import Grid
 from gaplab.services.reports.content import Facts
-from gaplab.services.reports.judged import SIGNIFICANT, p_of
+from gaplab.services.reports.judged import SIGNIFICANT
 from gaplab.services.reports.numbers import MISSING, fixed, interval, probability, signed
 
 NAMES = {
@@ -24,9 +24,8 @@ def summaries(facts: Facts, compared: Sequence[Comparison], caption: str) -> Gri
     found: dict[str, Summary] = {}
     for pair in compared:
         found |= {pair.first: pair.summary_first, pair.second: pair.summary_second}
-    names = {one.curve.experiment: one.name for one in facts.judged}
     rows = tuple(
-        (names[key], f"{one.n}", _estimate(one.mean), _estimate(one.interquartile_mean), fixed(one.sd))
+        (facts.names[key], f"{one.n}", _estimate(one.mean), _estimate(one.interquartile_mean), fixed(one.sd))
         for key, one in found.items()
     )
     return Grid(f"{caption}, with 95 % intervals", ("Experiment", "n", "Mean", "Interquartile mean", "SD"), rows)
@@ -54,7 +53,7 @@ def pairs(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
             _estimate(pair.improvement),
             "paired t" if pair.shared_streams else "Welch",
             *map(probability, (pair.trusted.p, pair.trusted.p_holm)),
-            MISSING if (p := p_of(pair)) is None else "yes" if p < SIGNIFICANT else "no",
+            MISSING if (p := pair.trusted.p_holm) is None else "yes" if p < SIGNIFICANT else "no",
             *([pair.equivalence.verdict.value] if pair.equivalence else []),
         )
         for pair in compared
@@ -82,8 +81,7 @@ def pooled(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
 
 
 def _pair(facts: Facts, pair: Comparison) -> tuple[str]:
-    names = {one.curve.experiment: one.name for one in facts.judged}
-    return (f"{names[pair.first]} − {names[pair.second]}",)
+    return (f"{facts.names[pair.first]} − {facts.names[pair.second]}",)
 
 
 def _tests(groups: Groups, names: Iterable[str]) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Curve, Fitness
@@ -71,6 +72,11 @@ class Facts:
     work: Mapping[str, Work]
     provenance: Mapping[str, ProvenanceRead]
     leading: tuple[Judged, TunedSimulators] | None
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        """The distinct names of the experiments, by their ids."""
+        return {one.curve.experiment: one.name for one in self.judged}
 
 
 def verdict_on(store: Store, subject: Subject, margin: Margin | None = None) -> VerdictRead:

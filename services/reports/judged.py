@@ -54,17 +54,12 @@ def judged_curves(
 
 def differs(pair: Comparison) -> bool:
     """Return whether a pair differs significantly, by its trusted test after Holm's correction."""
-    return (p := p_of(pair)) is not None and p < SIGNIFICANT
+    return (p := pair.trusted.p_holm) is not None and p < SIGNIFICANT
 
 
 def is_equivalent(pair: Comparison) -> bool:
     """Return whether a pair is shown to be equivalent within the margin that was asked for."""
     return pair.equivalence is not None and pair.equivalence.verdict is EquivalenceVerdict.EQUIVALENT
-
-
-def p_of(pair: Comparison) -> float | None:
-    """Return p of the trusted test, corrected by Holm's method; None if undefined."""
-    return pair.trusted.p_holm
 
 
 def _judged(name: str, curve: Curve, experiment: ExperimentRead, count: int | None) -> Judged:

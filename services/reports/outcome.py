@@ -71,7 +71,7 @@ def outcome_of(store: Store, experiment_id: str) -> ExperimentOutcome:
         row = experiments.get_experiment(session, experiment_id)
         seen = results.page_of_samples(session, experiment_id, repetition=None, kind=None, limit=MOST_ROWS, cursor=None)
         measured = tuple(sample for sample in seen if sample.fitness is not None)
-        best = max(measured, key=_fitness, default=None)
+        best = max(measured, key=lambda sample: -inf if sample.fitness is None else sample.fitness, default=None)
         simulators = _latest(session, row, best.repetition if best else 0)
         tuned = tunings.measured(session, row)
     if best is None and not simulators:
@@ -87,10 +87,6 @@ def outcome_of(store: Store, experiment_id: str) -> ExperimentOutcome:
         simulators=simulators,
         samples=tuned.tuned_until(simulators[0].repetition, simulators[0].iteration) if simulators else 0,
     )
-
-
-def _fitness(sample: SampleRead) -> float:
-    return -inf if sample.fitness is None else sample.fitness
 
 
 def _latest(session: Session, row: ExperimentRow, repetition: int) -> tuple[SimulatorRead, ...]:

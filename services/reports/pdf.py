@@ -29,9 +29,11 @@ class _Pages(FPDF):
     """Pages with the title and their number at the bottom."""
 
     def __init__(self, title: str) -> None:
+        from matplotlib import get_data_path
+
         super().__init__(format="A4")
         self._title = title
-        folder = _fonts()
+        folder = Path(get_data_path()) / "fonts" / "ttf"
         for (family, style), file in FILES.items():
             self.add_font(family, style, folder / file)
         self.set_margin(MARGIN_MM)
@@ -138,9 +140,3 @@ def _figure(pages: _Pages, figure: FigureDefinition) -> None:
         pages.add_page()
     pages.image(picture, w=width_mm, alt_text=figure.alt)
     pages.write_text(figure.caption, "note", faint=True)
-
-
-def _fonts() -> Path:
-    from matplotlib import get_data_path
-
-    return Path(get_data_path()) / "fonts" / "ttf"

@@ -8,7 +8,7 @@ from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.reports import Trend, TrendRead
 from gaplab.services.core.trends import FEWEST_REPETITIONS, CurveEnd
 from gaplab.services.figures.words import number_of
-from gaplab.services.reports.judged import SIGNIFICANT, Judged, differs, is_equivalent, p_of
+from gaplab.services.reports.judged import SIGNIFICANT, Judged, differs, is_equivalent
 
 
 def unreproduced(told: Mapping[str, str], names: Mapping[str, str]) -> Iterator[str]:
@@ -21,7 +21,7 @@ def unreproduced(told: Mapping[str, str], names: Mapping[str, str]) -> Iterator[
 def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], count: int | None) -> Iterator[str]:
     """Yield who is ahead, in one sentence."""
     ids = {one.curve.experiment for one in learned}
-    compared = [pair for pair in pairs if {pair.first, pair.second} <= ids and p_of(pair) is not None]
+    compared = [pair for pair in pairs if {pair.first, pair.second} <= ids and pair.trusted.p_holm is not None]
     if len(learned) < 2:
         return
     if any(one.point is not None and one.point.n < FEWEST_REPETITIONS for one in learned):
@@ -54,7 +54,9 @@ def ranking(
     yield f"{where}, {told} {_with_interval(best)}."
     ids = {one.curve.experiment for one in learned}
     own = [
-        pair for pair in pairs if best.curve.experiment in {pair.first, pair.second} <= ids and p_of(pair) is not None
+        pair
+        for pair in pairs
+        if best.curve.experiment in {pair.first, pair.second} <= ids and pair.trusted.p_holm is not None
     ]
     yield from _of_best(own, names, best.curve.experiment)
     yield from _disagreements(pairs, names)
@@ -82,7 +84,7 @@ def _disagreements(pairs: Sequence[Comparison], names: Mapping[str, str]) -> Ite
         unpaired = {"Student's t": pair.student.p_holm, "Mann-Whitney": pair.mann_whitney.p_holm}
         tests = {"Wilcoxon": pair.wilcoxon.p_holm} if pair.shared_streams else unpaired
         other = [name for name, p in tests.items() if p is not None and (p < SIGNIFICANT) != differs(pair)]
-        if other and p_of(pair) is not None:
+        if other and pair.trusted.p_holm is not None:
             found, p = (
                 ("differ", f"p of at least {SIGNIFICANT}")
                 if differs(pair)
@@ -104,7 +106,7 @@ def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: 
             one.name: pair
             for one in learned
             for pair in pairs
-            if {pair.first, pair.second} == {key, one.curve.experiment} and p_of(pair) is not None
+            if {pair.first, pair.second} == {key, one.curve.experiment} and pair.trusted.p_holm is not None
         }
         if same := [name for name, pair in known.items() if is_equivalent(pair)]:
             yield f"No difference from {baseline.name} {_within(pairs)}: {listed(same)}."
@@ -167,11 +169,9 @@ def incomplete(experiments: Sequence[ExperimentRead], names: Mapping[str, str]) 
 
 def _with_interval(one: Judged) -> str:
     assert one.point is not None
-    interval = (
-        f" (95 % interval {one.point.lower:.3f} to {one.point.upper:.3f}" if one.point.lower is not None else " ("
-    )
-    n = f", n = {one.point.n})" if one.point.lower is not None else f"n = {one.point.n})"
-    return f"{one.mean:.3f} {one.curve.unit}{interval}{n}"
+    lower, upper = one.point.lower, one.point.upper
+    interval = f"95 % interval {lower:.3f} to {upper:.3f}, " if lower is not None else ""
+    return f"{one.mean:.3f} {one.curve.unit} ({interval}n = {one.point.n})"
 
 
 def _named(trends: Sequence[TrendRead]) -> str:

@@ -67,14 +67,13 @@ def cost(facts: Facts) -> Grid:
         "Time of work",
         "Duration",
     )
-    names = {one.curve.experiment: one.name for one in facts.judged}
     rows = []
     for experiment in facts.experiments:
         progress, work = experiment.progress, facts.work.get(experiment.id, Work())
         counts = (work.samples, work.probes, progress.rollouts_done, progress.rollouts_saved, progress.rollouts_failed)
         rows.append(
             (
-                names[experiment.id],
+                facts.names[experiment.id],
                 experiment.state.value.lower(),
                 f"{progress.completed} of {progress.repetitions}",
                 *(f"{count:,}" for count in counts),
@@ -91,8 +90,7 @@ def cost(facts: Facts) -> Grid:
 def differing(facts: Facts) -> Iterator[Grid]:
     """Yield the settings that differ between the experiments."""
     if facts.differing and facts.differing.settings:
-        names = {one.curve.experiment: one.name for one in facts.judged}
-        head = ("Setting", *(names[column.id] for column in facts.differing.columns))
+        head = ("Setting", *(facts.names[column.id] for column in facts.differing.columns))
         rows = tuple((each.setting, *(_values(cell) for cell in each.values)) for each in facts.differing.settings)
         yield Grid("Settings that differ", head, rows, words=True)
 
@@ -182,8 +180,7 @@ def _duration(seconds: float) -> str:
 
 def misfit(facts: Facts) -> Iterator[Grid]:
     """Yield the misfit of the latest simulators, and their tunables."""
-    names = {one.curve.experiment: one.name for one in facts.judged}
-    found = [(names[id_], read) for id_, read in facts.misfits.items() if read.points]
+    found = [(facts.names[id_], read) for id_, read in facts.misfits.items() if read.points]
     if not found:
         return
     last = [(name, read.points[-1]) for name, read in found]
@@ -207,10 +204,9 @@ def misfit(facts: Facts) -> Iterator[Grid]:
 
 def identified(facts: Facts) -> Iterator[Grid]:
     """Yield which tunables are identified, and what would help."""
-    names = {one.curve.experiment: one.name for one in facts.judged}
     rows = tuple(
         (
-            names[id_],
+            facts.names[id_],
             spoken(each.name),
             each.verdict.value,
             MISSING if each.remaining is None else f"{each.remaining:.0%}",

@@ -1,7 +1,7 @@
 """The verdict: what curves and tests say, in words, by stated rules."""
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from dataclasses import asdict
 
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Curve
@@ -10,8 +10,6 @@ from gaplab.schemas.reports import Trend, TrendRead, VerdictRead
 from gaplab.services.core.trends import FEWEST_EVALUATIONS, FEWEST_REPETITIONS, SMALL, CurveEnd
 from gaplab.services.reports import sentences
 from gaplab.services.reports.judged import SIGNIFICANT, Judged, judged_curves
-
-NONE: Mapping[str, str] = MappingProxyType({})
 
 NOTHING = "There are no results yet."
 
@@ -40,7 +38,7 @@ def judge(
     curves: Sequence[Curve],
     experiments: Sequence[ExperimentRead],
     pairs: Sequence[Comparison],
-    unreproduced: Mapping[str, str] = NONE,
+    unreproduced: Mapping[str, str],
 ) -> VerdictRead:
     """Return the verdict on experiments.
 
@@ -79,13 +77,7 @@ def _trend(one: Judged, end: CurveEnd) -> TrendRead:
     return TrendRead(
         experiment=one.curve.experiment,
         name=one.name,
-        trend=end.trend,
-        n=end.n,
-        since=end.since,
-        last=end.last,
-        gain=end.gain,
-        lower=end.lower,
-        upper=end.upper,
         continuing=continuing,
         sentence=sentences.end_of_curve(one, end),
+        **asdict(end),
     )

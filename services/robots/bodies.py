@@ -77,7 +77,7 @@ class Bodies:
 
     def turn(self, member: int, head: int) -> Rotation:
         """Return the rotation of a member in the frame of its body of the World."""
-        return self._within(head, np.zeros(3), self._data.xquat[member])[1]
+        return self._within(head, member, np.zeros(3))[1]
 
     def mass_kg(self, head: int) -> float:
         """Return the mass of a body of the World."""
@@ -141,20 +141,18 @@ class Bodies:
             return Frame(place, turn, turn, turn.apply(-reference * axis))
         return Frame(place, turn, turn * Rotation.from_rotvec(-reference * axis), np.zeros(3))
 
-    def _within(self, head: int, place: FloatArray, wxyz: FloatArray) -> tuple[FloatArray, Rotation]:
-        """Return a pose in the scene, at the reference angles, in the frame of a body of the World."""
-        frame = self.frames[head]
-        turned = frame.turn.inv()
-        return np.asarray(turned.apply(place - frame.place_m)), turned * rotation_of(wxyz)
+    def _within(self, head: int, member: int, place_m: FloatArray) -> tuple[FloatArray, Rotation]:
+        """Return a place in the frame of a member, and the turn of that frame, in the frame of a body of the World."""
+        frame, turn = self.frames[head], rotation_of(self._data.xquat[member])
+        place, turned = self._data.xpos[member] + turn.apply(place_m), frame.turn.inv()
+        return np.asarray(turned.apply(place - frame.place_m)), turned * turn
 
     def _inertia(self, head: int) -> tuple[FloatArray, Inertia]:
         """Return the centre of mass and the inertia of all members together."""
         model = self.model
         found = []
         for at in self.members(head):
-            turn = rotation_of(self._data.xquat[at])
-            place = self._data.xpos[at] + turn.apply(model.body_ipos[at])
-            center, axes = self._within(head, place, self._data.xquat[at])
+            center, axes = self._within(head, at, model.body_ipos[at])
             found.append((float(model.body_mass[at]), center, axes * rotation_of(model.body_iquat[at]), at))
         heavy = [each for each in found if each[0] > 0]
         if weightless := [each[3] for each in found if each[0] <= 0 and model.body_inertia[each[3]].any()]:
@@ -183,10 +181,7 @@ class Bodies:
                 "shapes that touch nothing are left out; `-s visuals=true` keeps them: {}", self.name(head)
             )
         for geom in shown:
-            body = int(model.geom_bodyid[geom])
-            turn = rotation_of(self._data.xquat[body])
-            place = self._data.xpos[body] + turn.apply(model.geom_pos[geom])
-            center, axes = self._within(head, place, self._data.xquat[body])
+            center, axes = self._within(head, int(model.geom_bodyid[geom]), model.geom_pos[geom])
             part = self._shapes.part(geom, center, axes * rotation_of(model.geom_quat[geom]))
             if part is not None:
                 yield part
@@ -195,3 +190,8 @@ class Bodies:
 def joint_name(model: Any, at: int) -> str:  # noqa: ANN401
     """Return the name of a joint, or one made of its number."""
     return str(model.joint(at).name) or f"joint{at}"
+
+
+def joint_number(model: Any, name: str) -> int:  # noqa: ANN401
+    """Return the number of the joint with a name."""
+    return next(at for at in range(model.njnt) if joint_name(model, at) == name)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from gaplab.services.robots.bodies import joint_name
+from gaplab.services.robots.bodies import joint_number
 from gaplab.services.robots.reading import mujoco_library
 
 PLACEHOLDER = 50.0
@@ -13,7 +13,7 @@ PLACEHOLDER = 50.0
 
 def effort(model: Any, name: str) -> float | None:  # noqa: ANN401
     """Return the largest effort of a joint in the file, N·m or N; None if it has none."""
-    at = _number(model, name)
+    at = joint_number(model, name)
     largest = float(np.abs(model.jnt_actfrcrange[at]).max())
     return largest if model.jnt_actfrclimited[at] and largest > 0 else None
 
@@ -23,7 +23,7 @@ def needed_torque(model: Any, name: str) -> float:  # noqa: ANN401
     mujoco = mujoco_library()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    at = _number(model, name)
+    at = joint_number(model, name)
     moved = {int(model.jnt_bodyid[at])}
     for body in range(model.nbody):
         if int(model.body_parentid[body]) in moved:
@@ -32,7 +32,3 @@ def needed_torque(model: Any, name: str) -> float:  # noqa: ANN401
     reaches = [np.linalg.norm(data.geom_xpos[geom] - data.xanchor[at]) + model.geom_rbound[geom] for geom in geoms]
     weight = float(model.body_mass.sum()) * 9.81
     return weight if model.jnt_type[at] == 2 else 0.5 * weight * float(max(reaches, default=0.1))
-
-
-def _number(model: Any, name: str) -> int:  # noqa: ANN401
-    return next(at for at in range(model.njnt) if joint_name(model, at) == name)

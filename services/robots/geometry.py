@@ -1,5 +1,6 @@
 """Shapes of a compiled model as those of a World."""
 
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -79,7 +80,7 @@ class Shapes:
 
     def __init__(self, model: Any, options: ImportOptions, notes: Notes) -> None:  # noqa: ANN401
         self._model, self._options, self._notes = model, options, notes
-        self._hulls: dict[int, Hull | None] = {}
+        self._hull = cache(self._simplified)
         self.planes = [at for at in range(model.ngeom) if model.geom_bodyid[at] == 0 and self._kind(at) == "plane"]
         self._grounds = [(int(model.geom_contype[at]), int(model.geom_conaffinity[at])) for at in self.planes]
 
@@ -131,11 +132,6 @@ class Shapes:
             return _ellipsoid(np.array([x, y, z]), self._options.vertices)
         self._notes.lose(f"{self._name(geom)} is a {kind}, which a robot cannot have: it is left out")
         return None
-
-    def _hull(self, mesh: int) -> Hull | None:
-        if mesh not in self._hulls:
-            self._hulls[mesh] = self._simplified(mesh)
-        return self._hulls[mesh]
 
     def _simplified(self, mesh: int) -> Hull | None:
         model = self._model

@@ -1,7 +1,7 @@
 """Changed masses, centres and inertias of a World's body, as those of the file's bodies that it consists of."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -71,18 +71,7 @@ def inertials(bodies: Bodies, head: int, before: Body, after: Body) -> list[Iner
         return found
     ((only,), turn) = found, bodies.turn(shared[0], head)
     axes = turn.inv() * Rotation.from_quat(after.inertia.turn)
-    return [
-        Inertial(
-            only.body,
-            only.number,
-            float("nan"),
-            only.moved_m,
-            only.center_m,
-            only.mass_kg,
-            np.array(after.inertia.moments_kg_m2),
-            axes,
-        )
-    ]
+    return [replace(only, scale=float("nan"), moments_kg_m2=np.array(after.inertia.moments_kg_m2), axes=axes)]
 
 
 def _of_members(bodies: Bodies, head: int, members: list[int], scale: float, moved_m: FloatArray) -> Iterator[Inertial]:

@@ -2,17 +2,15 @@
 
 import os
 from collections.abc import Sequence
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.world import World
-from gaplab.services.robots.bodies import Bodies, joint_name
+from gaplab.services.robots.bodies import joint_name, joint_number
 from gaplab.services.robots.changes import Change
-from gaplab.services.robots.inertials import Inertial, inertials
+from gaplab.services.robots.inertials import Inertial
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.xml import Document, Element, child, decoded, numbers, tree
 
@@ -27,15 +25,14 @@ class MjcfDocument(Document):
         super().__init__(text)
         _include(self.root, folder)
         self._model, self._has_motors = model, options.motor is None
-        locked = options.lock
         elements = [each for world in self.root.findall("worldbody") for each in world.iter()]
         self._bodies = [each for each in elements if each.tag == "body"]
         joints = [each for body in self._bodies for each in body if each.tag in {"joint", "freejoint"}]
-        self._joints = [each for each in joints if not _fits(each.get("name", ""), locked)]
+        self._joints = [each for each in joints if not options.locks(each.get("name", ""))]
         if len(self._joints) == model.njnt - 1:  # the import made the base free
             self._joints.insert(0, tree("<freejoint/>"))
         drives = [each for group in self.root.findall("actuator") for each in group if isinstance(each.tag, str)]
-        self._actuators = [each for each in drives if not _fits(each.get("joint", ""), locked)]
+        self._actuators = [each for each in drives if not options.locks(each.get("joint", ""))]
         self._check()
 
     def write(self, change: Change) -> bool:
@@ -58,11 +55,9 @@ class MjcfDocument(Document):
             return True
         return value.startswith("motor.") and self._write_motor(name, value, change.after)
 
-    def write_body(self, bodies: Bodies, head: int, before: World, after: World) -> bool:
-        """Write mass, centre and inertia of a body; return whether the bodies that it consists of can share them."""
-        at = bodies.heads.index(head)
-        found = inertials(bodies, head, before.bodies[at], after.bodies[at])
-        if found is None or self._compiler("settotalmass", ""):
+    def write_body(self, found: Sequence[Inertial]) -> bool:
+        """Write mass, centre and inertia of the members of a body; return whether the file lets them have their own."""
+        if self._compiler("settotalmass", ""):
             return False
         if self._compiler("inertiafromgeom", "auto") == "true":
             self._state_all()
@@ -89,8 +84,7 @@ class MjcfDocument(Document):
             raise InvalidRobot(["the bodies of the MJCF are made by frames or copies: write robot.json instead"])
 
     def _joint(self, name: str) -> Element:
-        model = self._model
-        return next(self._joints[at] for at in range(model.njnt) if joint_name(model, at) == name)
+        return self._joints[joint_number(self._model, name)]
 
     def _compiler(self, name: str, default: str) -> str:
         return next((each.get(name, default) for each in self.root.findall("compiler") if each.get(name)), default)
@@ -169,10 +163,6 @@ def _limit(element: Element, what: str, largest: float) -> None:
     """Write a range to both sides, and that it counts."""
     element.set(f"{what}range", numbers(-largest, largest))
     element.set(f"{what}limited", "true")
-
-
-def _fits(name: str, patterns: Sequence[str]) -> bool:
-    return any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def _include(root: Element, folder: Path) -> None:

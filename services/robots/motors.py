@@ -222,16 +222,15 @@ def with_swings(joints: list[Joint], notes: Notes) -> list[Joint]:
         largest = max(max(map(abs, each.limits or ())) for each in turning)
         line = f"limits up to {largest:g} rad, {largest / (2 * np.pi):.0f} turns, are taken as they are, not as degrees"
         notes.lose(f"{line}: {{}}", *(each.name for each in turning))
-    found = []
-    for joint in joints:
-        follows = getattr(joint.motor, "follows", "position")
-        if joint.motor is not None and follows == "position":
-            swing = SWING_M if joint.slides else SWING_RAD
-            if joint.limits is not None:
-                lower, upper = joint.limits
-                nearer = min(joint.start - lower, upper - joint.start)
-                swing = min(swing, max(nearer, 0.1 * (upper - lower)))
-            found.append(replace(joint, swing=swing))
-        else:
-            found.append(joint)
-    return found
+    return [_with_swing(joint) for joint in joints]
+
+
+def _with_swing(joint: Joint) -> Joint:
+    if joint.motor is None or getattr(joint.motor, "follows", "position") != "position":
+        return joint
+    swing = SWING_M if joint.slides else SWING_RAD
+    if joint.limits is None:
+        return replace(joint, swing=swing)
+    lower, upper = joint.limits
+    nearer = min(joint.start - lower, upper - joint.start)
+    return replace(joint, swing=min(swing, max(nearer, 0.1 * (upper - lower))))

@@ -40,11 +40,11 @@ class Notes:
         """Note a reason to refuse the file."""
         self.refused.append(line)
 
-    def refuse_unknown(self, option: str, patterns: Iterable[str], joints: Sequence[str]) -> None:
-        """Note each pattern of an option that matches no joint."""
+    def refuse_unknown(self, patterns: Iterable[str], joints: Sequence[str]) -> None:
+        """Note each pattern of locked joints that matches none."""
         for pattern in patterns:
             if not any(fnmatchcase(name, pattern) for name in joints):
-                self.refuse(f"no joint is called like {pattern!r}, as --{option} says; joints: {listed(joints, 30)}")
+                self.refuse(f"no joint is called like {pattern!r}, as --lock says; joints: {listed(joints, 30)}")
 
     def check(self) -> None:
         """Raise all reasons to refuse the file so far.

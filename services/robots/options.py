@@ -1,5 +1,6 @@
 """Options of an import: the same file with the same options gives the same robot."""
 
+from fnmatch import fnmatchcase
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
@@ -59,6 +60,10 @@ class ImportOptions(Frozen):
     observed: str | None = None
     controller: PluginRef | None = None
     task: PluginRef | None = None
+
+    def locks(self, joint: str) -> bool:
+        """Return whether a joint is fixed, by its name."""
+        return any(fnmatchcase(joint, pattern) for pattern in self.lock)
 
     @field_validator("turn", mode="before")
     @classmethod

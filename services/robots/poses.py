@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Quaternion
 from gaplab.services.core.world import Body, Joint
-from gaplab.services.robots.bodies import FREE, Bodies, joint_name
+from gaplab.services.robots.bodies import FREE, Bodies, joint_name, joint_number
 from gaplab.services.robots.geometry import quaternion, rotation_of
 from gaplab.services.robots.notes import Notes, listed
 from gaplab.services.robots.options import ImportOptions
@@ -93,8 +93,7 @@ def base_pose(
     model, data = bodies.model, mujoco_library().MjData(bodies.model)
     data.qpos[:] = qpos
     for joint in joints:
-        at = next(at for at in range(model.njnt) if joint_name(model, at) == joint.name)
-        data.qpos[int(model.jnt_qposadr[at])] = joint.start
+        data.qpos[int(model.jnt_qposadr[joint_number(model, joint.name)])] = joint.start
     mujoco_library().mj_kinematics(model, data)
     lowest = [
         lowest_m(part, *_frame(model, data, head))

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -126,9 +125,9 @@ def _root(spec: Any, notes: Notes) -> Any:  # noqa: ANN401
 
 def _lock(spec: Any, options: ImportOptions, notes: Notes) -> None:  # noqa: ANN401
     """Fix joints at their reference angles, and delete their actuators."""
-    notes.refuse_unknown("lock", options.lock, [joint.name for joint in spec.joints])
+    notes.refuse_unknown(options.lock, [joint.name for joint in spec.joints])
     for joint in list(spec.joints):
-        if any(fnmatchcase(joint.name, pattern) for pattern in options.lock):
+        if options.locks(joint.name):
             for actuator in [each for each in spec.actuators if each.target == joint.name]:
                 spec.delete(actuator)
             spec.delete(joint)

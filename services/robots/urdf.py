@@ -3,9 +3,8 @@
 Source: https://wiki.ros.org/urdf/XML, https://mujoco.readthedocs.io/en/stable/modeling.html#urdf-extensions
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -67,7 +66,7 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
     check_structure(root, notes)
     check_values(root, notes)
     notes.check()
-    _lock(root, options.lock, notes)
+    _lock(root, options, notes)
     is_held = without_the_scene(root, notes)
     complete_limits(root, notes)
     _refuse(root, notes)
@@ -94,11 +93,11 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
     )
 
 
-def _lock(root: Element, patterns: Sequence[str], notes: Notes) -> None:
+def _lock(root: Element, options: ImportOptions, notes: Notes) -> None:
     """Fix joints at zero."""
-    notes.refuse_unknown("lock", patterns, [_name(joint) for joint in root.findall("joint")])
+    notes.refuse_unknown(options.lock, [_name(joint) for joint in root.findall("joint")])
     for joint in root.findall("joint"):
-        if any(fnmatchcase(_name(joint), pattern) for pattern in patterns):
+        if options.locks(_name(joint)):
             joint.set("type", "fixed")
             for mimic in joint.findall("mimic"):
                 joint.remove(mimic)

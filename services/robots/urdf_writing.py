@@ -1,14 +1,13 @@
 """Tuned values in a URDF: masses, centres, inertias, limits, damping, friction and efforts."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from gaplab.services.core.world import World
-from gaplab.services.robots.bodies import Bodies
 from gaplab.services.robots.changes import Change
-from gaplab.services.robots.inertials import Inertial, inertials
+from gaplab.services.robots.inertials import Inertial
 from gaplab.services.robots.urdf import find_mesh
 from gaplab.services.robots.xml import Document, Element, child, numbers, scaled
 
@@ -40,12 +39,10 @@ class UrdfDocument(Document):
         child(joint, tag).set(attribute, numbers(change.after))
         return True
 
-    def write_body(self, bodies: Bodies, head: int, before: World, after: World) -> bool:
-        """Write mass, centre and inertia of a body; return whether the links that it consists of can share them."""
-        at = bodies.heads.index(head)
-        found = inertials(bodies, head, before.bodies[at], after.bodies[at])
+    def write_body(self, found: Sequence[Inertial]) -> bool:
+        """Write mass, centre and inertia of the links of a body; return whether all of them have an inertial."""
         links = {link.get("name"): link.find("inertial") for link in self.root.findall("link")}
-        if found is None or any(links.get(each.body) is None for each in found):
+        if any(links.get(each.body) is None for each in found):
             return False
         for each in found:
             inertial = links[each.body]

@@ -14,6 +14,7 @@ from gaplab.services.engines.mujoco.plain import LOST, mjcf_of
 from gaplab.services.robots.bodies import Bodies
 from gaplab.services.robots.changes import Change, Place, changes
 from gaplab.services.robots.importing import import_robot
+from gaplab.services.robots.inertials import inertials
 from gaplab.services.robots.mjcf_writing import MjcfDocument
 from gaplab.services.robots.notes import Notes
 from gaplab.services.robots.options import ImportOptions
@@ -198,9 +199,10 @@ def _write(
 ) -> set[Place]:
     """Write what the document has a place for; return the places of these values."""
     written = {change.place for change in wanted if document.write(change)}
-    for head, body in zip(bodies.heads, worlds[0].bodies, strict=True):
-        places = {c.place for c in wanted if c.place[:2] == ("bodies", body.name) and c.place[2] in _OF_BODIES}
-        if places and head and document.write_body(bodies, head, *worlds):
+    for head, before, after in zip(bodies.heads, worlds[0].bodies, worlds[1].bodies, strict=True):
+        places = {c.place for c in wanted if c.place[:2] == ("bodies", before.name) and c.place[2] in _OF_BODIES}
+        found = inertials(bodies, head, before, after) if places and head else None
+        if found is not None and document.write_body(found):
             written |= places
     material = worlds[1].material
     frictions = {("world", "", name) for name in _FRICTION} & {change.place for change in wanted}

@@ -26,7 +26,7 @@ from gaplab.services.engines.mujoco.pool import in_force
 from gaplab.services.engines.mujoco.scene import ROWS
 
 mujoco = pytest.importorskip("mujoco")
-structs = pytest.importorskip("mujoco.introspect.structs")
+pytest.importorskip("mujoco.introspect.structs")
 pytest.importorskip("numba")
 
 G, STEP_S = 9.81, 1 / 100
@@ -128,15 +128,15 @@ def test_its_fields_are_where_mujocos_description_of_itself_says() -> None:
     box = Sliding(BOX, Material())
     model, data = box.model, box.data
     mujoco.mj_forward(model, data)
-    offsets, _ = layout(structs, "mjData")
-    contact, size = layout(structs, "mjContact")
+    offsets, _ = layout("mjData")
+    contact, size = layout("mjContact")
 
     def number(address: int, kind: type) -> int | float:
         return kind.from_address(address).value  # type: ignore[attr-defined]
 
     for name in f"{FIELDS} {ROW_FIELDS}".split():
         assert number(data._address + offsets[name], c_int64) == getattr(data, name).ctypes.data, name
-    inside, _ = layout(structs, "mjModel")
+    inside, _ = layout("mjModel")
     assert number(model._address + inside["numeric_data"], c_int64) == model.numeric_data.ctypes.data
     assert number(model._address + inside["nv"], c_int64) == model.nv
     assert number(data._address + offsets["ncon"], c_int32) == len(data.contact) > 1

@@ -48,8 +48,7 @@ def callbacks() -> Callbacks:
 
 def _law(numba: Any) -> Any:
     """Compute torques, then forces of joints and contacts, which are added; MuJoCo's solver has no rows left."""
-    structs = import_module("mujoco.introspect.structs")
-    at, settings_of = layout(structs, "mjData")[0], layout(structs, "mjModel")[0]["numeric_data"] // 8
+    at, settings_of = layout("mjData")[0], layout("mjModel")[0]["numeric_data"] // 8
     rows_of, forces_of = at["nefc"] // 4, at["qfrc_applied"] // 8
     angles_of, speeds_of = at["qpos"] // 8, at["qvel"] // 8
     accelerations_of = at["qacc_warmstart"] // 8  # those of the last step: MuJoCo copies them there at its end
@@ -75,8 +74,7 @@ def _law(numba: Any) -> Any:
 
 def _sensor(numba: Any) -> Any:
     """Copy the accelerations at the end of a step to the readings of sensors, which a rollout returns."""
-    structs = import_module("mujoco.introspect.structs")
-    at, model_at = layout(structs, "mjData")[0], layout(structs, "mjModel")[0]
+    at, model_at = layout("mjData")[0], layout("mjModel")[0]
     accelerations_of, readings_of, dofs_of = at["qacc"] // 8, at["sensordata"] // 8, model_at["nv"] // 8
     view, pointer = numba.carray, _pointer(numba)
 
@@ -92,7 +90,7 @@ def _sensor(numba: Any) -> Any:
 
 def _meet(numba: Any) -> Any:
     """Compute the impulses of joints and contacts, and add them as forces on the degrees of freedom."""
-    at = layout(import_module("mujoco.introspect.structs"), "mjData")[0]
+    at = layout("mjData")[0]
     bias_of, smooth_of, free_of = at["qfrc_bias"] // 8, at["qfrc_smooth"] // 8, at["qacc_smooth"] // 8
     jacobian_of, inverse_of, before_of = at["efc_J"] // 8, at["efc_AR"] // 8, at["efc_vel"] // 8
     excess_of, frictions_of, impulses_of = at["efc_b"] // 8, at["efc_frictionloss"] // 8, at["efc_force"] // 8
@@ -125,7 +123,7 @@ def _meet(numba: Any) -> Any:
 
 def _aim(numba: Any) -> Any:
     """Set the bounds of dry friction's impulses, and the target speeds of limits; return the numbers of their rows."""
-    at = layout(import_module("mujoco.introspect.structs"), "mjData")[0]
+    at = layout("mjData")[0]
     brakes_of, limits_of, gaps_of = at["nf"] // 4, at["nl"] // 4, at["efc_pos"] // 8
     view, pointer, end = numba.carray, _pointer(numba), numba.njit(error_model="numpy")(stop)
 
@@ -146,8 +144,7 @@ def _aim(numba: Any) -> Any:
 
 def _land(numba: Any) -> Any:
     """Set the target speeds and the coefficients of contacts."""
-    structs = import_module("mujoco.introspect.structs")
-    at, (contact, size) = layout(structs, "mjData")[0], layout(structs, "mjContact")
+    at, (contact, size) = layout("mjData")[0], layout("mjContact")
     count_of, contacts_of, row_of = at["ncon"] // 4, at["contact"] // 8, contact["efc_address"] // 4
     depth_of, friction_of = contact["dist"] // 8, contact["friction"] // 8
     view, pointer, want = numba.carray, _pointer(numba), numba.njit(error_model="numpy")(touch)

@@ -12,34 +12,9 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.core.world import World
-from gaplab.services.engines.base import ALL_FIELDS, Engine
+from gaplab.services.engines.base import ALL_FIELDS, USUALLY_IN_PLACE, Engine
 from gaplab.services.engines.mujoco.scene import MuJoCoScene
 from gaplab.services.engines.stepping import WarmScenes, consecutive, recording
-
-IN_PLACE = frozenset(
-    {
-        "body.mass_kg",
-        "body.center_m",
-        "body.inertia",
-        "joint.limits",
-        "joint.damping",
-        "joint.dry_friction",
-        "joint.armature",
-        "motor.position_gain",
-        "motor.max_speed_rad_s",
-        "motor.max_torque_nm",
-        "motor.follows",
-        "motor.kp",
-        "motor.kd",
-        "motor.delay_s",
-        "surfaces",
-        "gravity_m_s2",
-        "slope_rad",
-        "noise",
-        "noise.start_tilt_rad",
-    }
-)
-"""Fields that are numbers of a compiled model."""
 
 
 class MuJoCoOptions(Frozen):
@@ -65,7 +40,15 @@ class MuJoCo(Engine):
     Options = MuJoCoOptions
     options: MuJoCoOptions
     honours = ALL_FIELDS
-    in_place = IN_PLACE
+    in_place = USUALLY_IN_PLACE | {
+        "body.center_m",
+        "body.inertia",
+        "gravity_m_s2",
+        "joint.armature",
+        "joint.limits",
+        "motor.follows",
+        "slope_rad",
+    }
     closes_loops = True
     repeatable = True
 

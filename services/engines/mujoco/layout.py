@@ -1,50 +1,45 @@
 """Memory layout of MuJoCo's C structures, from `mujoco.introspect`."""
 
-from types import ModuleType
+import ctypes
+from functools import reduce
+from importlib import import_module
+from operator import mul
 from typing import Any
 
 Offsets = dict[str, int]
 
-_SCALARS = {"char": 1, "mjtBool": 1, "int": 4, "float": 4, "mjtNum": 8, "mjtSize": 8, "size_t": 8, "uint64_t": 8}
-_SCALARS["uintptr_t"] = _SCALARS["pointer"] = 8
+_SCALARS = {
+    "char": ctypes.c_char,
+    "mjtBool": ctypes.c_bool,
+    "int": ctypes.c_int,
+    "float": ctypes.c_float,
+    "mjtNum": ctypes.c_double,
+    "mjtSize": ctypes.c_int64,
+    "size_t": ctypes.c_size_t,
+    "uint64_t": ctypes.c_uint64,
+    "uintptr_t": ctypes.c_size_t,
+}
 
 
-def layout(structs: ModuleType, name: str) -> tuple[Offsets, int]:
-    """Return the offset of each field of a structure, and the total size, in bytes on a 64-bit machine.
-
-    Args:
-        structs: the module `mujoco.introspect.structs`.
-        name: name of the structure, like `mjContact`.
-    """
-    offsets, size, _ = _struct(structs, structs.STRUCTS[name].fields)
-    return offsets, size
+def layout(name: str) -> tuple[Offsets, int]:
+    """Return the offset of each field of a structure, like `mjContact`, and the total size, in bytes."""
+    made = _type(name)
+    return {field: getattr(made, field).offset for field, _ in made._fields_}, ctypes.sizeof(made)
 
 
-def _struct(structs: ModuleType, fields: Any) -> tuple[Offsets, int, int]:
-    offsets: Offsets = {}
-    end, alignment = 0, 1
-    for field in fields:
-        size, unit = _measure(structs, field.type)
-        offsets[field.name] = _up(end, unit)
-        end, alignment = offsets[field.name] + size, max(alignment, unit)
-    return offsets, _up(end, alignment), alignment
+def _type(kind: Any) -> Any:
+    """Return what ctypes has for the name of a type, or for a type of MuJoCo's without a name."""
+    match type(kind).__name__:
+        case "PointerType":
+            return ctypes.c_void_p
+        case "ArrayType":
+            return reduce(mul, kind.extents, _type(kind.inner_type))
+        case "ValueType":
+            return _type(kind.name)
+        case "AnonymousStructDecl":
+            return _struct(kind.fields)
+    return _SCALARS.get(kind) or _struct(import_module("mujoco.introspect.structs").STRUCTS[kind].fields)
 
 
-def _measure(structs: ModuleType, kind: Any) -> tuple[int, int]:
-    """Return size and alignment of a field."""
-    if type(kind).__name__ == "PointerType":
-        return _SCALARS["pointer"], _SCALARS["pointer"]
-    if type(kind).__name__ == "ArrayType":
-        size, unit = _measure(structs, kind.inner_type)
-        for extent in kind.extents:
-            size *= extent
-        return size, unit
-    if type(kind).__name__ == "AnonymousStructDecl":
-        return _struct(structs, kind.fields)[1:]
-    if kind.name in _SCALARS:
-        return _SCALARS[kind.name], _SCALARS[kind.name]
-    return _struct(structs, structs.STRUCTS[kind.name].fields)[1:]
-
-
-def _up(offset: int, unit: int) -> int:
-    return -(-offset // unit) * unit
+def _struct(fields: Any) -> type[ctypes.Structure]:
+    return type("Struct", (ctypes.Structure,), {"_fields_": [(each.name, _type(each.type)) for each in fields]})

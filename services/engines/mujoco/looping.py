@@ -1,22 +1,18 @@
 """Controllers in loops: all rollouts of a call are stepped together, with one call of the controller in each period."""
 
 from collections.abc import Hashable, Sequence
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Loop
 from gaplab.services.core.observations import observations
 from gaplab.services.core.world import World
 from gaplab.services.engines.agenda import Acting, tick_steps
-from gaplab.services.engines.mujoco.controls import Controls, grouped, held
-from gaplab.services.engines.mujoco.models import Delays, Prepared
+from gaplab.services.engines.mujoco.controls import Controls, Steps, grouped, held
+from gaplab.services.engines.mujoco.models import Prepared
 from gaplab.services.engines.mujoco.pool import Continued, Pool
 from gaplab.services.engines.mujoco.states import States
-
-Steps = NDArray[np.int_]
 
 
 class Looping:
@@ -47,20 +43,21 @@ class Looping:
         """
         run, end = _Run(self._states, prepared, loops), int(kept[-1])
         at = np.array(tick_steps(loops[0], prepared[0].world.time_step_s))
-        commands = _Commands(np.empty((len(run.models), len(at), len(prepared[0].world.actuators))), at)
+        targets = np.empty((len(run.models), len(at), len(prepared[0].world.actuators)))  # of each call
         delays = grouped([each.delays for each in prepared] * len(loops))
         found = np.empty((len(run.models), len(kept), len(self._states.start)))
         found[:, kept == 0] = run.recent[:, -1:]
         now = Continued(run.recent[:, -1], np.zeros((len(run.models), self._controls.width)))
         with self._pool.sensing(run.models[: len(prepared)]):
             for tick, (begin, then) in enumerate(zip(at, [*np.minimum(at[1:], end), end], strict=True)):
-                commands.targets[:, tick] = run.targets(tick)
+                targets[:, tick] = run.targets(tick)
                 if begin == then:
                     continue
                 controls = np.zeros((len(run.models), then - begin, self._controls.width))
                 for late, columns in delays:
                     for column in columns:
-                        self._controls.put(controls[column], commands.of(column, tick, np.arange(begin, then), late))
+                        given = targets[column, : tick + 1]
+                        self._controls.put(controls[column], held(at[: tick + 1], given, np.arange(begin, then), late))
                 if told is not None:
                     told[:, begin:then] = controls
                 states, now = self._pool.advanced(run.models, now, controls)
@@ -68,24 +65,6 @@ class Looping:
                 inside = (kept > begin) & (kept <= then)
                 found[:, inside] = states[:, kept[inside] - begin - 1]
         return found
-
-
-class _Commands(NamedTuple):
-    """Targets that controllers have set.
-
-    Attributes:
-        targets: `(rows, ticks, a)`: those of each call of the controllers.
-        at: `(ticks,)`: time steps of the calls.
-    """
-
-    targets: FloatArray
-    at: Steps
-
-    def of(self, rows: int | slice, tick: int, now: Steps, delays: Delays | None) -> FloatArray:
-        """Return `(..., s, a)`: the targets that motors follow in steps `(s,)` from a call on."""
-        if delays is None:
-            return self.targets[rows, tick : tick + 1]
-        return held(self.at[: tick + 1], self.targets[rows, : tick + 1], now, delays)
 
 
 class _Run:

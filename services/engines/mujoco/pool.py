@@ -1,7 +1,7 @@
 """Calls of MuJoCo: many rollouts at once, under the law, on any number of threads."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from importlib import import_module
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -81,11 +81,9 @@ class Pool:
             for model in models:
                 model.opt.disableflags |= self._sensor_off
 
-    @contextmanager
-    def in_force(self) -> Iterator[None]:
+    def in_force(self) -> AbstractContextManager[None]:
         """Activate the law during a call."""
-        with in_force(self._mujoco, self._callbacks):
-            yield
+        return in_force(self._mujoco, self._callbacks)
 
     def close(self) -> None:
         """End the threads."""

@@ -49,34 +49,29 @@ class PD(NamedTuple):
     rotor_kg_m2: float
 
 
-class Settings(NamedTuple):
-    """What the law reads of a world, apart from what MuJoCo's model has.
-
-    Attributes:
-        servos: its Motors.
-        motors: its PDMotors.
-        dampers: damping of degrees of freedom, by these.
-    """
-
-    servos: Sequence[Servo] = ()
-    motors: Sequence[PD] = ()
-    dampers: Sequence[tuple[int, float]] = ()
-
-
-def settings(world: World, dofs: int, ahead: int, of: Settings) -> FloatArray:
+def settings(
+    world: World,
+    dofs: int,
+    ahead: int,
+    servos: Sequence[Servo] = (),
+    motors: Sequence[PD] = (),
+    dampers: Sequence[tuple[int, float]] = (),
+) -> FloatArray:
     """Return the settings of a world, as an array for the law.
 
     Args:
         world: world.
         dofs: number of degrees of freedom.
         ahead: number of positions, less that of degrees of freedom.
-        of: its motors and damped joints.
+        servos: its Motors.
+        motors: its PDMotors.
+        dampers: damping of degrees of freedom, by these.
     """
     step, sweeps = world.time_step_s, max(1, world.solver_iterations)
-    counts = (len(of.servos), len(of.motors), len(of.dampers))
+    counts = (len(servos), len(motors), len(dampers))
     tables = [
-        *(value for servo in of.servos for value in servo),
-        *(value for dof, law, rotor in of.motors for value in (dof, *law, rotor)),
-        *(value for damper in of.dampers for value in damper),
+        *(value for servo in servos for value in servo),
+        *(value for dof, law, rotor in motors for value in (dof, *law, rotor)),
+        *(value for damper in dampers for value in damper),
     ]
     return np.array([step, abs(world.gravity_m_s2) * step, sweeps, dofs, ahead, *counts, *tables])

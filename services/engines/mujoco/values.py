@@ -16,15 +16,12 @@ from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.shapes import UNTURNED, Box, Quaternion, Sphere, Vector
 from gaplab.services.core.world import Body, Material, Motor, PDMotor, World
 from gaplab.services.engines.mujoco.model import Structure, scalar_first
-from gaplab.services.engines.mujoco.settings import FALL, PD, Servo, Settings, settings
+from gaplab.services.engines.mujoco.settings import FALL, PD, Servo, settings
 
 ROTOR = 8.0
 """Inertia of a servo's rotor, relative to that of what its joint carries in the zero pose: in one step a free limb
 reaches eight ninths of the target speed. The rank correlation with PyBullet over random gaits was 0.78; with 2, 4, 16
 and 32 it was 0.41, 0.72, 0.66 and 0.57."""
-
-WEAK = PDLaw(0.0, 0.0, 0.0, 0.0)
-"""The law of a motor without strength."""
 
 IN_PLACE, SAME_TURN, ANYWHERE = 1, 3, 0
 """MuJoCo's values of `sameframe`: frames are equal, only their turns are, or neither."""
@@ -124,7 +121,7 @@ def _write_joints(mujoco: ModuleType, structure: Structure, model: Any, data: An
     for dof, damping in dampers:
         model.dof_armature[dof] += world.time_step_s * damping  # the speed after the step is damped, not that before
     mujoco.mj_setConst(model, data)
-    known = settings(world, model.nv, structure.ahead, Settings(servos, motors, dampers))
+    known = settings(world, model.nv, structure.ahead, servos, motors, dampers)
     model.numeric_data[: len(known)] = known
 
 
@@ -151,7 +148,7 @@ def _motors(mujoco: ModuleType, structure: Structure, model: Any, data: Any, wor
     driven = any(isinstance(motor, PDMotor) for motor, _ in motors)
     inverses = _inverse_inertias(mujoco, structure, model, data, world) if driven else []
     return [
-        _pd(motor, dof, inverses[dof], world.time_step_s) if isinstance(motor, PDMotor) else PD(dof, WEAK, 0.0)
+        _pd(motor, dof, inverses[dof], world.time_step_s) if isinstance(motor, PDMotor) else PD(dof, PDLaw(), 0.0)
         for motor, dof in motors
         if isinstance(motor, PDMotor) or motor.max_torque_nm <= 0
     ]

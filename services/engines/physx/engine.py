@@ -8,30 +8,10 @@ from warnings import catch_warnings, simplefilter
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.motions import Tilt
 from gaplab.services.core.world import World
+from gaplab.services.engines.base import USUALLY_IN_PLACE
 from gaplab.services.engines.physx.scene import PhysXScene, surface_names
 from gaplab.services.engines.physx.shapes import MOST_SURFACES
 from gaplab.services.engines.stepped import SteppedEngine
-
-IN_PLACE = frozenset(
-    {
-        "body.inertia",
-        "body.mass_kg",
-        "joint.armature",
-        "joint.damping",
-        "joint.dry_friction",
-        "motor.delay_s",
-        "motor.follows",
-        "motor.kd",
-        "motor.kp",
-        "motor.max_speed_rad_s",
-        "motor.max_torque_nm",
-        "motor.position_gain",
-        "noise",
-        "noise.start_tilt_rad",
-        "surfaces",
-    }
-)
-"""Fields that PhysX lets us set in a scene; gravity, and so the slope, is given when a scene is created."""
 
 
 class PhysX(SteppedEngine[PhysXScene]):
@@ -45,17 +25,13 @@ class PhysX(SteppedEngine[PhysXScene]):
     name = "physx"
     source = "PhysX 5.3.1 through SAPIEN, https://sapien.ucsd.edu, version 3.0.3; docs/engines.md"
     library = "sapien"
-    in_place = IN_PLACE
+    in_place = USUALLY_IN_PLACE | {"body.inertia", "joint.armature", "motor.follows"}
+    # gravity, and so the slope, is given when a scene is created
     install = "pip install 'gaplab[physx]'"
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
         self._library = _sapien()
-
-    @classmethod
-    def runs(cls, world: World) -> bool:
-        """Return whether the world has bodies, with no more surfaces than PhysX can tell apart."""
-        return super().runs(world) and cls.exceeded(world) is None
 
     @classmethod
     def exceeded(cls, world: World) -> str | None:

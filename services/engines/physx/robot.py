@@ -10,8 +10,7 @@ from gaplab.services.core.inertias import inertia_of
 from gaplab.services.core.kinematics import product
 from gaplab.services.core.shapes import UNTURNED
 from gaplab.services.core.world import Body, Joint, World
-from gaplab.services.engines.physx.handles import Handle
-from gaplab.services.engines.physx.shapes import build_shape, pose_of, turn_from_x
+from gaplab.services.engines.physx.shapes import Handle, build_shape, pose_of, turn_from_x
 
 UNLIMITED = 1e6
 """Speed limit of links, m/s and rad/s: PhysX's defaults, 10 m/s and 50 rad/s, would brake permitted motions."""

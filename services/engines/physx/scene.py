@@ -13,9 +13,8 @@ from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.shapes import Quaternion, Vector
 from gaplab.services.core.world import Material, Motor, World
 from gaplab.services.engines.physx.drives import JointDrive, resists
-from gaplab.services.engines.physx.handles import Handle
 from gaplab.services.engines.physx.robot import build_robot, set_masses
-from gaplab.services.engines.physx.shapes import ground_groups, pose_of, set_offsets
+from gaplab.services.engines.physx.shapes import Handle, ground_groups, pose_of, set_offsets
 
 BOUNCE_THRESHOLD_M_S = 0.2
 """Impacts slower than this do not bounce, as in Bullet. PhysX's default, 2 m/s, is faster than walking feet."""

@@ -1,13 +1,16 @@
 """Shapes of a World's bodies as PhysX's, each with its place, its material and the ground that it touches."""
 
 from types import ModuleType
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import product
 from gaplab.services.core.shapes import UNTURNED, Box, Capsule, Cylinder, Hull, Part, Quaternion, Shape, Sphere, Vector
-from gaplab.services.engines.physx.handles import Handle
+
+Handle: TypeAlias = Any
+"""An object of SAPIEN, untyped because the library must not be imported here."""
 
 CONTACT_OFFSET_M = 0.01
 """Distance below which surfaces are candidates for contact; they touch at distance 0."""

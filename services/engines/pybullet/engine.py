@@ -6,7 +6,7 @@ from importlib import import_module
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.motions import Tilt
 from gaplab.services.core.world import World
-from gaplab.services.engines.base import ALL_FIELDS
+from gaplab.services.engines.base import ALL_FIELDS, USUALLY_IN_PLACE
 from gaplab.services.engines.pybullet.robot import MOST_LINKS, links_of
 from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
@@ -25,35 +25,13 @@ class PyBullet(SteppedEngine[PyBulletScene]):
     source = "https://pybullet.org, version 3.2.7"
     library = "pybullet"
     honours = ALL_FIELDS - {"joint.armature"}
-    in_place = frozenset(
-        {
-            "body.mass_kg",
-            "gravity_m_s2",
-            "joint.damping",
-            "joint.dry_friction",
-            "motor.delay_s",
-            "motor.kd",
-            "motor.kp",
-            "motor.max_speed_rad_s",
-            "motor.max_torque_nm",
-            "motor.position_gain",
-            "noise",
-            "noise.start_tilt_rad",
-            "slope_rad",
-            "surfaces",
-        }
-    )
+    in_place = USUALLY_IN_PLACE | {"gravity_m_s2", "slope_rad"}
     install = "pip install pybullet, which has wheels up to Python 3.11, or choose another engine, like mujoco"
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
         self._bullet = import_module("pybullet")
         self.failures = (self._bullet.error,)
-
-    @classmethod
-    def runs(cls, world: World) -> bool:
-        """Return whether the world has bodies, and no more links than Bullet permits."""
-        return super().runs(world) and cls.exceeded(world) is None
 
     @classmethod
     def exceeded(cls, world: World) -> str | None:

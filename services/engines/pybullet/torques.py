@@ -11,10 +11,6 @@ from gaplab.services.core.world import Joint, Motor, PDMotor, World
 States: TypeAlias = tuple[tuple[float, ...], ...]
 """Bullet's numbers about joints: angle, speed, and more."""
 
-FREE = PDLaw(0.0, 0.0, 0.0, 0.0)
-"""The law of a joint without a PD motor."""
-
-
 STIFFEST = 1.5
 """Largest share (kd + h kp) h w of a joint's inertia that its motor may have in an inner step of length h: beyond it,
 motors of joints that move each other swing up."""
@@ -126,7 +122,7 @@ def _strength(joint: Joint, step_s: float) -> float:
 
 def _resisted(joint: Joint, inverse: float, step_s: float) -> _Resisted:
     share = 1.0 / (1.0 + step_s * joint.damping * inverse)
-    law = pd_law(joint.motor, share * inverse, step_s) if isinstance(joint.motor, PDMotor) else FREE
+    law = pd_law(joint.motor, share * inverse, step_s) if isinstance(joint.motor, PDMotor) else PDLaw()
     friction = joint.dry_friction if isinstance(joint.motor, Motor) else 0.0
     return _Resisted(law, step_s * inverse, joint.damping, share, friction)
 

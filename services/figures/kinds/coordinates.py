@@ -15,19 +15,13 @@ from gaplab.services.figures.marks import (
     Polylines,
     Table,
 )
-from gaplab.services.figures.style import INK, Style
-from gaplab.services.figures.words import drawable, heading, number, number_of, power, printable
+from gaplab.services.figures.words import drawable, heading, is_wide, number, number_of, power, printable
 
 MOST = 1_000
 """Most lines; beyond them, only the first are drawn."""
 
-WIDE = 30.0
-"""Ratio of the greatest to the least value, above which the axis of an error is logarithmic."""
-
 LONGEST = 22
 """Characters of a label of an axis."""
-
-AXIS = Style(INK, "solid", "circle")
 
 
 @dataclass(frozen=True)
@@ -88,9 +82,9 @@ def coordinates_figure(
     places = tuple(float(place) for place in range(len(coordinates)))
     marks: list[Mark] = [Polylines("", places, rows, tuple(shades[:shown]), shades_label, tuple(hover[:shown]))]
     ends = [(place, end) for place in places for end in (0.0, 1.0, None)]
-    marks.append(Line("", tuple(p for p, _ in ends), tuple(end for _, end in ends), AXIS, markers=False))
+    marks.append(Line("", tuple(p for p, _ in ends), tuple(end for _, end in ends), markers=False))
     marks += [label for place, axis in zip(places, scaled, strict=True) for label in axis.labels(place)]
-    ticks = tuple((place, _label(axis.label)) for place, axis in zip(places, coordinates, strict=True))
+    ticks = tuple((place, printable(axis.label, LONGEST)) for place, axis in zip(places, coordinates, strict=True))
     frame = Axis("", (-0.4, max(1.0, len(coordinates) - 1) + 0.6), ticks=ticks)
     return FigureDefinition(
         name="coordinates",
@@ -112,7 +106,7 @@ def _scaled(coordinate: Coordinate) -> _Scaled:
         return _Scaled((None,) * len(values), ())
     least = min(there) if coordinate.lower is None else coordinate.lower
     most = max(there) if coordinate.upper is None else coordinate.upper
-    if coordinate.wide and least > 0 and most >= WIDE * least:
+    if coordinate.wide and is_wide((least, most)):
         heights = [None if value is None else log10(value / least) / log10(most / least) for value in numbers]
         return _Scaled(tuple(heights), ((-0.17, power(float(f"{least:.1g}"))), (1.0, power(float(f"{most:.1g}")))))
     span = most - least
@@ -128,10 +122,6 @@ def _of_words(values: Sequence[str | None]) -> _Scaled:
     height = {word: 0.5 if len(words) == 1 else at / (len(words) - 1) for at, word in enumerate(words)}
     heights = tuple(None if value is None else height[value] for value in values)
     return _Scaled(heights, tuple((height[word], printable(word, LONGEST)) for word in words), words=True)
-
-
-def _label(text: str) -> str:
-    return printable(text, LONGEST)
 
 
 def _caption(what: str, lines: int, shown: int, shades_label: str) -> str:
@@ -151,8 +141,5 @@ def _alt(coordinates: Sequence[Coordinate], what: str, lines: int) -> str:
 
 def _table(coordinates: Sequence[Coordinate], shown: int) -> Table:
     head = tuple(coordinate.label for coordinate in coordinates)
-    return Table(head, tuple(tuple(_cell(axis.values[line]) for axis in coordinates) for line in range(shown)))
-
-
-def _cell(value: float | str | None) -> str:
-    return value if isinstance(value, str) else number(value)
+    cells = [[each if isinstance(each, str) else number(each) for each in axis.values[:shown]] for axis in coordinates]
+    return Table(head, tuple(zip(*cells, strict=True)))

@@ -74,15 +74,14 @@ def curves_figure(
     placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
     lines = [one for one in placed if not one.curve.level]
     levels = [one for one in placed if one.curve.level and one.points]
-    styles = strategy_styles([one.curve.strategy for one in lines])
-    marks: list[Mark] = [_mean(one, band, style) for one, style in zip(lines, styles, strict=True)]
-    marks += [
-        _repetitions(one, against, style) for one, style in zip(lines, styles, strict=True) if each and one.points
-    ]
-    thin = [mark for one, style in zip(lines, styles, strict=True) for mark in _thin(one, beside, against, style)]
+    styled = list(zip(lines, strategy_styles([one.curve.strategy for one in lines]), strict=True))
+    marks: list[Mark] = [_mean(one, band, style) for one, style in styled]
+    marks += [_repetitions(one, against, style) for one, style in styled if each and one.points]
+    thin = [mark for one, style in styled for mark in _thin(one, beside, against, style)]
     marks += [*thin, *(_level(one, band, style) for one, style in zip(levels, _level_styles(levels), strict=True))]
     span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
-    best_of = _best_of_lines(levels, span) if lines and not against else []
+    found = [best_of_line(one.name, one.curve, span) for one in levels] if lines and not against else []
+    best_of = [line for line in found if line]
     marks += best_of
     x = Axis(against.label if against else EVALUATIONS, (-0.02 * span, 1.02 * span), whole=against is None)
     y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
@@ -161,11 +160,6 @@ def _thin(one: _Placed, beside: Sequence[Curve], against: CostAxis | None, style
 def _level(one: _Placed, band: Band, style: Style) -> Level:
     ((_, mean, point), *_) = one.points
     return Level(one.name, mean, style, *_ends(point, band), marked=not style.ink)
-
-
-def _best_of_lines(levels: Sequence[_Placed], last: float) -> list[Line]:
-    found = (best_of_line(one.name, one.curve, last) for one in levels)
-    return [line for line in found if line]
 
 
 def _level_styles(levels: Sequence[_Placed]) -> list[Style]:

@@ -16,7 +16,6 @@ MOST = 5_000
 
 REALITY = "Reality"
 STAR = Style(INK, "dashed", "star")
-DOT = Style(INK, "solid", "circle")
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,6 @@ def _points(shown: Sequence[SimulatorPoint], x: Sequence[float], y: Sequence[flo
         "Best simulator of a repetition",
         tuple(x),
         tuple(y),
-        DOT,
         shades=tuple(each.iteration for each in shown),
         shades_label="Iteration",
         hover=tuple(f"repetition {each.repetition}, iteration {each.iteration}" for each in shown),

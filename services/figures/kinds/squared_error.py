@@ -10,10 +10,7 @@ from statistics import median, quantiles
 
 from gaplab.services.figures.marks import Axis, FigureDefinition, Line, Number, Panel, Table, faint_lines
 from gaplab.services.figures.style import style_of
-from gaplab.services.figures.words import drawable, heading, limits, number, number_of, printable, with_unit
-
-WIDE = 30.0
-"""Ratio of the greatest to the least median above which the axis is logarithmic."""
+from gaplab.services.figures.words import drawable, heading, is_wide, limits, number, number_of, printable, with_unit
 
 LOOK = style_of(0)
 
@@ -121,7 +118,7 @@ def _measure(errors: Mapping[int, Errors], name: str, label: str, unit: str, *, 
     there = {at: [value for value in found.values() if value is not None] for at, found in sorted(errors.items())}
     there = {at: found for at, found in there.items() if found}
     line = _median(there)
-    logarithmic = _is_wide(line.y)
+    logarithmic = is_wide(line.y)
     marks = (line, *([_repetitions(errors)] if each else [])) if there else ()
     panel = Panel(
         tuple(_above_zero(mark) for mark in marks) if logarithmic else marks,
@@ -149,11 +146,6 @@ def _repetitions(errors: Mapping[int, Errors]) -> Line:
     iterations, repetitions = sorted(errors), sorted({each for found in errors.values() for each in found})
     rows = [[errors[at].get(each) for at in iterations] for each in repetitions]
     return faint_lines("Best simulator", iterations, rows, LOOK)
-
-
-def _is_wide(medians: Sequence[Number]) -> bool:
-    there = [each for each in medians if each is not None]
-    return bool(there) and min(there) > 0 and max(there) >= WIDE * min(there)
 
 
 def _above_zero(line: Line) -> Line:

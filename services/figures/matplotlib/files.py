@@ -121,8 +121,7 @@ def _square(canvas: "Canvas", rows: int) -> float:
     Returns:
         The free space at either side in inches, since a panel has a greatest width.
     """
-    engine = canvas.get_layout_engine()
-    assert engine is not None
+    engine: Any = canvas.get_layout_engine()
     engine.execute(canvas)
     place = canvas.axes[0].get_position(original=True)
     width, height = place.width * canvas.get_figwidth(), place.height * canvas.get_figheight()
@@ -134,8 +133,7 @@ def _square(canvas: "Canvas", rows: int) -> float:
 
 def _fix_positions(canvas: "Canvas") -> None:
     """Compute the layout once, and round its positions: the solver's last digits vary from run to run."""
-    engine = canvas.get_layout_engine()
-    assert engine is not None
+    engine: Any = canvas.get_layout_engine()
     engine.execute(canvas)
     canvas.set_layout_engine("none")
     for axes in canvas.axes:
