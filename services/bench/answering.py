@@ -32,12 +32,6 @@ UNKNOWN = "unknown"
 """Operator of an answer that names none, and whose take is not the latest one."""
 
 
-class AddressedAnswer(MeasurementSpec):
-    """An answer with the request that it is of, so that an idempotency key fits this request alone."""
-
-    request: str
-
-
 def answer(
     store: Store, id_: str, spec: MeasurementSpec, admitted: Admission, traces: TracesRead | None = None
 ) -> Once[AnswerRead]:
@@ -59,8 +53,11 @@ def answer(
         InvalidSpec: the values do not fit the request; every violation is named.
         Conflict: the request is wanted no more, or its traces are doubtful and not confirmed.
     """
-    asked = AddressedAnswer(request=id_, **spec.model_dump())
-    return once(store, admitted, asked, AnswerRead, lambda session: _answer(session, id_, spec, traces, admitted.token))
+
+    def work(session: Session) -> AnswerRead:
+        return _answer(session, id_, spec, traces, admitted.token)
+
+    return once(store, admitted, spec, AnswerRead, work, of=id_)
 
 
 def _answer(

@@ -4,9 +4,8 @@ from sqlalchemy import update
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.measurements import RequestState
-from gaplab.schemas.records import MeasurementKind
 from gaplab.services.bench import branches
-from gaplab.services.bench.consequences import places_of
+from gaplab.services.bench.consequences import recorded, samples_among
 from gaplab.services.core.arrays import known
 from gaplab.services.core.history import History
 from gaplab.services.core.probes import recorded_fitness
@@ -36,14 +35,11 @@ def apply(
     session: Session, request: RequestRow, repetition: RepetitionRow, answer: AnswerRow, reason: str
 ) -> int | None:
     """Write the new values into the steps that the answer is, and close what follows from the first sample."""
-    places = places_of(session, request, repetition)
-    samples = [place for place in places if place.request.kind is MeasurementKind.SAMPLE]
     branch = None
-    if samples:
-        first = min(samples, key=lambda place: place.number)
-        branch = branches.close(session, repetition, first.number + 1, first.request.iteration, reason)
-    for place in places_of(session, request, repetition):
-        _rewrite(session, place.request, repetition, answer)
+    if samples := samples_among(recorded(session, request, repetition)):
+        branch = branches.close(session, repetition, samples[0].place + 1, samples[0].iteration, reason)
+    for each in recorded(session, request, repetition):
+        _rewrite(session, each, repetition, answer)
     _rewrite_records(session, repetition)
     _continue(session, repetition, closed=branch is not None)
     return branch
@@ -67,9 +63,9 @@ def _rewrite_records(session: Session, repetition: RepetitionRow) -> None:
     (log,) = logs(session, [repetition.id]).values()
     for step in log:
         if isinstance(step, Probed):
-            recorded = known(recorded_fitness(step.fitness, history.samples))
+            fitness = known(recorded_fitness(step.fitness, history.samples))
             of_it = (row.repetition_id == repetition.id) & (row.number == step.iteration)
-            session.execute(update(row).where(of_it).values(recorded_fitness=recorded))
+            session.execute(update(row).where(of_it).values(recorded_fitness=fitness))
         history = history.after(step)
 
 
