@@ -24,31 +24,10 @@ from gaplab.services.store.models import (
 from gaplab.services.store.queries import checkpoints, request_states
 from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.queries.logs import logs
-from gaplab.services.store.queries.step_rows import position, vector
+from gaplab.services.store.queries.step_rows import iteration_columns, position, vector
 from gaplab.services.store.session import Session, snapshot
 
 _LEASES = RepetitionLeases()
-
-_KINDS: dict[type[Step], str] = {
-    Selected: "selected",
-    Measured: "measured",
-    Tuned: "tuned",
-    Transferred: "transferred",
-    Probed: "probed",
-}
-
-_COLUMNS: dict[type[Step], tuple[str, ...]] = {
-    Tuned: ("tuning_rollouts", "tuning_failures", "tuning_saved"),
-    Transferred: (
-        "transferred_genome",
-        "simulated_fitness",
-        "transfer_rollouts",
-        "transfer_failures",
-        "transfer_saved",
-    ),
-    Probed: ("recorded_fitness", "ended_at"),
-}
-"""Columns of an iteration that a step fills."""
 
 
 def close(session: Session, repetition: RepetitionRow, place: int, iteration: int, reason: str) -> int | None:
@@ -89,7 +68,7 @@ def close(session: Session, repetition: RepetitionRow, place: int, iteration: in
 
 def plain(step: Step) -> dict[str, Any]:
     """Return a step as JSON."""
-    found: dict[str, Any] = {"kind": _KINDS[type(step)], "iteration": step.iteration}
+    found: dict[str, Any] = {"kind": type(step).__name__.lower(), "iteration": step.iteration}
     match step:
         case Selected():
             found["genome"] = vector(step.genome)
@@ -155,9 +134,10 @@ def _remove(session: Session, repetition: int, closed: Sequence[Step]) -> None:
         if isinstance(step, Tuned):
             of_it = (simulator.repetition_id == repetition) & (simulator.iteration == number)
             session.execute(delete(simulator).where(of_it))
-        if number not in opened and (columns := _COLUMNS.get(type(step))):
+        if number not in opened:
             of_it = (iteration.repetition_id == repetition) & (iteration.number == number)
-            session.execute(update(iteration).where(of_it).values(dict.fromkeys(columns)))
+            emptied = dict.fromkeys([*iteration_columns(step), "ended_at"])
+            session.execute(update(iteration).where(of_it).values(emptied))
     if opened:
         session.execute(delete(iteration).where(iteration.repetition_id == repetition, iteration.number.in_(opened)))
 

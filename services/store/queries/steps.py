@@ -58,12 +58,11 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     for claim, steps in fresh.items():
         for each in steps:
             batch.add(claim.id, each, _measured_by(claim))
+            events.note_step(session, each.step, claim.experiment_id, claim.number)
     batch.write(session)
     checkpoints.forget(session, [claim.id for claim, steps in fresh.items() if steps and lengths[claim][1]])
-    checkpoints.write(
-        session, {claim: _parts(deliveries[claim], *lengths[claim], len(fresh[claim])) for claim in fresh}
-    )
-    events.note_steps(session, fresh)
+    parts = {claim: _parts(deliveries[claim], *lengths[claim], len(steps)) for claim, steps in fresh.items()}
+    checkpoints.write(session, parts)
     return {claim: len(steps) for claim, steps in fresh.items()}
 
 
