@@ -3,13 +3,13 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import BigInteger, Enum, Index, Integer, String, Text
+from sqlalchemy import BigInteger, Index, Integer, String, Text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind
 from gaplab.services.store.clock import now
-from gaplab.services.store.models.base import Base, Reason
+from gaplab.services.store.models.base import Base, Reason, words
 
 
 class TokenRow(Base):
@@ -26,16 +26,7 @@ class TokenRow(Base):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     name: Mapped[str] = mapped_column(String(200))
-    role: Mapped[Role] = mapped_column(
-        Enum(
-            Role,
-            native_enum=False,
-            create_constraint=True,
-            length=16,
-            name="role",
-            values_callable=lambda roles: [each.value for each in roles],
-        )
-    )
+    role: Mapped[Role] = mapped_column(words(Role, "role"))
     digest: Mapped[str] = mapped_column(String(64))
     created_at: Mapped[datetime]
     last_used_at: Mapped[datetime | None]
