@@ -9,7 +9,7 @@ from gaplab.schemas.measurements import (
     MeasurementSpec,
     RequestState,
 )
-from gaplab.schemas.traces import AlignedTrace, TraceRead, TracesRead
+from gaplab.schemas.traces import TraceRead, TracesRead
 from gaplab.services.bench.checking import check_attachments, check_values
 from gaplab.services.bench.doubts import doubts
 from gaplab.services.bench.taking import locked
@@ -82,7 +82,9 @@ def _answer(
         return view_answer(counted)
     counts = counted is None and (row.state is not RequestState.TAKEN or spec.take == row.takes)
     given = insert_answer(session, row, spec, AnswerState.COUNTED if counts else AnswerState.CONFLICT, token)
-    given.traces = None if traces is None else [_stored(trace) for trace in traces.traces]
+    if traces is not None:
+        kept = set(TraceRead.model_fields)
+        given.traces = [trace.model_dump(mode="json", include=kept) for trace in traces.traces]
     if counts:
         told = () if spec.confirmed else doubts(session, repetition, row, spec.values)
         given.doubts = list(told) or None
@@ -97,10 +99,6 @@ def _with_values(spec: MeasurementSpec, traces: TracesRead) -> MeasurementSpec:
     """Return an answer with the values and readings of its traces."""
     named = dict.fromkeys((*spec.attachments, *(trace.attachment for trace in traces.traces)))
     return spec.model_copy(update={"values": traces.values, "readings": traces.readings, "attachments": tuple(named)})
-
-
-def _stored(trace: AlignedTrace) -> dict[str, Any]:
-    return TraceRead.model_validate(trace.model_dump(include=set(TraceRead.model_fields))).model_dump(mode="json")
 
 
 def insert_answer(

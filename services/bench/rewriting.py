@@ -74,7 +74,7 @@ def _continue(session: Session, repetition: RepetitionRow, *, closed: bool) -> N
     session.refresh(repetition)
     if (repetition.state is State.COMPLETED and closed) or _waits_for_nothing(session, repetition):
         move(session, RepetitionRow, RepetitionRow.id == repetition.id, State.QUEUED, losses=0)
-    _settle(session, session.get_one(ExperimentRow, repetition.experiment_id))
+    _settle(session, repetition)
 
 
 def _waits_for_nothing(session: Session, repetition: RepetitionRow) -> bool:
@@ -85,7 +85,6 @@ def _waits_for_nothing(session: Session, repetition: RepetitionRow) -> bool:
 
 def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) -> None:
     """Open a request again whose answer is void."""
-    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
     session.refresh(repetition)
     if repetition.state in (State.FAILED, State.CANCELLED):
         become(session, request, RequestState.WITHDRAWN)
@@ -96,12 +95,12 @@ def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) 
         move(session, RepetitionRow, of_it, State.QUEUED, losses=0)
         move(session, RepetitionRow, of_it, State.WAITING)
     session.flush()
-    _settle(session, experiment)
+    _settle(session, repetition)
 
 
-def _settle(session: Session, experiment: ExperimentRow) -> None:
-    """Update the state of an experiment, which a correction may bring back to life."""
-    session.refresh(experiment)
+def _settle(session: Session, repetition: RepetitionRow) -> None:
+    """Update the state of a repetition's experiment, which a correction may bring back to life."""
+    experiment = session.get_one(ExperimentRow, repetition.experiment_id, populate_existing=True)
     alive = any(not each.state.ended for each in repetitions_of(session, experiment.id))
     revived = experiment.state is State.COMPLETED and alive
     if revived:

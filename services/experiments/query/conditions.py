@@ -8,7 +8,7 @@ from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.experiments.query import fields
 from gaplab.services.experiments.query.fields import Condition, Field, field_of
-from gaplab.services.experiments.query.parsing import Every, Not, Some, Term, Tree, Value, Words, parse, refusal
+from gaplab.services.experiments.query.parsing import Every, Not, Some, Term, Tree, Value, Words, inside, parse, refusal
 from gaplab.services.store.cursor import Column
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.results import best_of_all, points_of_all
@@ -148,15 +148,6 @@ def studies_meeting(query: str | None) -> list[Condition]:
     return _meeting(query, STUDY_FIELDS, STUDY_TEXTS, [_S.archived_at.is_(None)])
 
 
-def check(query: str | None, *, of_studies: bool) -> None:
-    """Refuse an invalid query.
-
-    Raises:
-        InvalidSpec: the message has the place.
-    """
-    studies_meeting(query) if of_studies else experiments_meeting(query)
-
-
 def _meeting(query: str | None, known: Fields, texts: Sequence[Column], otherwise: list[Condition]) -> list[Condition]:
     tree = parse(query or "")
     if tree is None:
@@ -198,11 +189,5 @@ def _permitted(field: Field) -> list[str]:
 
 
 def _mentions(tree: Tree, name: str) -> bool:
-    match tree:
-        case Term(field=field):
-            return field.text.lower() == name
-        case Not(part):
-            return _mentions(part, name)
-        case Every(parts) | Some(parts):
-            return any(_mentions(part, name) for part in parts)
-    return False
+    named = isinstance(tree, Term) and tree.field.text.lower() == name
+    return named or any(_mentions(part, name) for part in inside(tree))

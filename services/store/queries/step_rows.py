@@ -51,7 +51,7 @@ class StepRows:
         columns = self._columns[key]
         columns.update(iteration_columns(step))
         columns["seconds"] += timed.seconds
-        if _opens_iteration(step):
+        if isinstance(step, Selected) or position(step) == 0:
             self._opened.add(key)
         if isinstance(step, Probed):
             self._ended.add(key)
@@ -159,10 +159,6 @@ def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, 
 def _readings(values: FloatArray) -> list[float | None] | None:
     """Return a JSON array with None for each nan; None if there are no readings."""
     return [known(each) for each in values.tolist()] if len(values) else None
-
-
-def _opens_iteration(step: Step) -> bool:
-    return isinstance(step, Selected) or (isinstance(step, Tuned) and step.iteration == 0)
 
 
 def _phase(name: str, cost: Cost) -> dict[str, int]:

@@ -10,7 +10,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.types import Cost, Probed
 from gaplab.services.store.clock import now
-from gaplab.services.store.lease import Checkpoint, Claim, Delivered, TimedStep
+from gaplab.services.store.lease import Claim, Delivered, TimedStep
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries import checkpoints, events
 from gaplab.services.store.queries.step_rows import StepRows, position
@@ -61,7 +61,10 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
             events.note_step(session, each.step, claim.experiment_id, claim.number)
     batch.write(session)
     checkpoints.forget(session, [claim.id for claim, steps in fresh.items() if steps and lengths[claim][1]])
-    parts = {claim: _parts(deliveries[claim], *lengths[claim], len(steps)) for claim, steps in fresh.items()}
+    parts = {
+        claim: checkpoints.fresh(deliveries[claim], lengths[claim][0] + len(steps), 0 if steps else lengths[claim][1])
+        for claim, steps in fresh.items()
+    }
     checkpoints.write(session, parts)
     return {claim: len(steps) for claim, steps in fresh.items()}
 
@@ -110,12 +113,6 @@ def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[Time
         if place == following:
             found.append(each)
     return found
-
-
-def _parts(delivered: Iterable[Delivered], length: int, parts: int, new: int) -> list[Checkpoint]:
-    """Return the delivered checkpoints of the step that follows the new steps."""
-    found = [each for each in delivered if isinstance(each, Checkpoint)]
-    return checkpoints.fresh(found, length + new, 0 if new else parts)
 
 
 def _measured_by(claim: Claim) -> str:
