@@ -187,7 +187,7 @@ class Leases(Generic[L]):
         """
         return move(session, self.table, which & (self.table.state == State.RUNNING), change.to, **change.values)
 
-    def renew(self, session: Session, leases: Sequence[L], **values: Any) -> tuple[L, ...]:  # noqa: ANN401 - columns of any type
+    def renew(self, session: Session, leases: Sequence[L], /, **values: Any) -> tuple[L, ...]:  # noqa: ANN401 - columns of any type
         """Renew leases, set further columns of their rows, and return those that are still valid."""
         row = self.table
         beaten = update(row).where(self.of(leases), row.state == State.RUNNING).values(heartbeat_at=now(), **values)
