@@ -54,8 +54,7 @@ def _opened(settings: Settings) -> Iterator[Store]:
     Raises:
         StoreUnavailable: the URL is not valid, or of another kind of database.
     """
-    answer_s = min(ANSWER_S, max(SHORTEST_ANSWER_S, settings.lease_s / 2))  # after which a lease is not yet lost
-    store = Store(settings.database_url, answer_s=answer_s, pinned=True)
+    store = Store(settings.database_url, answer_s=_answer_s(settings.lease_s), pinned=True)
     try:
         yield store
     finally:
@@ -97,6 +96,11 @@ def _refuse_other_schema(store: Store) -> None:
         raise
     except StoreUnavailable as error:
         logging.getLogger("gaplab.supervisor").warning("the database cannot be used yet: %s", error)
+
+
+def _answer_s(lease_s: float) -> float:
+    """Return the longest time of a statement, after which a lease is not yet lost."""
+    return min(ANSWER_S, max(SHORTEST_ANSWER_S, lease_s / 2))
 
 
 def choose_authentication(settings: Settings, environment: MutableMapping[str, str] = os.environ) -> None:
