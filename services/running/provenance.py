@@ -58,11 +58,8 @@ def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
     lock(session, [experiment_id])
     session.refresh(experiment)
     if experiment.state.ended or experiment.computed_with is None:
-        why = (
-            f"has ended: it is {experiment.state}"
-            if experiment.state.ended
-            else "has not started, so it has no versions yet"
-        )
+        ended = f"has ended: it is {experiment.state}"
+        why = ended if experiment.state.ended else "has not started, so it has no versions yet"
         raise Conflict(f"experiment {experiment_id!r} {why}; there is nothing to accept")
     told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
     note(session, EventKind.VERSIONS_ACCEPTED, experiment_id, **told)

@@ -57,11 +57,6 @@ def _tagged(condition: Callable[[Column], Condition]) -> Condition:
     return or_(condition(_E.tags), and_(_E.study_id.is_not(None), of_its_study))
 
 
-def _study_tagged(condition: Callable[[Column], Condition]) -> Condition:
-    """SQL condition: the tags of the study, or of one of its experiments, meet the condition."""
-    return or_(condition(_S.tags), of_study(condition(_E.tags)))
-
-
 def _of_some(field: Field) -> Field:
     """Return the field of studies that asks for an experiment with this field."""
     return Field(
@@ -121,7 +116,7 @@ STUDY_FIELDS: Fields = {
     "name": fields.text(_S.name, "name"),
     "study": fields.text(_S.id, "id"),
     "note": _either(fields.text(_S.notes, "notes, also of its experiments"), _of_some(fields.text(_E.notes, ""))),
-    "tag": fields.tags(_study_tagged, "a tag of it or of its experiments"),
+    "tag": fields.tags(lambda has: or_(has(_S.tags), of_study(has(_E.tags))), "a tag of it or of its experiments"),
     "state": fields.state(study_is, "state"),
     **{name: _of_some(field) for name, field in EXPERIMENT_FIELDS.items() if name not in _OWN},
     "created": fields.moment(_S.created_at, "time of its submission"),

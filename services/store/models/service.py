@@ -1,4 +1,4 @@
-"""What is of one service: tokens, answered requests, events, notifications, saved views, and what was deleted."""
+"""What is of one service: tokens, answered requests, events, notifications, and saved views."""
 
 from datetime import datetime
 from typing import Any
@@ -131,24 +131,6 @@ class NotifierRow(Base):
     after: Mapped[int | None] = mapped_column(BigInteger)
     owner: Mapped[str | None] = mapped_column(String(200))
     until: Mapped[datetime | None]
-
-
-class DeletionRow(Base):
-    """A deleted study or experiment; its events still refer to it.
-
-    Attributes:
-        id: its id, which nothing else has unless its archive is imported again; then this row is removed.
-        study_id: study of a deleted experiment; NULL for a study, or an experiment without one.
-        token_id: id of the token that deleted it; NULL without a token.
-    """
-
-    __tablename__ = "deletion"
-
-    id: Mapped[str] = mapped_column(String(32), primary_key=True)
-    study_id: Mapped[str | None] = mapped_column(String(32))
-    name: Mapped[str] = mapped_column(String(200))
-    token_id: Mapped[str | None] = mapped_column(String(32))
-    deleted_at: Mapped[datetime]
 
 
 class ViewRow(Base):

@@ -1,7 +1,7 @@
 """Rows of steps. A few statements write the rows of many repetitions."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any, cast
 
@@ -99,6 +99,17 @@ class StepRows:
 def position(step: Step) -> int:
     """Return the step's place in the log of its repetition, from 0. Iteration 0 has no Selected and no Measured."""
     return len(_ORDER) * step.iteration + _ORDER.index(type(step)) - _ORDER.index(Tuned)
+
+
+def tallied(steps: Sequence[Step]) -> dict[str, int]:
+    """Return what steps add to the tallies of their repetition, by column."""
+    costs = [getattr(step, "cost", Cost()) for step in steps]
+    return {
+        "iterations_done": sum(isinstance(step, Probed) for step in steps),
+        "rollouts_done": sum(int(cost.rollouts) for cost in costs),
+        "rollouts_failed": sum(int(cost.failures) for cost in costs),
+        "rollouts_saved": sum(int(cost.saved) for cost in costs),
+    }
 
 
 def vector(values: FloatArray) -> list[float]:
