@@ -124,7 +124,7 @@ def demand(caller: Caller, role: Role, what: str) -> None:
     """
     if not caller.role.permits(role):
         held = f"this token is a {caller.role.value}'s" if caller.token else "none was shown"
-        raise Forbidden(f"{what} requires the token of {_article(role)}; {held}")
+        raise Forbidden(f"{what} requires the token of {'an' if role is Role.ADMIN else 'a'} {role.value}; {held}")
 
 
 def demand_token_beyond_loopback(store: Store, host: str) -> None:
@@ -179,10 +179,6 @@ def _note_use(session: Session, token_id: str) -> None:
 
 def _digest(secret: str) -> str:
     return sha256(secret.encode()).hexdigest()
-
-
-def _article(role: Role) -> str:
-    return f"an {role.value}" if role is Role.ADMIN else f"a {role.value}"
 
 
 def _view(row: TokenRow) -> TokenRead:

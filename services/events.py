@@ -59,12 +59,6 @@ def page(session: Session, after: int, wanted: WantedEvents, *, limit: int) -> E
 
 
 @snapshot
-def latest(session: Session) -> int:
-    """Return the number of the latest event; 0 if there is none."""
-    return _latest(session)
-
-
-@snapshot
 def check(session: Session, wanted: WantedEvents, after: int = 0) -> None:
     """Refuse a selection whose experiment, study or preceding event does not exist; deleted ones have events.
 
@@ -85,4 +79,8 @@ def check(session: Session, wanted: WantedEvents, after: int = 0) -> None:
 
 
 def _latest(session: Session) -> int:
+    """Return the number of the latest event; 0 if there is none."""
     return session.execute(select(EventCounterRow.latest)).scalar_one()
+
+
+latest = snapshot(_latest)

@@ -64,7 +64,8 @@ def check_here(expected: Versions) -> None:
     limit_prints()
     folders.find()
     imported.contents()
-    _compare(platform.node(), versions(), _shared(expected))
+    shared = {name: text for name, text in expected.items() if not name.startswith((PLUGIN, ROBOT))}
+    _compare(platform.node(), versions(), shared)
     robot_library.learn(text for name, text in expected.items() if name.startswith(ROBOT))
     wanted = {name.removeprefix(PLUGIN): text for name, text in expected.items() if name.startswith(PLUGIN)}
     if wanted and _different(imported.contents(), wanted) and (different := _different(imported.renewed(), wanted)):
@@ -88,7 +89,7 @@ def check_nodes() -> None:
         except RayError as error:
             msg = f"the node {name} cannot run gaplab, which every node needs: {_last_line(error)}"
             raise ClusterUnusable(msg) from error
-        _compare(name, found, _shared(ours))
+        _compare(name, found, versions())
         for plugin in [each for each in ours if found.get(each) != ours[each]]:
             log.warning("the node %s has another version of the %s; experiments that name it wait", name, plugin)
 
@@ -102,10 +103,6 @@ def _versions_of_node() -> Versions:
 
 def _prefixed(plugins: Versions) -> Versions:
     return {f"{PLUGIN}{plugin}": text for plugin, text in plugins.items()}
-
-
-def _shared(expected: Versions) -> Versions:
-    return {name: text for name, text in expected.items() if not name.startswith((PLUGIN, ROBOT))}
 
 
 def _different(contents: Contents, wanted: Versions) -> dict[str, str]:

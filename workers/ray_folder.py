@@ -35,7 +35,9 @@ def ray_folder(wanted: Path | None = None) -> Iterator[Path]:
     Args:
         wanted: where to make it; left out: RAY_TMPDIR, or the folder for temporary files.
     """
-    parent = _parent(wanted or Path(os.environ.get("RAY_TMPDIR") or tempfile.gettempdir()).absolute())
+    parent = wanted or Path(os.environ.get("RAY_TMPDIR") or tempfile.gettempdir()).absolute()
+    if len(str(parent)) > LONGEST_PARENT:  # too long for the sockets
+        parent = Path("/tmp")  # noqa: S108 - the folder in it is private
     _sweep(parent)
     folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))  # with mode 0700
     held = _hold(folder)
@@ -45,11 +47,6 @@ def ray_folder(wanted: Path | None = None) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
         if held is not None:
             os.close(held)
-
-
-def _parent(wanted: Path) -> Path:
-    """Return the wanted folder, or /tmp if its path is too long for the sockets."""
-    return wanted if len(str(wanted)) <= LONGEST_PARENT else Path("/tmp")  # noqa: S108 - the folder in it is private
 
 
 def _sweep(parent: Path) -> None:

@@ -9,7 +9,7 @@ from gaplab.schemas.measurements import (
     MeasurementSpec,
     RequestState,
 )
-from gaplab.schemas.traces import AlignedTrace, TraceRead, TracesRead
+from gaplab.schemas.traces import TraceRead, TracesRead
 from gaplab.services.bench.checking import check_attachments, check_values
 from gaplab.services.bench.doubts import doubts
 from gaplab.services.bench.taking import locked
@@ -30,12 +30,6 @@ from gaplab.services.store.statements import storable
 
 UNKNOWN = "unknown"
 """Operator of an answer that names none, and whose take is not the latest one."""
-
-
-class AddressedAnswer(MeasurementSpec):
-    """An answer with the request that it is of, so that an idempotency key fits this request alone."""
-
-    request: str
 
 
 def answer(
@@ -59,8 +53,11 @@ def answer(
         InvalidSpec: the values do not fit the request; every violation is named.
         Conflict: the request is wanted no more, or its traces are doubtful and not confirmed.
     """
-    asked = AddressedAnswer(request=id_, **spec.model_dump())
-    return once(store, admitted, asked, AnswerRead, lambda session: _answer(session, id_, spec, traces, admitted.token))
+
+    def work(session: Session) -> AnswerRead:
+        return _answer(session, id_, spec, traces, admitted.token)
+
+    return once(store, admitted, spec, AnswerRead, work, of=id_)
 
 
 def _answer(
@@ -85,7 +82,9 @@ def _answer(
         return view_answer(counted)
     counts = counted is None and (row.state is not RequestState.TAKEN or spec.take == row.takes)
     given = insert_answer(session, row, spec, AnswerState.COUNTED if counts else AnswerState.CONFLICT, token)
-    given.traces = None if traces is None else [_stored(trace) for trace in traces.traces]
+    if traces is not None:
+        kept = set(TraceRead.model_fields)
+        given.traces = [trace.model_dump(mode="json", include=kept) for trace in traces.traces]
     if counts:
         told = () if spec.confirmed else doubts(session, repetition, row, spec.values)
         given.doubts = list(told) or None
@@ -100,10 +99,6 @@ def _with_values(spec: MeasurementSpec, traces: TracesRead) -> MeasurementSpec:
     """Return an answer with the values and readings of its traces."""
     named = dict.fromkeys((*spec.attachments, *(trace.attachment for trace in traces.traces)))
     return spec.model_copy(update={"values": traces.values, "readings": traces.readings, "attachments": tuple(named)})
-
-
-def _stored(trace: AlignedTrace) -> dict[str, Any]:
-    return TraceRead.model_validate(trace.model_dump(include=set(TraceRead.model_fields))).model_dump(mode="json")
 
 
 def insert_answer(

@@ -2,14 +2,14 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
 from sqlalchemy import delete, func, insert, literal, select, update
 
 from gaplab.schemas.corrections import BranchRead
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.services.core.arrays import known
-from gaplab.services.core.types import Cost, Measured, Probed, Selected, Step, Transferred, Tuned
+from gaplab.services.core.types import Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.running.leases import Change
 from gaplab.services.running.repetition_leases import RepetitionLeases
 from gaplab.services.store.clock import now
@@ -24,31 +24,10 @@ from gaplab.services.store.models import (
 from gaplab.services.store.queries import checkpoints, request_states
 from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.queries.logs import logs
-from gaplab.services.store.queries.step_rows import position, vector
+from gaplab.services.store.queries.step_rows import iteration_columns, position, tallied, vector
 from gaplab.services.store.session import Session, snapshot
 
 _LEASES = RepetitionLeases()
-
-_KINDS: dict[type[Step], str] = {
-    Selected: "selected",
-    Measured: "measured",
-    Tuned: "tuned",
-    Transferred: "transferred",
-    Probed: "probed",
-}
-
-_COLUMNS: dict[type[Step], tuple[str, ...]] = {
-    Tuned: ("tuning_rollouts", "tuning_failures", "tuning_saved"),
-    Transferred: (
-        "transferred_genome",
-        "simulated_fitness",
-        "transfer_rollouts",
-        "transfer_failures",
-        "transfer_saved",
-    ),
-    Probed: ("recorded_fitness", "ended_at"),
-}
-"""Columns of an iteration that a step fills."""
 
 
 def close(session: Session, repetition: RepetitionRow, place: int, iteration: int, reason: str) -> int | None:
@@ -89,7 +68,7 @@ def close(session: Session, repetition: RepetitionRow, place: int, iteration: in
 
 def plain(step: Step) -> dict[str, Any]:
     """Return a step as JSON."""
-    found: dict[str, Any] = {"kind": _KINDS[type(step)], "iteration": step.iteration}
+    found: dict[str, Any] = {"kind": type(step).__name__.lower(), "iteration": step.iteration}
     match step:
         case Selected():
             found["genome"] = vector(step.genome)
@@ -155,9 +134,10 @@ def _remove(session: Session, repetition: int, closed: Sequence[Step]) -> None:
         if isinstance(step, Tuned):
             of_it = (simulator.repetition_id == repetition) & (simulator.iteration == number)
             session.execute(delete(simulator).where(of_it))
-        if number not in opened and (columns := _COLUMNS.get(type(step))):
+        if number not in opened:
             of_it = (iteration.repetition_id == repetition) & (iteration.number == number)
-            session.execute(update(iteration).where(of_it).values(dict.fromkeys(columns)))
+            emptied = dict.fromkeys([*iteration_columns(step), "ended_at"])
+            session.execute(update(iteration).where(of_it).values(emptied))
     if opened:
         session.execute(delete(iteration).where(iteration.repetition_id == repetition, iteration.number.in_(opened)))
 
@@ -171,8 +151,7 @@ def _count_down(session: Session, repetition: int, place: int, closed: Sequence[
 
     Seconds of an iteration that keeps steps are shared by rollouts, since those of single steps are not stored.
     """
-    row, costs = RepetitionRow, list(map(_cost, closed))
-    seconds = _seconds_of(session, repetition, closed)
+    row, seconds = RepetitionRow, _seconds_of(session, repetition, closed)
     iteration = IterationRow
     for number, spent in seconds.items():
         of_it = (iteration.repetition_id == repetition) & (iteration.number == number)
@@ -180,10 +159,7 @@ def _count_down(session: Session, repetition: int, place: int, closed: Sequence[
     values = {
         "seconds": row.seconds - sum(seconds.values()),
         "steps": place,
-        "iterations_done": row.iterations_done - sum(isinstance(step, Probed) for step in closed),
-        "rollouts_done": row.rollouts_done - sum(int(cost.rollouts) for cost in costs),
-        "rollouts_failed": row.rollouts_failed - sum(int(cost.failures) for cost in costs),
-        "rollouts_saved": row.rollouts_saved - sum(int(cost.saved) for cost in costs),
+        **{name: getattr(row, name) - count for name, count in tallied(closed).items()},
     }
     session.execute(update(row).where(row.id == repetition).values(values))
 
@@ -191,7 +167,7 @@ def _count_down(session: Session, repetition: int, place: int, closed: Sequence[
 def _seconds_of(session: Session, repetition: int, closed: Sequence[Step]) -> dict[int, float]:
     row, whole, rollouts = IterationRow, _whole(closed), Counter[int]()
     for step in closed:
-        rollouts[step.iteration] += int(_cost(step).rollouts)
+        rollouts[step.iteration] += tallied([step])["rollouts_done"]
     parts = (row.selection_rollouts, row.tuning_rollouts, row.transfer_rollouts)
     every = sum((func.coalesce(part, 0) for part in parts), start=literal(0))
     query = select(row.number, row.seconds, every).where(row.repetition_id == repetition, row.number.in_(rollouts))
@@ -199,7 +175,3 @@ def _seconds_of(session: Session, repetition: int, closed: Sequence[Step]) -> di
         number: seconds if number in whole else seconds * rollouts[number] / max(count, 1)
         for number, seconds, count in session.execute(query)
     }
-
-
-def _cost(step: Step) -> Cost:
-    return cast("Cost", getattr(step, "cost", Cost()))

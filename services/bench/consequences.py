@@ -1,6 +1,6 @@
 """What follows from a correction or a void: the steps of the log that an answer is, and those after it."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Literal
 
 from gaplab.schemas.corrections import Consequences
@@ -13,79 +13,53 @@ from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Session
 
 
-@dataclass(frozen=True)
-class Place:
-    """A step of the log that an answer is.
+def recorded(session: Session, request: RequestRow, repetition: RepetitionRow) -> tuple[RequestRow, ...]:
+    """Return the requests whose steps in the log are the answer to a request, by place.
 
-    Attributes:
-        request: request of the step.
-        number: its place in the log.
-        following: number of steps after it that follow from it.
-        measurements: number of measurements among them.
-    """
-
-    request: RequestRow
-    number: int
-    following: int
-    measurements: int
-
-
-def places_of(session: Session, request: RequestRow, repetition: RepetitionRow) -> tuple[Place, ...]:
-    """Return the steps of the log that the answer to a request is; a controller that is measured once may be several.
-
-    Steps follow from a sample, but not from a probe.
+    A controller that is measured once may be several.
     """
     (log,) = logs(session, [repetition.id]).values()
-    found = []
-    for each in requests.requests_of(session, repetition.id):
-        if (each.same_as or each.id) == request.id and each.branch is None and each.place < len(log):
-            later = log[each.place + 1 :] if each.kind is MeasurementKind.SAMPLE else ()
-            measurements = sum(isinstance(step, Measured | Probed) and not _left_out(step) for step in later)
-            found.append(Place(each, each.place, len(later), measurements))
-    return tuple(found)
+    return tuple(
+        each
+        for each in requests.requests_of(session, repetition.id)
+        if (each.same_as or each.id) == request.id and each.branch is None and each.place < len(log)
+    )
 
 
-def _iterations(session: Session, repetition: RepetitionRow) -> int:
-    return session.get_one(ExperimentRow, repetition.experiment_id).iterations
-
-
-def _left_out(step: Measured | Probed) -> bool:
-    return isinstance(step, Probed) and step.left_out
+def samples_among(rows: Sequence[RequestRow]) -> list[RequestRow]:
+    """Return the requests for samples, from which the later steps of the log follow; none follows from a probe."""
+    return [each for each in rows if each.kind is MeasurementKind.SAMPLE]
 
 
 def consequences(
     session: Session, request: RequestRow, repetition: RepetitionRow, verb: Literal["correct", "void"]
 ) -> Consequences:
     """Return what a correction or a void would do."""
-    places = places_of(session, request, repetition)
-    if not places:
+    rows = recorded(session, request, repetition)
+    if not rows:
         return nothing_follows(request, repetition, "it belongs to a closed branch, so no step follows from it")
-    first = min(places, key=lambda place: place.number)
-    steps = max(place.following for place in places)
-    measurements = max(place.measurements for place in places)
-    if verb == "void":
-        steps, measurements = _after(session, repetition, first.number)
+    (log,) = logs(session, [repetition.id]).values()
+    leading = rows if verb == "void" else samples_among(rows)
+    later = log[leading[0].place + 1 :] if leading else ()
+    measured = [step for step in later if isinstance(step, Measured | Probed)]
+    measurements = sum(not (isinstance(step, Probed) and step.left_out) for step in measured)
+    steps = len(later)
     if not steps:
         words = "nothing follows from it"
     else:
         again = f"; {measurements} of them measurements, which are reused if asked for again" if measurements else ""
         words = f"{steps} stored step{'' if steps == 1 else 's'} after it will be computed again{again}"
-        if repetition.state is State.COMPLETED and repetition.iterations_done < _iterations(session, repetition):
+        iterations = session.get_one(ExperimentRow, repetition.experiment_id).iterations
+        if repetition.state is State.COMPLETED and repetition.iterations_done < iterations:
             words += "; the repetition, which was stopped, goes on to its last iteration"
     return Consequences(
         request=request.id,
         repetition=repetition.number,
-        iteration=first.request.iteration,
+        iteration=rows[0].iteration,
         steps=steps,
         measurements=measurements,
         words=words if verb == "correct" else f"{words}; the controller is asked for again",
     )
-
-
-def _after(session: Session, repetition: RepetitionRow, place: int) -> tuple[int, int]:
-    (log,) = logs(session, [repetition.id]).values()
-    later = log[place + 1 :]
-    return len(later), sum(isinstance(step, Measured | Probed) and not _left_out(step) for step in later)
 
 
 def nothing_follows(request: RequestRow, repetition: RepetitionRow, words: str) -> Consequences:

@@ -1,5 +1,7 @@
 """Corrections of measurements: what follows from one is computed again, and nothing that was measured is lost."""
 
+from collections.abc import Callable
+
 from gaplab.schemas.corrections import (
     ConflictSpec,
     Consequences,
@@ -11,7 +13,7 @@ from gaplab.schemas.measurements import AnswerState, MeasurementSpec
 from gaplab.services.bench import branches
 from gaplab.services.bench.answering import insert_answer, note_answer, settle_request
 from gaplab.services.bench.checking import check_values
-from gaplab.services.bench.consequences import consequences, nothing_follows, places_of
+from gaplab.services.bench.consequences import consequences, nothing_follows, recorded
 from gaplab.services.bench.rewriting import apply, ask_again
 from gaplab.services.bench.taking import locked
 from gaplab.services.core.errors import Conflict
@@ -30,24 +32,6 @@ from gaplab.services.store.queries.request_states import judge
 from gaplab.services.store.session import Session, Store
 
 
-class AddressedCorrection(CorrectionSpec):
-    """A correction with the answer that it is of."""
-
-    answer: str
-
-
-class AddressedVoid(VoidSpec):
-    """A void with the answer that it is of."""
-
-    answer: str
-
-
-class AddressedDecision(ConflictSpec):
-    """A decision with the answer that it is of."""
-
-    answer: str
-
-
 def correct(
     store: Store, id_: str, spec: CorrectionSpec, admitted: Admission, *, dry_run: bool = False
 ) -> Once[Consequences]:
@@ -60,15 +44,14 @@ def correct(
     """
     if dry_run:
         with store.reading() as session:
-            row, request, repetition = _counted(session, id_)
+            row, request, repetition = _counted(session, id_, requests.get)
             _check(session, repetition, _with_readings(spec, row))
             return Once(consequences(session, request, repetition, "correct"))
-    asked = AddressedCorrection(answer=id_, **spec.model_dump())
 
     def work(session: Session) -> Consequences:
         return _correct(session, id_, spec, admitted.token)
 
-    return once(store, admitted, asked, Consequences, work)
+    return once(store, admitted, spec, Consequences, work, of=id_)
 
 
 def void(store: Store, id_: str, spec: VoidSpec, admitted: Admission, *, dry_run: bool = False) -> Once[Consequences]:
@@ -80,9 +63,8 @@ def void(store: Store, id_: str, spec: VoidSpec, admitted: Admission, *, dry_run
     """
     if dry_run:
         with store.reading() as session:
-            return Once(consequences(session, *_counted(session, id_)[1:], "void"))
-    asked = AddressedVoid(answer=id_, **spec.model_dump())
-    return once(store, admitted, asked, Consequences, lambda session: _void(session, id_, spec))
+            return Once(consequences(session, *_counted(session, id_, requests.get)[1:], "void"))
+    return once(store, admitted, spec, Consequences, lambda session: _void(session, id_, spec), of=id_)
 
 
 def decide(
@@ -100,12 +82,11 @@ def decide(
         with store.reading() as session:
             row = requests.get_answer(session, id_)
             return Once(_decided(session, row, *requests.get(session, row.request_id), spec))
-    asked = AddressedDecision(answer=id_, **spec.model_dump())
-    return once(store, admitted, asked, Consequences, lambda session: _decide(session, id_, spec))
+    return once(store, admitted, spec, Consequences, lambda session: _decide(session, id_, spec), of=id_)
 
 
 def _correct(session: Session, id_: str, spec: CorrectionSpec, token: str | None) -> Consequences:
-    row, request, repetition = _locked_and_counted(session, id_)
+    row, request, repetition = _counted(session, id_, locked)
     spec = _with_readings(spec, row)
     _check(session, repetition, spec)
     found = consequences(session, request, repetition, "correct")
@@ -120,20 +101,15 @@ def _correct(session: Session, id_: str, spec: CorrectionSpec, token: str | None
 
 
 def _void(session: Session, id_: str, spec: VoidSpec) -> Consequences:
-    row, request, repetition = _locked_and_counted(session, id_)
+    row, request, repetition = _counted(session, id_, locked)
     found = consequences(session, request, repetition, "void")
     judge(session, row, AnswerState.VOID, spec.reason)
     note_answer(session, EventKind.VOIDED, request, repetition, row, spec.operator)
     branch = None
-    if places := places_of(session, request, repetition):
-        first = min(places, key=lambda place: place.number)
-        request.place, request.iteration, request.kind = (
-            first.request.place,
-            first.request.iteration,
-            first.request.kind,
-        )
+    if rows := recorded(session, request, repetition):
+        request.place, request.iteration, request.kind = rows[0].place, rows[0].iteration, rows[0].kind
         session.flush()
-        branch = branches.close(session, repetition, first.number, first.request.iteration, spec.reason)
+        branch = branches.close(session, repetition, request.place, request.iteration, spec.reason)
         ask_again(session, request, repetition)
     return found.model_copy(update={"branch": branch})
 
@@ -183,21 +159,13 @@ def _decided(
     return found.model_copy(update={"answer": row.id})
 
 
-def _counted(session: Session, id_: str) -> tuple[AnswerRow, RequestRow, RepetitionRow]:
+def _counted(
+    session: Session, id_: str, get: Callable[[Session, str], tuple[RequestRow, RepetitionRow]]
+) -> tuple[AnswerRow, RequestRow, RepetitionRow]:
+    """Return an answer, its request and its repetition as `get` does, unless the answer does not count."""
     row = requests.get_answer(session, id_)
-    _refuse_unless_counted(row)
-    return row, *requests.get(session, row.request_id)
-
-
-def _locked_and_counted(session: Session, id_: str) -> tuple[AnswerRow, RequestRow, RepetitionRow]:
-    row = requests.get_answer(session, id_)
-    request, repetition = locked(session, row.request_id)
+    request, repetition = get(session, row.request_id)
     session.refresh(row)
-    _refuse_unless_counted(row)
-    return row, request, repetition
-
-
-def _refuse_unless_counted(row: AnswerRow) -> None:
     if row.state is not AnswerState.COUNTED:
         why = {
             AnswerState.CONFLICT: "it is in conflict; decide about it instead",
@@ -205,6 +173,7 @@ def _refuse_unless_counted(row: AnswerRow) -> None:
             AnswerState.VOID: "it is void",
         }.get(row.state, "it is dismissed")
         raise Conflict(f"measurement {row.id} does not count: {why}")
+    return row, request, repetition
 
 
 def _with_readings(spec: CorrectionSpec, row: AnswerRow) -> CorrectionSpec:

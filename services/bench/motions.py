@@ -56,7 +56,8 @@ def written(spec: ResolvedSpec, genome: FloatArray, form: MotionFormat) -> str:
     """
     robot = robot_of(spec)
     if form not in forms_of(robot, genome):
-        raise Conflict(_why_not(robot, genome))
+        positions = "a JointTrajectory has positions, and these motors follow others"
+        raise Conflict(_why_none(robot, genome) or f"{positions}: {', '.join(_others(robot))}; take csv")
     motion, world = open_loop(robot.motion(genome)), robot.world
     if form == "csv":
         return _csv(motion, world)
@@ -78,13 +79,13 @@ def between_repeats(world: World) -> str:
 
 def forms_of(robot: Robot, genome: FloatArray) -> tuple[MotionFormat, ...]:
     """Return the forms in which the motion of a genome `(g,)` can be written."""
-    if not robot.world.actuators or isinstance(robot.motion(genome), Loop):
+    if _why_none(robot, genome):
         return ()
     return ("csv", "json") if _others(robot) else ("csv", "json", "ros2")
 
 
-def _why_not(robot: Robot, genome: FloatArray) -> str:
-    """Return why a motion cannot be written in a form that `forms_of` leaves out."""
+def _why_none(robot: Robot, genome: FloatArray) -> str | None:
+    """Return why a motion cannot be written in any form; None if it can."""
     if not robot.world.actuators:
         return f"the {robot.label} has no actuators, so its controller has no motion; measure it by its genome"
     if isinstance(robot.motion(genome), Loop):
@@ -92,8 +93,7 @@ def _why_not(robot: Robot, genome: FloatArray) -> str:
             "the controller observes the robot while it acts, so no targets are known in advance; run the controller "
             "itself, with the genome, on the robot"
         )
-    others = ", ".join(_others(robot))
-    return f"a JointTrajectory has positions, and these motors follow others: {others}; take csv"
+    return None
 
 
 def _others(robot: Robot) -> list[str]:

@@ -4,9 +4,8 @@ from sqlalchemy import update
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.measurements import RequestState
-from gaplab.schemas.records import MeasurementKind
 from gaplab.services.bench import branches
-from gaplab.services.bench.consequences import places_of
+from gaplab.services.bench.consequences import recorded, samples_among
 from gaplab.services.core.arrays import known
 from gaplab.services.core.history import History
 from gaplab.services.core.probes import recorded_fitness
@@ -36,14 +35,11 @@ def apply(
     session: Session, request: RequestRow, repetition: RepetitionRow, answer: AnswerRow, reason: str
 ) -> int | None:
     """Write the new values into the steps that the answer is, and close what follows from the first sample."""
-    places = places_of(session, request, repetition)
-    samples = [place for place in places if place.request.kind is MeasurementKind.SAMPLE]
     branch = None
-    if samples:
-        first = min(samples, key=lambda place: place.number)
-        branch = branches.close(session, repetition, first.number + 1, first.request.iteration, reason)
-    for place in places_of(session, request, repetition):
-        _rewrite(session, place.request, repetition, answer)
+    if samples := samples_among(recorded(session, request, repetition)):
+        branch = branches.close(session, repetition, samples[0].place + 1, samples[0].iteration, reason)
+    for each in recorded(session, request, repetition):
+        _rewrite(session, each, repetition, answer)
     _rewrite_records(session, repetition)
     _continue(session, repetition, closed=branch is not None)
     return branch
@@ -67,9 +63,9 @@ def _rewrite_records(session: Session, repetition: RepetitionRow) -> None:
     (log,) = logs(session, [repetition.id]).values()
     for step in log:
         if isinstance(step, Probed):
-            recorded = known(recorded_fitness(step.fitness, history.samples))
+            fitness = known(recorded_fitness(step.fitness, history.samples))
             of_it = (row.repetition_id == repetition.id) & (row.number == step.iteration)
-            session.execute(update(row).where(of_it).values(recorded_fitness=recorded))
+            session.execute(update(row).where(of_it).values(recorded_fitness=fitness))
         history = history.after(step)
 
 
@@ -78,7 +74,7 @@ def _continue(session: Session, repetition: RepetitionRow, *, closed: bool) -> N
     session.refresh(repetition)
     if (repetition.state is State.COMPLETED and closed) or _waits_for_nothing(session, repetition):
         move(session, RepetitionRow, RepetitionRow.id == repetition.id, State.QUEUED, losses=0)
-    _settle(session, session.get_one(ExperimentRow, repetition.experiment_id))
+    _settle(session, repetition)
 
 
 def _waits_for_nothing(session: Session, repetition: RepetitionRow) -> bool:
@@ -89,7 +85,6 @@ def _waits_for_nothing(session: Session, repetition: RepetitionRow) -> bool:
 
 def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) -> None:
     """Open a request again whose answer is void."""
-    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
     session.refresh(repetition)
     if repetition.state in (State.FAILED, State.CANCELLED):
         become(session, request, RequestState.WITHDRAWN)
@@ -100,12 +95,12 @@ def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) 
         move(session, RepetitionRow, of_it, State.QUEUED, losses=0)
         move(session, RepetitionRow, of_it, State.WAITING)
     session.flush()
-    _settle(session, experiment)
+    _settle(session, repetition)
 
 
-def _settle(session: Session, experiment: ExperimentRow) -> None:
-    """Update the state of an experiment, which a correction may bring back to life."""
-    session.refresh(experiment)
+def _settle(session: Session, repetition: RepetitionRow) -> None:
+    """Update the state of a repetition's experiment, which a correction may bring back to life."""
+    experiment = session.get_one(ExperimentRow, repetition.experiment_id, populate_existing=True)
     alive = any(not each.state.ended for each in repetitions_of(session, experiment.id))
     revived = experiment.state is State.COMPLETED and alive
     if revived:

@@ -108,12 +108,6 @@ def read_request(session: Session, id_: str) -> RequestRead:
     return view_requests(session, [requests.get(session, id_)[0]])[0]
 
 
-class AddressedTake(TakeSpec):
-    """A take with the request that it is of, so that an idempotency key fits this request alone."""
-
-    request: str
-
-
 def take(store: Store, id_: str, spec: TakeSpec, admitted: Admission) -> Once[RequestRead]:
     """Take an open request: nobody else may answer it, and its bench is busy, until the take ends.
 
@@ -121,9 +115,8 @@ def take(store: Store, id_: str, spec: TakeSpec, admitted: Admission) -> Once[Re
         NotFound: it does not exist.
         Conflict: it is not open, its bench is busy, or its experiment is paused.
     """
-    asked = AddressedTake(request=id_, **spec.model_dump())
     try:
-        return once(store, admitted, asked, RequestRead, lambda session: _take(session, id_, spec))
+        return once(store, admitted, spec, RequestRead, lambda session: _take(session, id_, spec), of=id_)
     except IntegrityError as error:
         if "held" not in str(error.orig):
             raise

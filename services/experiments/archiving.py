@@ -41,9 +41,7 @@ def archive_study(session: Session, study_id: str, *, archived: bool = True) -> 
     """
     study = get_study(session, study_id)
     _archive(session, experiments_of(session, [study_id]), f"study {study_id!r}", archived=archived)
-    row = StudyRow
-    missing = row.archived_at.is_(None) if archived else row.archived_at.is_not(None)
-    session.execute(update(row).where(row.id == study_id, missing).values(archived_at=now() if archived else None))
+    _mark(session, StudyRow, [study_id], archived=archived)
     session.refresh(study)
     return view_studies(session, [study])[0]
 
@@ -69,8 +67,12 @@ def _archive(session: Session, experiments: Sequence[ExperimentRow], what: str, 
 
 
 def _move(session: Session, ids: Sequence[str], *, archived: bool) -> None:
-    row = ExperimentRow
-    missing = row.archived_at.is_(None) if archived else row.archived_at.is_not(None)
-    changed = update(row).where(row.id.in_(ids), missing).values(archived_at=now() if archived else None)
-    for id_ in sorted(session.scalars(changed.returning(row.id))):
+    for id_ in _mark(session, ExperimentRow, ids, archived=archived):
         note(session, EventKind.ARCHIVED if archived else EventKind.UNARCHIVED, id_)
+
+
+def _mark(session: Session, table: type[ExperimentRow | StudyRow], ids: Sequence[str], *, archived: bool) -> list[str]:
+    """Note since when rows are archived, or that they are not any more; return the sorted ids of those that changed."""
+    missing = table.archived_at.is_(None) if archived else table.archived_at.is_not(None)
+    changed = update(table).where(table.id.in_(ids), missing).values(archived_at=now() if archived else None)
+    return sorted(session.scalars(changed.returning(table.id)))

@@ -36,7 +36,9 @@ class Once(Generic[R]):
     replayed: bool = False
 
 
-def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: Callable[[Session], R]) -> Once[R]:
+def once(
+    store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: Callable[[Session], R], *, of: str = ""
+) -> Once[R]:
     """Do the work and store its answer under the key, in one transaction; or return the stored answer.
 
     This waits for another transaction with the same key: in Postgres at the unique key, in SQLite for the one writer.
@@ -47,6 +49,7 @@ def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: 
         asked: the request's body; its class identifies the endpoint.
         kind: class of the answer.
         work: creates the answer in the transaction.
+        of: id of what the request is about, so that a key fits this alone.
 
     Raises:
         KeyReused: the key was used for another request.
@@ -54,7 +57,7 @@ def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: 
     key, caller, row = admitted.key, admitted.token or "", IdempotencyRow
     if key is None:
         return Once(store.write(work))
-    text = json.dumps([type(asked).__name__, asked.model_dump(mode="json")], sort_keys=True)
+    text = json.dumps([type(asked).__name__ + of, asked.model_dump(mode="json")], sort_keys=True)
     digest = sha256(text.encode()).hexdigest()
     ours = (row.caller == caller) & (row.key == key)
 

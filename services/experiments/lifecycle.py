@@ -16,10 +16,11 @@ from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.checks import cancel_unneeded
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.experiments.views import view_experiments, view_studies
-from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
-from gaplab.services.store.queries import attempts, checkpoints, requests
+from gaplab.services.store.models import ExperimentRow, RepetitionRow, RequestRow, StudyRow
+from gaplab.services.store.queries import attempts, checkpoints
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, lock, with_failures
+from gaplab.services.store.queries.request_states import withdraw
 from gaplab.services.store.session import Session, transaction
 
 _EVENTS = {
@@ -163,7 +164,7 @@ def _end_repetitions(session: Session, experiment: str) -> None:
     cancelled = move(session, RepetitionRow, RepetitionRow.experiment_id == experiment, State.CANCELLED)
     attempts.end(session, cancelled, Ending.CANCELLED)
     checkpoints.forget(session, cancelled)
-    requests.withdraw(session, cancelled)
+    withdraw(session, RequestRow.repetition_id.in_(cancelled))
 
 
 _REQUESTED: dict[Verb, Callable[[ExperimentRow], State | None]] = {

@@ -1,5 +1,6 @@
 """Limits of submissions: the size of one, and the work in progress."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -39,14 +40,6 @@ class Admission:
 FREELY = Admission()
 
 
-@dataclass(frozen=True)
-class OpenWork:
-    """Number of experiments that have not ended, and their remaining rollouts."""
-
-    experiments: int
-    rollouts: int
-
-
 def check_extent(specs: Sequence[ResolvedSpec], limits: Limits | None) -> None:
     """Refuse a submission that is too large.
 
@@ -55,14 +48,15 @@ def check_extent(specs: Sequence[ResolvedSpec], limits: Limits | None) -> None:
     """
     if limits is None:
         return
-    iterations = max(each.iterations for each in specs)
-    repetitions = sum(each.repetitions for each in specs)
-    asked = {"iterations": iterations, "repetitions": repetitions}
-    violations = [
-        Violation(f"/{name}", value, _too_much(name, value, getattr(limits, name)), f"at most {getattr(limits, name)}")
-        for name, value in asked.items()
-        if value > getattr(limits, name)
-    ]
+    asked = {
+        "iterations": max(each.iterations for each in specs),
+        "repetitions": sum(each.repetitions for each in specs),
+    }
+    violations = []
+    for name, value in asked.items():
+        if value > (limit := getattr(limits, name)):
+            permitted = f"this service takes at most {limit:,} {name} in one submission ({variable_of(name)})"
+            violations.append(Violation(f"/{name}", value, f"{permitted}, not {value:,}", f"at most {limit}"))
     if violations:
         raise InvalidSpec(violations)
 
@@ -83,28 +77,27 @@ def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
         return
     if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write overlap
         session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
-    under_way = _load(session)
-    of_token = under_way.get(admitted.token, OpenWork(0, 0))
-    rollouts = max(0, sum(expected_rollouts(each) * each.repetitions for each in specs) - done)
-    _check("experiments_per_token", of_token.experiments, len(specs), limits)
-    _check("rollouts_per_token", of_token.rollouts, rollouts, limits)
-    _check("experiments", sum(each.experiments for each in under_way.values()), len(specs), limits)
-    _check("rollouts", sum(each.rollouts for each in under_way.values()), rollouts, limits)
+    experiments, rollouts = _load(session)
+    more = max(0, sum(expected_rollouts(each) * each.repetitions for each in specs) - done)
+    _check("experiments_per_token", experiments[admitted.token], len(specs), limits)
+    _check("rollouts_per_token", rollouts[admitted.token], more, limits)
+    _check("experiments", experiments.total(), len(specs), limits)
+    _check("rollouts", rollouts.total(), more, limits)
 
 
-def _load(session: Session) -> dict[str | None, OpenWork]:
-    """Return the work in progress, by the id of the token that submitted it."""
+def _load(session: Session) -> tuple[Counter[str | None], Counter[str | None]]:
+    """Return the experiments that have not ended and their remaining rollouts, by the token that submitted them."""
     row, run = ExperimentRow, RepetitionRow
     left = row.rollouts - run.rollouts_done - run.rollouts_saved
     counts = select(row.token_id, func.count()).where(row.state.in_(OPEN)).group_by(row.token_id)
-    rollouts = (
+    sums = (
         select(row.token_id, func.sum(case((left > 0, left), else_=0)))
         .join(run, run.experiment_id == row.id)
         .where(row.state.in_(OPEN), run.state.in_(OPEN))
         .group_by(row.token_id)
     )
-    sums = {token: int(total) for token, total in session.execute(rollouts)}
-    return {token: OpenWork(count, sums.get(token, 0)) for token, count in session.execute(counts)}
+    rollouts = {token: int(total) for token, total in session.execute(sums)}
+    return Counter(dict(session.execute(counts).all())), Counter(rollouts)
 
 
 def _check(name: str, present: int, more: int, limits: Limits) -> None:
@@ -115,7 +108,3 @@ def _check(name: str, present: int, more: int, limits: Limits) -> None:
             f"{present:,} {noun} {whose}are in progress, and {more:,} more would exceed {limit:,} ({variable_of(name)})"
         )
         raise LimitReached(msg, RETRY_AFTER_S)
-
-
-def _too_much(name: str, value: int, limit: int) -> str:
-    return f"this service takes at most {limit:,} {name} in one submission ({variable_of(name)}), not {value:,}"

@@ -5,11 +5,9 @@ state or name changes between two pages, both pages or neither may have it.
 """
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from datetime import datetime
 from hashlib import sha256
-from typing import Any
+from typing import TypeVar
 
 from sqlalchemy import Select, String, select, tuple_, type_coerce
 
@@ -25,12 +23,12 @@ from gaplab.services.experiments.query.conditions import (
     study_is,
 )
 from gaplab.services.experiments.views import view_experiments, view_studies
-from gaplab.services.store.cursor import Column, decode, encode, next_cursor
-from gaplab.services.store.models import ExperimentRow, StudyRow
+from gaplab.services.store.cursor import decode, encode, next_cursor
+from gaplab.services.store.models import Base, ExperimentRow, StudyRow
 from gaplab.services.store.session import Session, snapshot
 from gaplab.services.store.statements import storable
 
-Key = tuple[str | int | datetime, ...]
+R = TypeVar("R", ExperimentRow, StudyRow)
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class ListFilter:
         text: only experiments or studies whose name, id, notes or tags contain this text.
         q: query, as `gaplab.services.experiments.query` has it. Archived ones are left out unless it mentions them, or
             a study is named.
-        sort: a name of EXPERIMENT_ORDERS or STUDY_ORDERS; a minus before it reverses the order.
+        sort: an order of ORDERS; a minus before it reverses the order.
     """
 
     study: str | None = None
@@ -62,35 +60,20 @@ class ListFilter:
 
     def cursor_after(self, row: ExperimentRow | StudyRow) -> str:
         """Return the cursor of the page that follows the row in this list."""
-        orders = EXPERIMENT_ORDERS if isinstance(row, ExperimentRow) else STUDY_ORDERS
-        return encode(*orders[self.sort.removeprefix("-")].key(row), bound_to=self.digest())
+        key = (getattr(row, name) for name in ORDERS[type(row)][self.sort.removeprefix("-")])
+        return encode(*key, bound_to=self.digest())
 
 
-@dataclass(frozen=True)
-class Order:
-    """An order of a list: its columns, and the key of a row in them."""
-
-    columns: tuple[Column, ...]
-    key: Callable[[Any], Key]
-
-
-_STATE = type_coerce(ExperimentRow.state, String())
-
-EXPERIMENT_ORDERS = {
-    "created_at": Order(
-        (ExperimentRow.created_at, ExperimentRow.position, ExperimentRow.id),
-        lambda row: (row.created_at, row.position, row.id),
-    ),
-    "name": Order((ExperimentRow.name, ExperimentRow.id), lambda row: (row.name, row.id)),
-    "strategy": Order((ExperimentRow.strategy, ExperimentRow.id), lambda row: (row.strategy, row.id)),
-    "state": Order((_STATE, ExperimentRow.id), lambda row: (row.state.value, row.id)),
+ORDERS: dict[type[Base], dict[str, tuple[str, ...]]] = {
+    ExperimentRow: {
+        "created_at": ("created_at", "position", "id"),
+        "name": ("name", "id"),
+        "strategy": ("strategy", "id"),
+        "state": ("state", "id"),
+    },
+    StudyRow: {"created_at": ("created_at", "id"), "name": ("name", "id")},
 }
-
-STUDY_ORDERS = {
-    "created_at": Order((StudyRow.created_at, StudyRow.id), lambda row: (row.created_at, row.id)),
-    "name": Order((StudyRow.name, StudyRow.id), lambda row: (row.name, row.id)),
-}
-
+"""The columns of each order."""
 
 NEWEST_FIRST = ListFilter()
 
@@ -104,7 +87,17 @@ def list_experiments(
     Raises:
         InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
     """
-    rows = _page_of_experiments(session, wanted, limit=limit + 1, cursor=cursor)
+    row = ExperimentRow
+    query = select(row).where(*experiments_meeting(wanted.q, all_=wanted.study is not None))
+    if wanted.text:
+        query = query.where(contains(wanted.text, *EXPERIMENT_TEXTS))
+    equal = {row.study_id: wanted.study, row.strategy: wanted.strategy}
+    query = query.where(*(column == storable(value) for column, value in equal.items() if value is not None))
+    if wanted.alone:
+        query = query.where(row.study_id.is_(None))
+    if wanted.state is not None:
+        query = query.where(row.state == wanted.state)
+    rows = session.scalars(_cut(query, row, wanted, limit + 1, cursor)).all()
     return Page(items=view_experiments(session, rows[:limit]), next=next_cursor(rows, limit, wanted.cursor_after))
 
 
@@ -117,27 +110,6 @@ def list_studies(
     Raises:
         InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
     """
-    rows = _page_of_studies(session, wanted, limit=limit + 1, cursor=cursor)
-    return Page(items=view_studies(session, rows[:limit]), next=next_cursor(rows, limit, wanted.cursor_after))
-
-
-def _page_of_experiments(
-    session: Session, wanted: ListFilter, *, limit: int, cursor: str | None
-) -> tuple[ExperimentRow, ...]:
-    row = ExperimentRow
-    query = select(row).where(*experiments_meeting(wanted.q, all_=wanted.study is not None))
-    if wanted.text:
-        query = query.where(contains(wanted.text, *EXPERIMENT_TEXTS))
-    equal = {row.study_id: wanted.study, row.strategy: wanted.strategy}
-    query = query.where(*(column == storable(value) for column, value in equal.items() if value is not None))
-    if wanted.alone:
-        query = query.where(row.study_id.is_(None))
-    if wanted.state is not None:
-        query = query.where(row.state == wanted.state)
-    return tuple(session.scalars(_cut(query, wanted, EXPERIMENT_ORDERS, limit, cursor)))
-
-
-def _page_of_studies(session: Session, wanted: ListFilter, *, limit: int, cursor: str | None) -> tuple[StudyRow, ...]:
     query = select(StudyRow).where(*studies_meeting(wanted.q))
     if wanted.text:
         query = query.where(contains(wanted.text, *STUDY_TEXTS))
@@ -145,13 +117,15 @@ def _page_of_studies(session: Session, wanted: ListFilter, *, limit: int, cursor
         query = query.where(of_study(ExperimentRow.strategy == storable(wanted.strategy)))
     if wanted.state is not None:
         query = query.where(study_is(wanted.state))
-    return tuple(session.scalars(_cut(query, wanted, STUDY_ORDERS, limit, cursor)))
+    rows = session.scalars(_cut(query, StudyRow, wanted, limit + 1, cursor)).all()
+    return Page(items=view_studies(session, rows[:limit]), next=next_cursor(rows, limit, wanted.cursor_after))
 
 
-def _cut(
-    query: Select[Any], wanted: ListFilter, orders: dict[str, Order], limit: int, cursor: str | None
-) -> Select[Any]:
-    columns = orders[wanted.sort.removeprefix("-")].columns
+def _cut(query: Select[R], table: type[R], wanted: ListFilter, limit: int, cursor: str | None) -> Select[R]:
+    names = ORDERS[table][wanted.sort.removeprefix("-")]
+    columns = [
+        type_coerce(ExperimentRow.state, String()) if name == "state" else getattr(table, name) for name in names
+    ]
     falling = wanted.sort.startswith("-")
     if cursor is not None:
         key, after = tuple_(*columns), decode(cursor, columns, wanted.digest())

@@ -4,7 +4,7 @@ from sqlalchemy import delete, func, select, update
 
 from gaplab.schemas.views import ViewRead, ViewSpec
 from gaplab.services.core.errors import InvalidSpec, LimitReached, NotFound
-from gaplab.services.experiments.query import conditions
+from gaplab.services.experiments.query.conditions import experiments_meeting, studies_meeting
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ViewRow
 from gaplab.services.store.session import Session, snapshot, transaction
@@ -39,7 +39,7 @@ def save_view(session: Session, name: str, spec: ViewSpec) -> ViewRead:
         LimitReached: there are too many views.
     """
     try:
-        conditions.check(spec.query, of_studies=spec.shows != "experiments")
+        (experiments_meeting if spec.shows == "experiments" else studies_meeting)(spec.query)
     except InvalidSpec as error:
         raise InvalidSpec(violation.moved("q", "/query") for violation in error.violations) from error
     query = storable(spec.query) if spec.query else None

@@ -10,9 +10,9 @@ from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import MOVES, State
 from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
-from gaplab.services.store.models import ExperimentRow, LeasedRow, RepetitionRow
-from gaplab.services.store.queries import requests
+from gaplab.services.store.models import ExperimentRow, LeasedRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.request_states import withdraw
 
 _CLAIMABLE = (State.QUEUED, State.RUNNING)
 
@@ -121,4 +121,4 @@ def _end_queued(session: Session, experiment: str) -> None:
     queued = (row.experiment_id == experiment) & row.state.in_((State.QUEUED, State.WAITING))
     ended = move(session, row, queued & (row.iterations_done > 0), State.COMPLETED, error=None)
     ended += move(session, row, queued, State.CANCELLED, error=None)
-    requests.withdraw(session, ended)
+    withdraw(session, RequestRow.repetition_id.in_(ended))

@@ -137,13 +137,8 @@ def _with_stored_names(store: Store, violation: Violation) -> Violation:
     plugins = violation.permitted
     if violation.pointer != "/robot" or isinstance(plugins, str) or IMPORTED not in (plugins or ()):
         return violation
-    names = {*robots, *_stored_names(store)} - {IMPORTED}
+    names = {*robots, *snapshot(rows.names)(store)} - {IMPORTED}
     return unknown_name("/robot", "robot", str(violation.value), sorted(names))
-
-
-@snapshot
-def _stored_names(session: Session) -> tuple[str, ...]:
-    return rows.names(session)
 
 
 @snapshot

@@ -115,34 +115,30 @@ def _view(
     session: Session, rows: Sequence[ExperimentRow], work: Mapping[str, _Work], *, reveal: bool
 ) -> tuple[ExperimentRead, ...]:
     ids = [row.id for row in rows]
-    failures, checks, best = reasons(session, ids), summaries(session, rows), best_recorded(session, ids)
-    fitness, doubts = fitness_of(session, ids), doubtful(session, ids)
+    found = _Findings(
+        failures=reasons(session, ids),
+        checks=summaries(session, rows),
+        fitness=fitness_of(session, ids),
+        best=best_recorded(session, ids),
+        doubts=doubtful(session, ids),
+    )
     secret = frozenset() if reveal else hidden(session, rows)
-    found = {
-        id_: _Findings(
-            failures=failures.get(id_, ()),
-            check=checks.get(id_, CheckSummary()),
-            fitness=fitness.get(id_),
-            best=mean_best(best[id_]) if id_ in best else None,
-            doubts=doubts.get(id_, ()),
-        )
-        for id_ in ids
-    }
-    return tuple(_experiment(row, work[row.id], found[row.id], secret=row.id in secret) for row in rows)
+    return tuple(_experiment(row, work[row.id], found, secret=row.id in secret) for row in rows)
 
 
 @dataclass(frozen=True)
 class _Findings:
-    """Findings on an experiment: reasons of failure, sensitivity check, fitness, doubtful measurements."""
+    """Findings by experiment: reasons of failure, sensitivity check, fitness, doubtful measurements."""
 
-    failures: tuple[str, ...]
-    check: CheckSummary
-    fitness: FitnessRead | None
-    best: float | None
-    doubts: tuple[str, ...]
+    failures: Mapping[str, tuple[str, ...]]
+    checks: Mapping[str, CheckSummary]
+    fitness: Mapping[str, FitnessRead]
+    best: Mapping[str, Sequence[float]]
+    doubts: Mapping[str, tuple[str, ...]]
 
 
 def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bool) -> ExperimentRead:
+    check, doubts = found.checks.get(row.id, CheckSummary()), found.doubts.get(row.id, ())
     return ExperimentRead(
         id=row.id,
         study=row.study_id,
@@ -160,12 +156,12 @@ def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bo
         priority=-row.precedence,
         max_parallel=row.max_parallel,
         progress=work.progress,
-        fitness=found.fitness,
-        best_fitness=found.best,
-        reasons=(*([row.paused_because] if row.paused_because else []), *found.failures),
-        sensitivity=found.check.id,
-        doubts=found.doubts,
-        warnings=(*found.doubts, *found.check.warnings, *_version_warnings(row, work.tally)),
+        fitness=found.fitness.get(row.id),
+        best_fitness=mean_best(found.best[row.id]) if row.id in found.best else None,
+        reasons=(*([row.paused_because] if row.paused_because else []), *found.failures.get(row.id, ())),
+        sensitivity=check.id,
+        doubts=doubts,
+        warnings=(*doubts, *check.warnings, *_version_warnings(row, work.tally)),
         created_at=row.created_at,
         started_at=row.started_at,
         ended_at=row.ended_at,

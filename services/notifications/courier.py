@@ -54,7 +54,8 @@ class Courier:
 
     def work(self) -> bool:
         """Deliver what is due, and return whether it was this process's turn."""
-        channels = [channel for channel, is_set in self._channels().items() if is_set]
+        settings = {Channel.WEBHOOK: self._notify.url, Channel.COMMAND: self._notify.command}
+        channels = [channel for channel, setting in settings.items() if setting]
         while has_turn := outbox.collect(self._store, self._owner, channels):
             letter = outbox.next_letter(self._store)
             if letter is None or self._stopped.is_set():
@@ -68,9 +69,6 @@ class Courier:
                 log.warning("notification %s by %s: %s", letter.message.id, letter.channel, outcome.failure)
             outbox.settle(self._store, letter, outcome.failure, hopeless=outcome.hopeless)
         return has_turn
-
-    def _channels(self) -> dict[Channel, bool]:
-        return {Channel.WEBHOOK: bool(self._notify.url), Channel.COMMAND: bool(self._notify.command)}
 
     def _run(self) -> None:
         while not self._stopped.wait(EVERY_S):

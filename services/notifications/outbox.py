@@ -7,6 +7,7 @@ function is one transaction, and raises StoreUnavailable while the database cann
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from typing import Literal
 
 from sqlalchemy import func, select
 
@@ -138,28 +139,22 @@ def _of_end(
     The end of an experiment that is deleted by now may be that of its study.
     """
     experiment = session.get(ExperimentRow, event.experiment_id)
-    deleted = session.get(DeletionRow, event.experiment_id) if experiment is None else None
     if experiment is not None:
         if not experiment.state.ended or not _is_last_end(session, event, [experiment.id]):
             return
-        told = [*(channels if experiment.study_id is None else ()), *([Channel.OWN] if experiment.webhook else [])]
-        message = _of_experiment(event, experiment)
-        yield from (_row(event, message, channel, present) for channel in told)
-    of = experiment or deleted
+        yield from _rows(event, experiment, [experiment], channels if experiment.study_id is None else (), present)
+    of = experiment or session.get(DeletionRow, event.experiment_id)
     study = session.get(StudyRow, of.study_id) if of and of.study_id else None
-    if study is not None and _ended_with(session, event, study):
-        told = [*channels, *([Channel.OWN] if study.webhook else [])]
-        message = _of_study(session, event, study)
-        yield from (_row(event, message, channel, present) for channel in told)
+    if study is not None:
+        members = experiments_of(session, [study.id])
+        if members and all(each.state.ended for each in members) and _ends(session, event, study, members):
+            yield from _rows(event, study, members, channels, present)
 
 
-def _ended_with(session: Session, event: EventRow, study: StudyRow) -> bool:
-    """Return whether all experiments of the study have ended, the last of them, deleted or not, at this event."""
-    experiments = experiments_of(session, [study.id])
-    if not experiments or not all(experiment.state.ended for experiment in experiments):
-        return False
+def _ends(session: Session, event: EventRow, study: StudyRow, members: Sequence[ExperimentRow]) -> bool:
+    """Return whether the last experiment of the study to end, deleted or not, ended at this event."""
     deleted = session.scalars(select(DeletionRow.id).where(DeletionRow.study_id == study.id))
-    return _is_last_end(session, event, [*(experiment.id for experiment in experiments), *deleted])
+    return _is_last_end(session, event, [*(each.id for each in members), *deleted])
 
 
 def _is_last_end(session: Session, event: EventRow, experiments: Sequence[str]) -> bool:
@@ -168,44 +163,34 @@ def _is_last_end(session: Session, event: EventRow, experiments: Sequence[str]) 
     return session.scalar(ends) == event.number
 
 
-def _row(event: EventRow, message: Notification, channel: Channel, present: datetime) -> NotificationRow:
-    return NotificationRow(
-        event=event.number,
-        subject_id=message.subject,
-        channel=channel.value,
-        experiment_id=event.experiment_id,
-        message=message.model_dump(mode="json"),
-        next_at=present,
-    )
-
-
-def _of_experiment(event: EventRow, row: ExperimentRow) -> Notification:
-    return Notification(
+def _rows(
+    event: EventRow,
+    row: ExperimentRow | StudyRow,
+    members: Sequence[ExperimentRow],
+    channels: Sequence[Channel],
+    present: datetime,
+) -> Iterator[NotificationRow]:
+    """Yield the notifications that a study with its members, or an experiment by itself, has ended."""
+    kind: Literal["study", "experiment"] = "study" if isinstance(row, StudyRow) else "experiment"
+    states = [each.state.value for each in members]
+    counts = ", ".join(f"{states.count(state)} {state}" for state in sorted(set(states)))
+    state = state_of([each.state for each in members])
+    message = Notification(
         id=f"{event.number}-{row.id}",
-        kind="experiment",
-        subject=row.id,
-        name=row.name,
-        state=row.state,
-        text=f"The experiment {row.name} is {row.state}.",
-        experiments=(EndedExperiment(id=row.id, name=row.name, state=row.state),),
-        ended_at=event.at,
-    )
-
-
-def _of_study(session: Session, event: EventRow, row: StudyRow) -> Notification:
-    experiments = experiments_of(session, [row.id])
-    state = state_of([experiment.state for experiment in experiments])
-    return Notification(
-        id=f"{event.number}-{row.id}",
-        kind="study",
+        kind=kind,
         subject=row.id,
         name=row.name,
         state=state,
-        text=f"The study {row.name} is {state}: {_counted([each.state.value for each in experiments])}.",
-        experiments=tuple(EndedExperiment(id=each.id, name=each.name, state=each.state) for each in experiments),
+        text=f"The {kind} {row.name} is {state}{f': {counts}' if kind == 'study' else ''}.",
+        experiments=tuple(EndedExperiment(id=each.id, name=each.name, state=each.state) for each in members),
         ended_at=event.at,
     )
-
-
-def _counted(states: list[str]) -> str:
-    return ", ".join(f"{states.count(state)} {state}" for state in sorted(set(states)))
+    for channel in (*channels, *([Channel.OWN] if row.webhook else [])):
+        yield NotificationRow(
+            event=event.number,
+            subject_id=row.id,
+            channel=channel.value,
+            experiment_id=event.experiment_id,
+            message=message.model_dump(mode="json"),
+            next_at=present,
+        )

@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TypeGuard
 
 from gaplab.schemas.plugin import IgnoredFile
 from gaplab.services.core import external_plugins
@@ -64,13 +63,8 @@ def _hidden_classes(name: str) -> list[str]:
     """Return the classes of plug-ins in a module whose names begin with an underscore."""
     module = f"{external_plugins.PACKAGE}.{name}"
     found = vars(sys.modules[module]).values() if module in sys.modules else ()
-    return [
-        each.__name__ for each in found if _is_plugin(each) and each.__module__ == module and each.__name__[0] == "_"
-    ]
-
-
-def _is_plugin(found: object) -> TypeGuard[type[Plugin]]:
-    return isinstance(found, type) and issubclass(found, Plugin)
+    plugins = [each for each in found if isinstance(each, type) and issubclass(each, Plugin)]
+    return [each.__name__ for each in plugins if each.__module__ == module and each.__name__[0] == "_"]
 
 
 def _why_no_module(suffix: str) -> str:

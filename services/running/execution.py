@@ -60,11 +60,7 @@ def fail(store: Store, claim: Claim, failure: Failure) -> bool:
 @transaction
 def note_measuring(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
     """Record that these repetitions wait for reality's answer, and return the claims that are still valid."""
-    row = RepetitionRow
-    holds = update(row).where(_LEASES.of(claims), row.state == State.RUNNING)
-    noted = session.execute(holds.values(measuring_at=now(), heartbeat_at=now()).returning(row.id, row.epoch))
-    held = {(id_, epoch) for id_, epoch in noted}
-    return tuple(claim for claim in claims if (claim.id, claim.epoch) in held)
+    return _LEASES.renew(session, claims, measuring_at=now())
 
 
 @transaction

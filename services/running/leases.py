@@ -90,7 +90,7 @@ class Leases(Generic[L]):
     def heartbeat(self, store: Store, leases: Iterable[L]) -> tuple[L, ...]:
         """Renew leases, and return those that are still valid."""
         held = tuple(leases)
-        return store.write(self._heartbeat, held) if held else ()
+        return store.write(self.renew, held) if held else ()
 
     def complete(self, store: Store, *leases: L, **results: Any) -> tuple[L, ...]:  # noqa: ANN401 - columns of any type
         """End work as COMPLETED, and return the leases that were valid.
@@ -187,9 +187,10 @@ class Leases(Generic[L]):
         """
         return move(session, self.table, which & (self.table.state == State.RUNNING), change.to, **change.values)
 
-    def _heartbeat(self, session: Session, leases: Sequence[L]) -> tuple[L, ...]:
+    def renew(self, session: Session, leases: Sequence[L], /, **values: Any) -> tuple[L, ...]:  # noqa: ANN401 - columns of any type
+        """Renew leases, set further columns of their rows, and return those that are still valid."""
         row = self.table
-        beaten = update(row).where(self.of(leases), row.state == State.RUNNING).values(heartbeat_at=now())
+        beaten = update(row).where(self.of(leases), row.state == State.RUNNING).values(heartbeat_at=now(), **values)
         held = {(id_, epoch) for id_, epoch in session.execute(beaten.returning(row.id, row.epoch))}
         return tuple(lease for lease in leases if (lease.id, lease.epoch) in held)
 

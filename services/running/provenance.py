@@ -58,11 +58,8 @@ def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
     lock(session, [experiment_id])
     session.refresh(experiment)
     if experiment.state.ended or experiment.computed_with is None:
-        why = (
-            f"has ended: it is {experiment.state}"
-            if experiment.state.ended
-            else "has not started, so it has no versions yet"
-        )
+        ended = f"has ended: it is {experiment.state}"
+        why = ended if experiment.state.ended else "has not started, so it has no versions yet"
         raise Conflict(f"experiment {experiment_id!r} {why}; there is nothing to accept")
     told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
     note(session, EventKind.VERSIONS_ACCEPTED, experiment_id, **told)
@@ -73,7 +70,8 @@ def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
 
 def decisive(under: Provenance, spec: Mapping[str, Any]) -> str:
     """Return the part of a provenance that all supervisors of an experiment with this spec must share."""
-    engines = (_engine(under, name) for name in sorted(_engines(spec)))
+    chosen = {ref["name"] for ref in (spec["engine"], spec["reality"]["engine"]) if ref}
+    engines = (_engine(under, name) for name in sorted(chosen))
     plugins = (plugin for plugin in named_in(spec) if not plugin.startswith("engine "))
     external = (_external(under, plugin) for plugin in plugins if plugin in under.outside)
     return ", ".join([*engines, *_machine(under), *external])
@@ -217,8 +215,3 @@ def _machine(under: Provenance) -> tuple[str, str]:
 
 def _external(under: Provenance, plugin: str) -> str:
     return f"{plugin} ({under.outside[plugin]})"
-
-
-def _engines(spec: Mapping[str, Any]) -> set[str]:
-    chosen = (spec["engine"], spec["reality"]["engine"])
-    return {ref["name"] for ref in chosen if ref}

@@ -73,7 +73,8 @@ class RepetitionLeases(Leases[Claim]):
             _refuse_unfinished(session, which)
         change = replace(change, values={"hardware": None, "measuring_at": None} | dict(change.values))
         ended: list[int] = super().end(session, which & row.id.in_(owners), change)
-        endings = {id_: _ending(change.ending, states[owners[id_]]) for id_ in ended}
+        requested = _REQUESTED_ENDINGS if change.ending is Ending.HANDED_BACK else {}
+        endings = {id_: requested.get(states[owners[id_]], change.ending) for id_ in ended}
         for each in Ending:
             if ids := [id_ for id_ in ended if endings[id_] is each]:
                 attempts.end(session, ids, each, change.reason)
@@ -81,10 +82,6 @@ class RepetitionLeases(Leases[Claim]):
             checkpoints.forget(session, ended)
         settle(session, states)
         return ended
-
-
-def _ending(ending: Ending, state: State) -> Ending:
-    return _REQUESTED_ENDINGS.get(state, ending) if ending is Ending.HANDED_BACK else ending
 
 
 def _refuse_unfinished(session: Session, which: ColumnElement[bool]) -> None:

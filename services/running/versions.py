@@ -118,10 +118,8 @@ def _version(module: str) -> str:
     return " ".join(sorted({version(name) for name in _distributions().get(module, ())})) or "none"
 
 
-@cache
-def _distributions() -> Mapping[str, list[str]]:
-    """Return the distributions of each module, whose name may differ from its own; this takes a quarter of a second."""
-    return packages_distributions()
+_distributions = cache(packages_distributions)
+"""The distributions of each module, whose name may differ from its own; finding them takes a quarter of a second."""
 
 
 @cache

@@ -10,6 +10,7 @@ from sqlalchemy import ColumnElement, Tuple, literal, tuple_
 from sqlalchemy.orm import InstrumentedAttribute
 
 from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.store.texts import storable
 
 R = TypeVar("R")
 
@@ -52,11 +53,6 @@ def _part(part: object, column: Column) -> ColumnElement[Any]:
     value = datetime.fromisoformat(str(part)).astimezone(UTC) if kind is datetime else part
     if type(value) is not kind:
         raise TypeError(part)
-    if (isinstance(value, int) and abs(value) >= 2**31) or (isinstance(value, str) and not _storable(value)):
+    if (isinstance(value, int) and abs(value) >= 2**31) or (isinstance(value, str) and storable(value) != value):
         raise ValueError(part)
     return literal(value, column.type)
-
-
-def _storable(text: str) -> bool:
-    """Return whether both databases accept the text: Postgres refuses NULs, and both refuse lone surrogates."""
-    return "\0" not in text and bool(text.encode())

@@ -31,7 +31,7 @@ def named() -> Iterator[None]:
     except PoolExhausted as error:
         raise StoreUnavailable("all connections to the database are in use") from error
     except DBAPIError as error:
-        if _lacks_schema(error):
+        if _sqlstate(error) in _NO_SCHEMA or str(error.orig).startswith(("no such table", "no such column")):
             raise StoreUnavailable(WRONG_SCHEMA) from error
         if is_damage(error.orig):
             raise StoreDamaged(f"the database is damaged: {_first_line(error)}") from error
@@ -44,10 +44,6 @@ def named() -> Iterator[None]:
 def is_clash(error: DBAPIError) -> bool:
     """Return whether the transaction was aborted for another one, and may succeed if it runs again."""
     return _sqlstate(error) in _CLASHES
-
-
-def _lacks_schema(error: DBAPIError) -> bool:
-    return _sqlstate(error) in _NO_SCHEMA or str(error.orig).startswith(("no such table", "no such column"))
 
 
 def _sqlstate(error: DBAPIError) -> str | None:

@@ -5,8 +5,6 @@ from collections.abc import Iterable
 LONGEST_REASON = 2_000
 """Characters of a reason; lists of experiments have those of every failed repetition."""
 
-_BEGINNING = LONGEST_REASON - 100
-
 
 def storable(text: str) -> str:
     """Return the text with NUL characters and lone surrogates replaced, which databases refuse."""
@@ -17,7 +15,7 @@ def brief(text: str) -> str:
     """Return the text, or its beginning if it has more than `LONGEST_REASON` characters."""
     if len(text) <= LONGEST_REASON:
         return text
-    return f"{text[:_BEGINNING]}… (the beginning of {len(text):,} characters, which are in the log)"
+    return f"{text[: LONGEST_REASON - 100]}… (the beginning of {len(text):,} characters, which are in the log)"
 
 
 def pack_tags(tags: Iterable[str]) -> str | None:

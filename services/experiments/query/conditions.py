@@ -8,7 +8,7 @@ from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.experiments.query import fields
 from gaplab.services.experiments.query.fields import Condition, Field, field_of
-from gaplab.services.experiments.query.parsing import Every, Not, Some, Term, Tree, Value, Words, parse, refusal
+from gaplab.services.experiments.query.parsing import Every, Not, Some, Term, Tree, Value, Words, inside, parse, refusal
 from gaplab.services.store.cursor import Column
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.results import best_of_all, points_of_all
@@ -55,11 +55,6 @@ def _tagged(condition: Callable[[Column], Condition]) -> Condition:
     """SQL condition: the tags of the experiment, or of its study, meet the condition."""
     of_its_study = _E.study_id.in_(select(_S.id).where(condition(_S.tags)))
     return or_(condition(_E.tags), and_(_E.study_id.is_not(None), of_its_study))
-
-
-def _study_tagged(condition: Callable[[Column], Condition]) -> Condition:
-    """SQL condition: the tags of the study, or of one of its experiments, meet the condition."""
-    return or_(condition(_S.tags), of_study(condition(_E.tags)))
 
 
 def _of_some(field: Field) -> Field:
@@ -121,7 +116,7 @@ STUDY_FIELDS: Fields = {
     "name": fields.text(_S.name, "name"),
     "study": fields.text(_S.id, "id"),
     "note": _either(fields.text(_S.notes, "notes, also of its experiments"), _of_some(fields.text(_E.notes, ""))),
-    "tag": fields.tags(_study_tagged, "a tag of it or of its experiments"),
+    "tag": fields.tags(lambda has: or_(has(_S.tags), of_study(has(_E.tags))), "a tag of it or of its experiments"),
     "state": fields.state(study_is, "state"),
     **{name: _of_some(field) for name, field in EXPERIMENT_FIELDS.items() if name not in _OWN},
     "created": fields.moment(_S.created_at, "time of its submission"),
@@ -146,15 +141,6 @@ def experiments_meeting(query: str | None, *, all_: bool = False) -> list[Condit
 def studies_meeting(query: str | None) -> list[Condition]:
     """Return the SQL conditions of a query on studies, as `experiments_meeting` does."""
     return _meeting(query, STUDY_FIELDS, STUDY_TEXTS, [_S.archived_at.is_(None)])
-
-
-def check(query: str | None, *, of_studies: bool) -> None:
-    """Refuse an invalid query.
-
-    Raises:
-        InvalidSpec: the message has the place.
-    """
-    studies_meeting(query) if of_studies else experiments_meeting(query)
 
 
 def _meeting(query: str | None, known: Fields, texts: Sequence[Column], otherwise: list[Condition]) -> list[Condition]:
@@ -198,11 +184,5 @@ def _permitted(field: Field) -> list[str]:
 
 
 def _mentions(tree: Tree, name: str) -> bool:
-    match tree:
-        case Term(field=field):
-            return field.text.lower() == name
-        case Not(part):
-            return _mentions(part, name)
-        case Every(parts) | Some(parts):
-            return any(_mentions(part, name) for part in parts)
-    return False
+    named = isinstance(tree, Term) and tree.field.text.lower() == name
+    return named or any(_mentions(part, name) for part in inside(tree))

@@ -19,7 +19,7 @@ DEEPEST = 20
 """Limits of a query: of its conditions, and of the depth to which parentheses and `not` nest."""
 
 _GRAMMAR = r"""
-start: either
+?start: either
 either: both (OR both)*
 both: factor (AND? factor)*
 ?factor: NOT factor -> negation | "(" either ")" | comparison
@@ -143,9 +143,6 @@ def _parser() -> Lark:
 class _Building(Transformer[Token, Tree]):
     """Builds the tree while Lark parses, so that depth costs no stack; a method is named as its rule."""
 
-    def start(self, found: list[Tree]) -> Tree:
-        return found[0]
-
     def either(self, found: list[Token | Tree]) -> Tree:
         return _joined(Some, found)
 
@@ -185,13 +182,14 @@ def _check_size(query: str, tree: Tree) -> None:
     level, conditions = [tree], 0
     for _ in range(DEEPEST):
         conditions += sum(len(part.values) if isinstance(part, Term) else 1 for part in level)
-        level = [child for part in level for child in _children(part)]
+        level = [child for part in level for child in inside(part)]
     if level or conditions > 3 * MOST_CONDITIONS:
         message = f"the query is too large: at most {MOST_CONDITIONS} conditions, nested at most {DEEPEST // 2} deep"
         raise refusal(Value(query, 1), message)
 
 
-def _children(tree: Tree) -> tuple[Tree, ...]:
+def inside(tree: Tree) -> tuple[Tree, ...]:
+    """Return what a tree consists of; nothing for a condition."""
     match tree:
         case Not(part):
             return (part,)

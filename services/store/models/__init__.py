@@ -29,6 +29,7 @@ from gaplab.services.store.models.bench import AnswerRow as AnswerRow
 from gaplab.services.store.models.bench import AttachmentRow as AttachmentRow
 from gaplab.services.store.models.bench import BranchRow as BranchRow
 from gaplab.services.store.models.bench import RequestRow as RequestRow
+from gaplab.services.store.models.experiments import DeletionRow as DeletionRow
 from gaplab.services.store.models.experiments import ExperimentRow as ExperimentRow
 from gaplab.services.store.models.experiments import RepetitionRow as RepetitionRow
 from gaplab.services.store.models.experiments import StudyRow as StudyRow
@@ -39,7 +40,6 @@ from gaplab.services.store.models.provenance import SupervisorRow as SupervisorR
 from gaplab.services.store.models.results import IterationRow as IterationRow
 from gaplab.services.store.models.results import MeasurementRow as MeasurementRow
 from gaplab.services.store.models.results import SimulatorRow as SimulatorRow
-from gaplab.services.store.models.service import DeletionRow as DeletionRow
 from gaplab.services.store.models.service import EventCounterRow as EventCounterRow
 from gaplab.services.store.models.service import EventRow as EventRow
 from gaplab.services.store.models.service import IdempotencyRow as IdempotencyRow

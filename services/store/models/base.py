@@ -18,7 +18,7 @@ REVISION = "0002"
 """The revision with these tables; a database at any other revision is refused."""
 
 
-def _words(kind: type[StrEnum], name: str) -> Enum:
+def words(kind: type[StrEnum], name: str) -> Enum:
     """Return a text type that a named constraint limits to the values of an enumeration."""
     return Enum(
         kind,
@@ -74,10 +74,10 @@ class Base(DeclarativeBase):
         list[list[list[float | None]]]: JSON(none_as_null=True),
         dict[str, Any]: JSON(none_as_null=True),
         State: Enum(State, native_enum=False, create_constraint=True, length=16, name="state"),
-        MeasurementKind: _words(MeasurementKind, "kind"),
-        Ending: _words(Ending, "ending"),
-        RequestState: _words(RequestState, "state"),
-        AnswerState: _words(AnswerState, "state"),
+        MeasurementKind: words(MeasurementKind, "kind"),
+        Ending: words(Ending, "ending"),
+        RequestState: words(RequestState, "state"),
+        AnswerState: words(AnswerState, "state"),
     }
 
 

@@ -1,4 +1,4 @@
-"""Studies, experiments and repetitions, with their states."""
+"""Studies, experiments and repetitions, with their states, and what was deleted."""
 
 from datetime import datetime
 from typing import Any
@@ -145,3 +145,21 @@ class RepetitionRow(LeasedRow):
     measuring_at: Mapped[datetime | None]
     hidden_error: Mapped[str | None] = mapped_column(Reason)
     hardware: Mapped[str | None] = mapped_column(String(32))
+
+
+class DeletionRow(Base):
+    """A deleted study or experiment; its events still refer to it.
+
+    Attributes:
+        id: its id, which nothing else has unless its archive is imported again; then this row is removed.
+        study_id: study of a deleted experiment; NULL for a study, or an experiment without one.
+        token_id: id of the token that deleted it; NULL without a token.
+    """
+
+    __tablename__ = "deletion"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    study_id: Mapped[str | None] = mapped_column(String(32))
+    name: Mapped[str] = mapped_column(String(200))
+    token_id: Mapped[str | None] = mapped_column(String(32))
+    deleted_at: Mapped[datetime]

@@ -1,15 +1,15 @@
-"""What is of one service: tokens, answered requests, events, notifications, saved views, and what was deleted."""
+"""What is of one service: tokens, answered requests, events, notifications, and saved views."""
 
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import BigInteger, Enum, Index, Integer, String, Text
+from sqlalchemy import BigInteger, Index, Integer, String, Text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind
 from gaplab.services.store.clock import now
-from gaplab.services.store.models.base import Base, Reason
+from gaplab.services.store.models.base import Base, Reason, words
 
 
 class TokenRow(Base):
@@ -26,16 +26,7 @@ class TokenRow(Base):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     name: Mapped[str] = mapped_column(String(200))
-    role: Mapped[Role] = mapped_column(
-        Enum(
-            Role,
-            native_enum=False,
-            create_constraint=True,
-            length=16,
-            name="role",
-            values_callable=lambda roles: [each.value for each in roles],
-        )
-    )
+    role: Mapped[Role] = mapped_column(words(Role, "role"))
     digest: Mapped[str] = mapped_column(String(64))
     created_at: Mapped[datetime]
     last_used_at: Mapped[datetime | None]
@@ -140,24 +131,6 @@ class NotifierRow(Base):
     after: Mapped[int | None] = mapped_column(BigInteger)
     owner: Mapped[str | None] = mapped_column(String(200))
     until: Mapped[datetime | None]
-
-
-class DeletionRow(Base):
-    """A deleted study or experiment; its events still refer to it.
-
-    Attributes:
-        id: its id, which nothing else has unless its archive is imported again; then this row is removed.
-        study_id: study of a deleted experiment; NULL for a study, or an experiment without one.
-        token_id: id of the token that deleted it; NULL without a token.
-    """
-
-    __tablename__ = "deletion"
-
-    id: Mapped[str] = mapped_column(String(32), primary_key=True)
-    study_id: Mapped[str | None] = mapped_column(String(32))
-    name: Mapped[str] = mapped_column(String(200))
-    token_id: Mapped[str | None] = mapped_column(String(32))
-    deleted_at: Mapped[datetime]
 
 
 class ViewRow(Base):

@@ -10,13 +10,11 @@ from sqlalchemy.exc import DataError, IntegrityError
 from sqlalchemy.orm import Session
 
 from gaplab.services.store.models import (
-    AttachmentRow,
     Base,
     DeletionRow,
     ExperimentProvenanceRow,
     ExperimentRow,
     RepetitionRow,
-    RobotRow,
     StudyRow,
 )
 from gaplab.services.store.queries import attachments, provenance, robots
@@ -87,12 +85,27 @@ def insert_rows(session: Session, name: str, rows: Iterable[Row]) -> int:
 def _queries(session: Session, name: str, columns: Sequence[str], owners: Sequence[str]) -> list[Select[Any]]:
     match name:
         case "provenance":
-            return [_provenances(columns, owners)]
+            use = ExperimentProvenanceRow
+            used = select(use.provenance_id).where(use.experiment_id.in_(owners))
+            return [_shared(name, columns, used)]
         case "robot":
-            return [_robots(columns, owners)]
+            hash_ = ExperimentRow.spec["robot"]["options"]["sha256"].as_string()
+            used = select(hash_).where(ExperimentRow.id.in_(owners), hash_.is_not(None))
+            return [_shared(name, columns, used)]
         case "attachment":
-            return _attachments(session, columns, owners)
+            row = RepetitionRow
+            repetitions = select(row.id).where(row.experiment_id.in_(owners)).scalar_subquery()
+            ids = sorted(attachments.named(session, repetitions))
+            parts = [ids[start : start + _AT_ONCE] for start in range(0, len(ids), _AT_ONCE)]
+            return [_shared(name, columns, part) for part in parts]
     return [_query(name, columns, owner) for owner in owners]
+
+
+def _shared(name: str, columns: Sequence[str], ids: Select[str] | Sequence[str]) -> Select[Any]:
+    """Return the query for rows of a table that experiments share, whose key is a hash."""
+    table = Base.metadata.tables[name]
+    (key,) = table.primary_key.columns
+    return select(*(table.c[each] for each in columns)).where(key.in_(ids)).order_by(key)
 
 
 def _with_ids(session: Session, rows: Sequence[Row]) -> list[Row]:
@@ -105,28 +118,6 @@ def _with_ids(session: Session, rows: Sequence[Row]) -> list[Row]:
         | {REPETITION_ID: ids[row[EXPERIMENT], row[REPETITION]]}
         for row in rows
     ]
-
-
-def _provenances(columns: Sequence[str], experiments: Sequence[str]) -> Select[Any]:
-    table, use = Base.metadata.tables["provenance"], ExperimentProvenanceRow
-    used = select(use.provenance_id).where(use.experiment_id.in_(experiments))
-    return select(*(table.c[each] for each in columns)).where(table.c.id.in_(used)).order_by(table.c.id)
-
-
-def _robots(columns: Sequence[str], experiments: Sequence[str]) -> Select[Any]:
-    table, hash_ = RobotRow.__table__, ExperimentRow.spec["robot"]["options"]["sha256"].as_string()
-    used = select(hash_).where(ExperimentRow.id.in_(experiments), hash_.is_not(None))
-    return select(*(table.c[each] for each in columns)).where(table.c.sha256.in_(used)).order_by(table.c.sha256)
-
-
-def _attachments(session: Session, columns: Sequence[str], experiments: Sequence[str]) -> list[Select[Any]]:
-    """Return the queries for files that answers name, by hash; experiments share them."""
-    row = RepetitionRow
-    repetitions = select(row.id).where(row.experiment_id.in_(experiments)).scalar_subquery()
-    ids, table = sorted(attachments.named(session, repetitions)), AttachmentRow.__table__
-    query = select(*(table.c[each] for each in columns)).order_by(table.c.id)
-    parts = [ids[start : start + _AT_ONCE] for start in range(0, len(ids), _AT_ONCE)]
-    return [query.where(table.c.id.in_(part)) for part in parts]
 
 
 def _query(name: str, columns: Sequence[str], owner: str) -> Select[Any]:

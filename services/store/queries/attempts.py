@@ -74,8 +74,8 @@ def work_spans(session: Session, experiments: Sequence[str]) -> dict[str, list[t
     left: dict[int, timedelta] = {}
     for experiment, id_, seconds, started_at, ended_at in session.execute(query.order_by(row.epoch.desc())):
         end = ended_at or present
-        took = min(left.get(id_, timedelta(seconds=seconds)), end - started_at)
-        left[id_] = left.get(id_, timedelta(seconds=seconds)) - took
+        took = min(left.setdefault(id_, timedelta(seconds=seconds)), end - started_at)
+        left[id_] -= took
         found.setdefault(experiment, []).append((end - took, end))
     return found
 

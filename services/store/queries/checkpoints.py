@@ -1,22 +1,22 @@
 """Checkpoints of current steps: stored in parts, read with a claim, deleted when the step is recorded."""
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from sqlalchemy import bindparam, delete, insert, select, update
 from sqlalchemy.orm import Session
 
 from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
-from gaplab.services.store.lease import Checkpoint, Claim
+from gaplab.services.store.lease import Checkpoint, Claim, Delivered
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
 
 
-def fresh(checkpoints: Sequence[Checkpoint], step: int, parts: int) -> list[Checkpoint]:
+def fresh(delivered: Iterable[Delivered], step: int, parts: int) -> list[Checkpoint]:
     """Return the delivered parts of the current step that are not stored yet.
 
     Args:
-        checkpoints: delivered parts, in order.
+        delivered: deliveries, in order.
         step: place of the current step in the log.
         parts: number of its stored parts.
 
@@ -24,7 +24,7 @@ def fresh(checkpoints: Sequence[Checkpoint], step: int, parts: int) -> list[Chec
         Conflict: parts or steps before a delivered part are missing.
     """
     found: list[Checkpoint] = []
-    for each in checkpoints:
+    for each in (item for item in delivered if isinstance(item, Checkpoint)):
         following = parts + len(found)
         if each.step > step or (each.step == step and each.part > following):
             msg = f"part {each.part} of step {each.step} cannot be stored: next is part {following} of step {step}"

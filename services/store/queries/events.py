@@ -15,7 +15,6 @@ from gaplab.schemas.events import EventKind
 from gaplab.services.core.arrays import known
 from gaplab.services.core.types import Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.store.clock import now
-from gaplab.services.store.lease import Claim, TimedStep
 from gaplab.services.store.models import EventCounterRow, EventRow
 from gaplab.services.store.texts import brief
 
@@ -51,13 +50,6 @@ def note(session: Session, kind: EventKind, experiment: str, repetition: int | N
     short = {name: brief(value) if isinstance(value, str) else value for name, value in body.items()}
     values = {"kind": kind.value, "experiment_id": experiment, "repetition": repetition, "body": short}
     session.info.setdefault(_NOTED, []).append(values)
-
-
-def note_steps(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) -> None:
-    """Add an event for each of these steps."""
-    for claim, steps in deliveries.items():
-        for each in steps:
-            note_step(session, each.step, claim.experiment_id, claim.number)
 
 
 def note_step(session: Session, step: Step, experiment: str, repetition: int) -> None:

@@ -11,8 +11,6 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.lifecycle import PENDING, State
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 
-_OPEN = PENDING
-
 _STOPPED = (State.COMPLETED, State.CANCELLED)
 
 
@@ -67,7 +65,7 @@ def _all_tallies() -> Select[*tuple[Any, ...]]:
             _count(row.state == State.COMPLETED),
             _count(row.state == State.FAILED),
             _count((row.state == State.RUNNING) & (row.steps > 0)),
-            _count(row.state.in_(_OPEN)),
+            _count(row.state.in_(PENDING)),
             _count(row.state.in_(_STOPPED) & (row.iterations_done < ExperimentRow.iterations)),
             func.sum(ExperimentRow.iterations),
             func.sum(row.iterations_done),
@@ -77,7 +75,7 @@ def _all_tallies() -> Select[*tuple[Any, ...]]:
             func.sum(row.rollouts_done),
             func.sum(row.rollouts_failed),
             func.sum(row.rollouts_saved),
-            func.sum(case(((left > 0) & row.state.in_(_OPEN), left), else_=0)),
+            func.sum(case(((left > 0) & row.state.in_(PENDING), left), else_=0)),
             func.sum(row.seconds),
         )
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)

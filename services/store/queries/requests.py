@@ -127,11 +127,6 @@ def get_answer(session: Session, id_: str) -> AnswerRow:
     return row
 
 
-def withdraw(session: Session, repetitions: Sequence[int]) -> None:
-    """Withdraw what these repetitions still wait for."""
-    request_states.withdraw(session, RequestRow.repetition_id.in_(repetitions))
-
-
 def is_expired(row: RequestRow, at: datetime) -> bool:
     """Return whether a take has ended without an answer.
 

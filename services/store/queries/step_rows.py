@@ -1,7 +1,7 @@
 """Rows of steps. A few statements write the rows of many repetitions."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any, cast
 
@@ -51,7 +51,7 @@ class StepRows:
         columns = self._columns[key]
         columns.update(iteration_columns(step))
         columns["seconds"] += timed.seconds
-        if _opens_iteration(step):
+        if isinstance(step, Selected) or position(step) == 0:
             self._opened.add(key)
         if isinstance(step, Probed):
             self._ended.add(key)
@@ -99,6 +99,17 @@ class StepRows:
 def position(step: Step) -> int:
     """Return the step's place in the log of its repetition, from 0. Iteration 0 has no Selected and no Measured."""
     return len(_ORDER) * step.iteration + _ORDER.index(type(step)) - _ORDER.index(Tuned)
+
+
+def tallied(steps: Sequence[Step]) -> dict[str, int]:
+    """Return what steps add to the tallies of their repetition, by column."""
+    costs = [getattr(step, "cost", Cost()) for step in steps]
+    return {
+        "iterations_done": sum(isinstance(step, Probed) for step in steps),
+        "rollouts_done": sum(int(cost.rollouts) for cost in costs),
+        "rollouts_failed": sum(int(cost.failures) for cost in costs),
+        "rollouts_saved": sum(int(cost.saved) for cost in costs),
+    }
 
 
 def vector(values: FloatArray) -> list[float]:
@@ -159,10 +170,6 @@ def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, 
 def _readings(values: FloatArray) -> list[float | None] | None:
     """Return a JSON array with None for each nan; None if there are no readings."""
     return [known(each) for each in values.tolist()] if len(values) else None
-
-
-def _opens_iteration(step: Step) -> bool:
-    return isinstance(step, Selected) or (isinstance(step, Tuned) and step.iteration == 0)
 
 
 def _phase(name: str, cost: Cost) -> dict[str, int]:

@@ -8,12 +8,12 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import Conflict
-from gaplab.services.core.types import Cost, Probed
+from gaplab.services.core.types import Probed
 from gaplab.services.store.clock import now
-from gaplab.services.store.lease import Checkpoint, Claim, Delivered, TimedStep
+from gaplab.services.store.lease import Claim, Delivered, TimedStep
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries import checkpoints, events
-from gaplab.services.store.queries.step_rows import StepRows, position
+from gaplab.services.store.queries.step_rows import StepRows, position, tallied
 
 _REPETITION = cast("Table", RepetitionRow.__table__)
 
@@ -30,11 +30,7 @@ _ADVANCE = (
         losses=0,
         measuring_at=None,
         heartbeat_at=now(),
-        iterations_done=_REPETITION.c.iterations_done + bindparam("more_iterations"),
-        rollouts_done=_REPETITION.c.rollouts_done + bindparam("more_rollouts"),
-        rollouts_failed=_REPETITION.c.rollouts_failed + bindparam("more_failures"),
-        rollouts_saved=_REPETITION.c.rollouts_saved + bindparam("more_saved"),
-        seconds=_REPETITION.c.seconds + bindparam("more_seconds"),
+        **{name: _REPETITION.c[name] + bindparam(f"more_{name}") for name in (*tallied(()), "seconds")},
     )
 )
 """Built once: building a statement costs more than executing it."""
@@ -58,12 +54,14 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     for claim, steps in fresh.items():
         for each in steps:
             batch.add(claim.id, each, _measured_by(claim))
+            events.note_step(session, each.step, claim.experiment_id, claim.number)
     batch.write(session)
     checkpoints.forget(session, [claim.id for claim, steps in fresh.items() if steps and lengths[claim][1]])
-    checkpoints.write(
-        session, {claim: _parts(deliveries[claim], *lengths[claim], len(fresh[claim])) for claim in fresh}
-    )
-    events.note_steps(session, fresh)
+    parts = {
+        claim: checkpoints.fresh(deliveries[claim], lengths[claim][0] + len(steps), 0 if steps else lengths[claim][1])
+        for claim, steps in fresh.items()
+    }
+    checkpoints.write(session, parts)
     return {claim: len(steps) for claim, steps in fresh.items()}
 
 
@@ -113,27 +111,17 @@ def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[Time
     return found
 
 
-def _parts(delivered: Iterable[Delivered], length: int, parts: int, new: int) -> list[Checkpoint]:
-    """Return the delivered checkpoints of the step that follows the new steps."""
-    found = [each for each in delivered if isinstance(each, Checkpoint)]
-    return checkpoints.fresh(found, length + new, 0 if new else parts)
-
-
 def _measured_by(claim: Claim) -> str:
     engine = claim.spec.reality.engine
     return engine.name if engine else "nobody"
 
 
 def _move(claim: Claim, length: int, steps: Sequence[TimedStep]) -> dict[str, Any]:
-    costs = [getattr(each.step, "cost", Cost()) for each in steps]
+    more = tallied([each.step for each in steps]) | {"seconds": sum(each.seconds for each in steps)}
     return {
         "of_id": claim.id,
         "of_epoch": claim.epoch,
         "from_steps": length,
         "to_steps": length + len(steps),
-        "more_iterations": sum(isinstance(each.step, Probed) for each in steps),
-        "more_rollouts": sum(int(each.rollouts) for each in costs),
-        "more_failures": sum(int(each.failures) for each in costs),
-        "more_saved": sum(int(each.saved) for each in costs),
-        "more_seconds": sum(each.seconds for each in steps),
+        **{f"more_{name}": count for name, count in more.items()},
     }
