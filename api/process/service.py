@@ -51,14 +51,13 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
 
 @contextmanager
 def _kept_supervisor(settings: Settings) -> Iterator[SupervisorProcess]:
-    store = Store(settings.database_url)
-    supervisor = SupervisorProcess(environment_of(settings), silence=Silence.of(settings), store=store)
-    supervisor.start()
-    try:
-        yield supervisor
-    finally:
-        supervisor.stop()
-        store.dispose()
+    with Store(settings.database_url) as store:
+        supervisor = SupervisorProcess(environment_of(settings), silence=Silence.of(settings), store=store)
+        supervisor.start()
+        try:
+            yield supervisor
+        finally:
+            supervisor.stop()
 
 
 def migrate(database_url: str, *, only_new: bool = False) -> None:
