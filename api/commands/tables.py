@@ -8,7 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from gaplab.api.clients.progress.text import colored, fitness, percent, standing, time_left
+from gaplab.api.clients.progress.text import colored, fitness, left, percent, standing
 from gaplab.api.clients.records import Record
 from gaplab.api.commands.completion import KINDS
 from gaplab.schemas.curves import Curve, CurvePoint
@@ -111,8 +111,7 @@ def minute(moment: datetime | None) -> str:
 
 def _record(record: Record) -> tuple[str, ...]:
     many = f" ({len(record.experiments)})" if isinstance(record, StudyRead) else ""
-    unknown = "not known yet" if record.state is State.RUNNING else "-"
-    progress = (fitness(record), percent(record.progress), time_left(record) or unknown)
+    progress = (fitness(record), percent(record.progress), left(record))
     tags = f" [dim]{escape(' '.join(record.tags))}[/]" if record.tags else ""
     return record.id, escape(record.name) + many + tags, standing(record), *progress, minute(record.created_at)
 
