@@ -43,8 +43,7 @@ class Archives:
         if isinstance(file, str | Path):
             with Path(file).open("rb") as source:
                 return self.import_(source)
-        headers, content = {"Content-Type": "application/zip"}, iter(partial(file.read, _CHUNK), b"")
-        return self._connection.change(ImportRead, "POST", "/import", content=content, headers=headers)
+        return self._connection.upload(ImportRead, "/import", iter(partial(file.read, _CHUNK), b""), "application/zip")
 
 
 @contextmanager
