@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from http import HTTPStatus
 from string import Template
@@ -167,14 +167,10 @@ def _of_validation(request: Request, error: Exception) -> Response:
         where, what = found[0]["loc"][-1], found[0]["ctx"]["error"]
         return response(problem(*FRAMEWORK[400], f"The body is not JSON: {what} at character {where}."))
     errors = [explain(each, error.body, request) for each in found[:MOST_ERRORS]]
-    in_body = all(each["loc"][0] == "body" for each in found)
-    kind = KINDS[InvalidSpec] if in_body else INVALID_REQUEST
-    return response(problem(*(FRAMEWORK[415] if _is_not_json(found) else kind), _sentence(errors, len(found)), errors))
-
-
-def _is_not_json(found: Sequence[Mapping[str, Any]]) -> bool:
-    """Return whether the content type of the body is not JSON, so that FastAPI did not parse it."""
-    return any(each["loc"] == ("body",) and isinstance(each["input"], bytes) for each in found)
+    kind = KINDS[InvalidSpec] if all(each["loc"][0] == "body" for each in found) else INVALID_REQUEST
+    if any(each["loc"] == ("body",) and isinstance(each["input"], bytes) for each in found):
+        kind = FRAMEWORK[415]  # FastAPI did not parse it
+    return response(problem(*kind, _sentence(errors, len(found)), errors))
 
 
 def _sentence(errors: Sequence[SpecError], count: int) -> str:

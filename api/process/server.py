@@ -197,12 +197,7 @@ def require_token(settings: Settings) -> None:
 
 
 class Server(uvicorn.Server):
-    """Uvicorn that ends event streams at shutdown, rather than waiting for them forever.
-
-    Args:
-        app: to serve.
-        connection: class of its connections.
-    """
+    """Uvicorn that ends event streams at shutdown, rather than waiting for them forever."""
 
     def __init__(self, app: FastAPI, connection: type[TimedConnection] = TimedConnection) -> None:
         config = uvicorn.Config(

@@ -56,12 +56,7 @@ class Snapshot:
 
 
 class Snapshots:
-    """Snapshots of a study or an experiment.
-
-    Args:
-        records: records of the service.
-        results: results of the service; left out: snapshots without curves and repetitions.
-    """
+    """Snapshots of a study or an experiment; without `results`, they have no curves and repetitions."""
 
     def __init__(self, records: Records, results: Results | None = None) -> None:
         self._records = records
@@ -70,13 +65,7 @@ class Snapshots:
         self._settled: set[str] = set()
 
     def of(self, id: str, *, every_s: float, patience_s: float) -> Iterator[Snapshot]:
-        """Yield snapshots until the study or the experiment has ended.
-
-        Args:
-            id: id of the study or the experiment.
-            every_s: interval between requests.
-            patience_s: longest time without a service before the error is raised.
-        """
+        """Yield snapshots until the study or the experiment has ended; see `Watcher.watch`."""
         snapshot = self._snapshot(self._records.find(id))
         yield snapshot
         answered_at = time.monotonic()

@@ -21,13 +21,7 @@ MOST_REPETITIONS = 60
 
 
 def show(snapshots: Iterable[Snapshot], console: Console, *, keep: bool = False) -> Record:
-    """Show each snapshot in place of the one before; return the last record.
-
-    Args:
-        snapshots: at least one.
-        console: a terminal.
-        keep: leave the last snapshot on the screen.
-    """
+    """Show each snapshot in place of the one before, and perhaps keep the last on the screen; return its record."""
     with Live(console=console, auto_refresh=False, transient=not keep) as live:
         for snapshot in snapshots:
             live.update(view(snapshot), refresh=True)
