@@ -130,7 +130,8 @@ def of_gaplab(request: Request, error: Exception) -> Response:
 
 def _shown(request: Request, refused: Problem, headers: dict[str, str]) -> Response:
     """Return the problem; as a page if a person looks for something that does not exist."""
-    if refused.status == HTTPStatus.NOT_FOUND and asks_for_a_page(request):
+    in_a_browser = request.method == "GET" and "text/html" in request.headers.get("accept", "")
+    if refused.status == HTTPStatus.NOT_FOUND and in_a_browser:
         return lost(request, refused)
     return response(refused, headers)
 
@@ -226,11 +227,6 @@ _PAGE = Template("""<!doctype html>
 </body>
 </html>
 """)
-
-
-def asks_for_a_page(request: Request) -> bool:
-    """Return whether a browser wants to show the answer as a page."""
-    return request.method == "GET" and "text/html" in request.headers.get("accept", "")
 
 
 def lost(request: Request, problem: Problem) -> HTMLResponse:

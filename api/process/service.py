@@ -61,11 +61,7 @@ def _kept_supervisor(settings: Settings) -> Iterator[SupervisorProcess]:
 
 
 def migrate(database_url: str, *, only_new: bool = False) -> None:
-    """Migrate the database to the schema of this version.
-
-    Args:
-        database_url: its URL.
-        only_new: whether a database that has a schema already stays as it is.
+    """Migrate the database to the schema of this version; with `only_new`, one that has a schema stays as it is.
 
     Raises:
         StoreUnavailable: the database does not answer or cannot be changed.
