@@ -85,8 +85,7 @@ class Results:
             intervals: with intervals; left out: for up to 20 experiments.
             fitness: whose fitness counts, as in `curves`.
         """
-        records = [each for id in _several(experiments) for each in experiments_of(self._records.find(id))]
-        query: dict[str, Parameter] = {"experiment": [each.id for each in records], "from": first, "to": last}
+        query: dict[str, Parameter] = {"experiment": self._experiments(experiments), "from": first, "to": last}
         query |= {"margin": margin, "margin_of_direct": margin_of_direct, "intervals": intervals, "fitness": fitness}
         pairs = self._connection.get(tuple[Comparison, ...], "/comparisons", **query)
         query |= {"from": pairs[0].from_evaluations, "to": pairs[0].to_evaluations}  # also if an experiment goes on
