@@ -35,8 +35,8 @@ class Reports:
         Args:
             id: id of the study or the experiment.
             file: file to write; missing folders are created.
-            margin: as for `verdict`.
-            margin_of_direct: as for `verdict`.
+            margin: difference in the unit of fitness within which strategies are equivalent; left out: not tested.
+            margin_of_direct: the same margin as a share of the direct baseline's mean fitness, like 0.03.
         """
         path = Path(file)
         if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
