@@ -27,12 +27,7 @@ Table = tuple[tuple[Real | None, ...], ...]
 
 
 class MeasuredValues(Frozen):
-    """What was measured of one controller.
-
-    Attributes:
-        values: fitness of each repeat, in the robot's unit.
-        readings: of each repeat, what the sensors said.
-    """
+    """What was measured of one controller."""
 
     values: Values = Field(description="fitness of each repeat, in the robot's unit")
     readings: tuple[Table, ...] | None = Field(

@@ -4,8 +4,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, MutableMapping
-from contextlib import contextmanager
+from collections.abc import Callable, MutableMapping
 from secrets import token_hex
 
 from gaplab.services import logs
@@ -35,7 +34,8 @@ def serve(settings: Settings) -> int:
     logs.configure()
     folders.load()
     try:
-        with _opened(settings) as store, in_use(store.file):
+        database = Store(settings.database_url, answer_s=_answer_s(settings.lease_s), pinned=True)
+        with database as store, in_use(store.file):
             _work(store, settings, pulse)
     except (ClusterUnusable, StoreUnavailable) as error:
         pulse.explain(str(error))
@@ -45,20 +45,6 @@ def serve(settings: Settings) -> int:
             os._exit(1)  # what Ray does at exit waits for a Ray that does not answer
         return 1
     return 0
-
-
-@contextmanager
-def _opened(settings: Settings) -> Iterator[Store]:
-    """Open the database for as long as the context lasts.
-
-    Raises:
-        StoreUnavailable: the URL is not valid, or of another kind of database.
-    """
-    store = Store(settings.database_url, answer_s=_answer_s(settings.lease_s), pinned=True)
-    try:
-        yield store
-    finally:
-        store.dispose()
 
 
 def _work(store: Store, settings: Settings, pulse: PulsePipe) -> None:

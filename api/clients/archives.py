@@ -10,9 +10,6 @@ from gaplab.api.clients.connection import Connection
 from gaplab.api.clients.records import Records, path_of
 from gaplab.schemas.archives import ImportRead
 
-STORED_S = 600.0
-"""Longest wait until the service has stored an archive."""
-
 _CHUNK = 2**16
 
 
@@ -46,10 +43,7 @@ class Archives:
         if isinstance(file, str | Path):
             with Path(file).open("rb") as source:
                 return self.import_(source)
-        headers, content = {"Content-Type": "application/zip"}, iter(partial(file.read, _CHUNK), b"")
-        return self._connection.change(
-            ImportRead, "POST", "/import", content=content, headers=headers, timeout=STORED_S
-        )
+        return self._connection.upload(ImportRead, "/import", iter(partial(file.read, _CHUNK), b""), "application/zip")
 
 
 @contextmanager

@@ -212,22 +212,15 @@ class Bench:
         query = "".join(
             f"&{name}={segment(json.dumps(json_of(value)))}" for name, value in given.items() if value is not None
         )
-        found = self._connection.change(
-            SamplesRead,
-            "POST",
-            f"/samples/check?robot={segment(robot)}{query}",
-            content=[Path(file).read_bytes()],
-            headers={"Content-Type": "text/csv"},
-        )
-        return found.checked(Path(file))
+        path, content = f"/samples/check?robot={segment(robot)}{query}", [Path(file).read_bytes()]
+        return self._connection.upload(SamplesRead, path, content, "text/csv").checked(Path(file))
 
     def branches(self, experiment: str) -> tuple[BranchRead, ...]:
         """Return the steps that corrections closed."""
         return self._connection.get(tuple[BranchRead, ...], f"/experiments/{segment(experiment)}/branches")
 
     def _attach(self, name: str, content: bytes, media_type: str) -> AttachmentRead:
-        path, headers = f"/attachments?name={segment(name)}", {"Content-Type": media_type}
-        return self._connection.change(AttachmentRead, "POST", path, content=[content], headers=headers)
+        return self._connection.upload(AttachmentRead, f"/attachments?name={segment(name)}", [content], media_type)
 
     def _after(self, answer: str, what: str, body: dict[str, Any], *, dry_run: bool) -> Consequences:
         path = f"/measurements/{segment(answer)}/{what}{'?dry_run=true' if dry_run else ''}"

@@ -109,13 +109,7 @@ class Client:
 
     def add_robot(self, file: str | Path) -> RobotRead:
         """Store a robot file, which `gaplab robot import` writes; specs name the robot by its name from then on."""
-        return self._connection.change(
-            RobotRead,
-            "POST",
-            "/robots",
-            content=[Path(file).read_bytes()],
-            headers={"Content-Type": "application/json"},
-        )
+        return self._connection.upload(RobotRead, "/robots", [Path(file).read_bytes()], "application/json")
 
     def robot_file(self, robot: str) -> bytes:
         """Return the robot file with this hash, or the newest one with this name."""

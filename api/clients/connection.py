@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 from urllib.parse import quote
 from uuid import uuid4
@@ -28,6 +29,9 @@ PAUSES_S = (0.2, 1.0, 3.0)
 
 PASSING = {502, 503, 504}
 """Statuses of passing failures: the database does not answer, or the service behind a proxy does not."""
+
+STORED_S = 600.0
+"""Longest wait until the service has stored a file, like a large archive."""
 
 BUSY = 429
 """Status of a GET whose turn has not come: others compute replays or draw figures. The answer says how long to wait."""
@@ -54,17 +58,7 @@ _certificates = cache(httpx2.create_ssl_context)
 
 
 class Connection:
-    """A connection to a service.
-
-    Args:
-        url: address of the service; left out: GAPLAB_URL, or this machine.
-        token: token to send; left out: GAPLAB_TOKEN, or none; "" for none.
-        timeout_s: longest wait for an answer.
-        transport: replaces the network, for tests.
-        pauses_s: pauses before each repetition of a request that is safe to repeat.
-
-    Every method that sends a request raises ServiceError with the service's problem, or ServiceUnreachable.
-    """
+    """A connection to a service; the arguments and the errors are those of `gaplab.Client`."""
 
     def __init__(
         self,
@@ -112,6 +106,13 @@ class Connection:
         timeout_s = self._timeout_s + (wait_s if isinstance(wait_s, int | float) else 0.0)
         return self._repeat("GET", path, params=given, timeout=timeout_s)
 
+    def save(self, file: Path, path: str, /, **parameters: Parameter) -> Path:
+        """Write the answer to a GET into a file, and return it; missing folders are created."""
+        content = self.get_bytes(path, **parameters)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
+        return file
+
     def items(self, page: type[Page[T]], path: str, /, **parameters: Parameter) -> Iterator[T]:
         """Yield every item of a list, page after page."""
         cursor = None
@@ -136,6 +137,11 @@ class Connection:
     def change(self, kind: type[T], method: str, path: str, **request: Unpack[Request]) -> T:
         """Return the answer to a request that must not be repeated."""
         return self.read(kind, self._send(method, path, **request))
+
+    def upload(self, kind: type[T], path: str, content: Iterable[bytes], media_type: str) -> T:
+        """Return the answer to a POST of a file, whose content comes in parts; it may take `STORED_S`."""
+        headers = {"Content-Type": media_type}
+        return self.change(kind, "POST", path, content=content, headers=headers, timeout=STORED_S)
 
     @contextmanager
     def stream(self, method: str, path: str, **request: Unpack[Request]) -> Iterator[httpx2.Response]:

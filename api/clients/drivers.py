@@ -82,13 +82,14 @@ def measure(task: TakenRequest, driver: Driver, limit_s: float | None, tell: Cal
         DriverBroken: the driver hangs or answers nonsense; the request is released.
     """
     limit_s, sensors = limit_s or 60.0 + 10.0 * task.motion.observe_s[-1], task.sensors
-    found = [(value, readings) for value, readings in task.known if _fit(readings, sensors)]
+    found = [(value, readings) for value, readings in task.known if not _mistake_of(readings, sensors)]
     if found:
         tell(f"{len(found)} of {task.repeats} repeats are in the journal already")
     try:
         while len(found) < task.repeats:
             value, readings = _checked(_limited(driver, task.motion, limit_s))
-            _check_readings(readings, sensors)
+            if mistake := _mistake_of(readings, sensors):
+                raise DriverBroken(f"the driver's run returned {mistake}")
             task.note(value, readings)
             found.append((value, readings))
             tell(f"repeat {len(found)} of {task.repeats}: {value:.6g} {task.request.unit}")
@@ -154,32 +155,21 @@ def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a dri
         raise DriverBroken(f"the driver's run returned readings that cannot be sent: {error}") from error
 
 
-def _check_readings(readings: Any, sensors: SensorsRead | None) -> None:  # noqa: ANN401 - whatever a driver returns
-    """Refuse after the first repeat what the service would refuse after the last.
-
-    Raises:
-        DriverBroken: readings are missing though the experiment tunes on them, or have another shape than the sensors.
-    """
+def _mistake_of(readings: Any, sensors: SensorsRead | None) -> str | None:  # noqa: ANN401 - whatever a driver returns
+    """Return why the service would refuse readings, after the last repeat; None if it would not."""
     if sensors is None or (readings is None and not sensors.needed):
-        return
+        return None
     times_s, names = sensors.times_s, sensors.names
     if not names:
-        raise DriverBroken("the driver's run returned readings, but the robot has no sensors: return the fitness alone")
+        return "readings, but the robot has no sensors: return the fitness alone"
     rows = f"{len(times_s)} rows of {len(names)} numbers"
     shape = f"{rows}: {', '.join(names)}, at {len(times_s)} times from {times_s[0]:g} to {times_s[-1]:g} s"
     if readings is None:
         msg = f"return (fitness, readings), {shape}; or answer with `gaplab traces REQUEST FILE --answer`"
-        raise DriverBroken(f"the driver's run returned no readings, but the experiment tunes on them: {msg}")
+        return f"no readings, but the experiment tunes on them: {msg}"
     if not _has_shape(readings, len(times_s), len(names)):
-        raise DriverBroken(f"the driver's run returned readings of another shape than the sensors'; return {shape}")
-
-
-def _fit(readings: Any, sensors: SensorsRead | None) -> bool:  # noqa: ANN401 - whatever a journal has
-    try:
-        _check_readings(readings, sensors)
-    except DriverBroken:
-        return False
-    return True
+        return f"readings of another shape than the sensors'; return {shape}"
+    return None
 
 
 def _has_shape(readings: Any, rows: int, columns: int) -> bool:  # noqa: ANN401 - whatever a driver returns

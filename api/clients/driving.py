@@ -46,7 +46,7 @@ class TakenRequest:
         Raises:
             ServiceError: the controller observes while it acts, or the robot has no actuators: run the genome.
         """
-        return self._driving.motion(self.request)
+        return motion_of(self._driving.connection, self.id)
 
     @cached_property
     def sensors(self) -> SensorsRead | None:
@@ -55,7 +55,7 @@ class TakenRequest:
         Raises:
             ServiceError: the experiment was deleted.
         """
-        return self._driving.sensors(self.request)
+        return self._driving.records.experiment(self.request.experiment).sensors
 
     @property
     def id(self) -> str:
@@ -110,20 +110,12 @@ class TakenRequest:
 
 
 class Driving:
-    """The requests of a driver.
-
-    Args:
-        connection: to the service.
-        records: of experiments.
-        journal: what was measured and perhaps not sent.
-        lease_s: seconds without a heartbeat after which others may take a request.
-        operator: name of the driver; None: this machine's name.
-    """
+    """The requests of a driver; see `Bench.requests`."""
 
     def __init__(
         self, connection: Connection, records: Records, journal: Journal, lease_s: float, operator: str | None
     ) -> None:
-        self._connection, self._records = connection, records
+        self.connection, self.records = connection, records
         self._lease_s, self._operator = lease_s, operator or socket.gethostname()
         self.deliveries = Deliveries(connection, journal, self._operator)
 
@@ -154,7 +146,7 @@ class Driving:
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": WAIT_S}
         request = None
         try:
-            for request in self._connection.items(Page[RequestRead], "/requests", **parameters):
+            for request in self.connection.items(Page[RequestRead], "/requests", **parameters):
                 is_free = request.state is RequestState.OPEN and not request.busy
                 if is_free and (taken := self._take(request)):
                     return taken
@@ -172,29 +164,21 @@ class Driving:
         """Take a request; None if somebody else was faster, or it is wanted no more."""
         body = {"operator": self._operator, "lease_s": self._lease_s}
         try:
-            return self._connection.post(RequestRead, f"/requests/{segment(request.id)}/take", body)
+            return self.connection.post(RequestRead, f"/requests/{segment(request.id)}/take", body)
         except ServiceError as error:
             if error.problem.status not in _NOT_THIS_ONE:
                 raise
             log.info("not taken: %s", error)
             return None
 
-    def motion(self, request: RequestRead) -> DriverMotion:
-        """Return the motion that a request asks for."""
-        return motion_of(self._connection, request.id)
-
-    def sensors(self, request: RequestRead) -> SensorsRead | None:
-        """Return the sensors of the robot of a request; None if the service does not know them."""
-        return self._records.experiment(request.experiment).sensors
-
     def _release(self, request: RequestRead) -> None:
         with suppress(ServiceError, ServiceUnreachable):
             path = f"/requests/{segment(request.id)}/release"
-            self._connection.change(RequestRead, "POST", path, json={"take": request.takes})
+            self.connection.change(RequestRead, "POST", path, json={"take": request.takes})
 
     def _ended(self, experiment: str) -> bool:
         try:
-            return self._records.experiment(experiment).state.ended
+            return self.records.experiment(experiment).state.ended
         except (ServiceError, ServiceUnreachable):
             return False
 
@@ -213,6 +197,6 @@ class Driving:
         path = f"/requests/{segment(task.id)}/heartbeat"
         while not task.over.wait(self._lease_s / 3):
             try:
-                self._connection.change(RequestRead, "POST", path, json={"take": task.request.takes})
+                self.connection.change(RequestRead, "POST", path, json={"take": task.request.takes})
             except (ServiceError, ServiceUnreachable) as error:
                 log.warning("no heartbeat: %s", error)

@@ -1,5 +1,8 @@
 """Errors between a client and the service."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
 from typing import Self
 
 import httpx2
@@ -65,6 +68,16 @@ def is_final(error: Exception) -> bool:
     if isinstance(error, ServiceError):
         return error.problem.status < 500
     return isinstance(error, UnknownService)
+
+
+@contextmanager
+def if_found() -> Iterator[None]:
+    """End the block at a request for what the service does not have; any other error is raised."""
+    try:
+        yield
+    except ServiceError as error:
+        if error.problem.status != HTTPStatus.NOT_FOUND:
+            raise
 
 
 def refuses_sender(error: ServiceError) -> bool:

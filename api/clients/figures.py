@@ -21,13 +21,7 @@ class _Paths(BaseModel):
 
 
 class Figure:
-    """A figure that the service draws once per format, so that a saved file equals what was shown.
-
-    Args:
-        kind: kind of figure.
-        ids: ids of the experiments and studies in it.
-        draw: returns the figure in a format.
-    """
+    """A figure that the service draws once per format, so that a saved file equals what was shown."""
 
     def __init__(self, kind: str, ids: tuple[str, ...], draw: Callable[[str], bytes]) -> None:
         self.kind = kind

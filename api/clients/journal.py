@@ -108,24 +108,14 @@ log = logging.getLogger("gaplab.driver")
 
 
 class Deliveries:
-    """The answers of a driver.
-
-    Args:
-        connection: to the service.
-        journal: what was measured and perhaps not sent.
-        operator: name of the driver.
-    """
+    """The answers of a driver, which is their operator."""
 
     def __init__(self, connection: Connection, journal: Journal, operator: str) -> None:
         self.journal = journal
         self._connection, self._operator = connection, operator
 
     def send(self, request: str, answer: dict[str, Any]) -> AnswerRead:
-        """Journal an answer, and send it until the service has it.
-
-        Args:
-            request: id of the request.
-            answer: JSON.
+        """Journal an answer to a request, and send it until the service has it.
 
         Raises:
             ServiceError: the service refuses it.

@@ -2,10 +2,8 @@
 
 from collections.abc import Iterable
 
-import httpx2
-
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.errors import ServiceError
+from gaplab.api.clients.errors import if_found
 from gaplab.api.clients.records import Records, path_of
 from gaplab.schemas.editing import DeletionRead
 from gaplab.schemas.notifications import WebhookRead
@@ -38,11 +36,8 @@ class Keeping:
 
     def delete(self, id: str) -> DeletionRead:
         """Delete a study or an experiment that has ended, with its results, for good; twice is the same as once."""
-        try:
+        with if_found():
             return self._connection.change(DeletionRead, "DELETE", f"/studies/{segment(id)}")
-        except ServiceError as error:
-            if error.problem.status != httpx2.codes.NOT_FOUND:
-                raise
         return self._connection.change(DeletionRead, "DELETE", f"/experiments/{segment(id)}")
 
     def notify(self, id: str, url: str | None) -> WebhookRead:

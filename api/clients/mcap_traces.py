@@ -27,17 +27,7 @@ _STAMPS, _NANOSECONDS = ("timestamp", "stamp"), ("nsec", "nanosec")
 
 
 def mcap_to_csv(file: Path, topic: str | None = None, body: str | None = None) -> str:
-    """Return the trace of an MCAP file as CSV.
-
-    Args:
-        file: the recording.
-        topic: topic of the base's pose; None if the recording has a single topic of poses.
-        body: `child_frame_id` of the base; None if the topic has a single one.
-
-    Raises:
-        ExtraMissing: the libraries for MCAP are not installed.
-        ValueError: the recording has no such topic or body, or several.
-    """
+    """Return the trace of an MCAP file as CSV; see `Bench.attach_trace`."""
     try:
         from mcap.exceptions import McapError
         from mcap.reader import make_reader

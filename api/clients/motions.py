@@ -29,11 +29,7 @@ class DriverMotion:
 
 
 def motion_of(connection: Connection, request: str) -> DriverMotion:
-    """Return the motion that a request asks for.
-
-    Raises:
-        ServiceError: the controller observes while it acts, or the robot has no actuators: run the genome.
-    """
+    """Return the motion that a request asks for; see `TakenRequest.motion`."""
     found = json.loads(connection.get_bytes(f"/requests/{segment(request)}/motion", format="json"))
     return DriverMotion(
         actuators=tuple(found["actuators"]),

@@ -3,10 +3,8 @@
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
-import httpx2
-
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.errors import ServiceError
+from gaplab.api.clients.errors import if_found
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import AttemptRead, ExperimentRead, Page, RepetitionRead, StudyRead
@@ -49,11 +47,8 @@ class Records:
 
     def find(self, id: str) -> ExperimentRead | StudyRead:
         """Return the study or the experiment with this id."""
-        try:
+        with if_found():
             return self.study(id)
-        except ServiceError as error:
-            if error.problem.status != httpx2.codes.NOT_FOUND:
-                raise
         return self.experiment(id)
 
     def spec(self, id: str) -> SpecRead:

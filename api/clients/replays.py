@@ -35,10 +35,7 @@ class Replays:
         path = Path(file)
         if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
             raise ValueError(f"{path} has no suffix of a video; permitted: {', '.join(FORMATS)}")
-        content = self._connection.get_bytes(f"/experiments/{segment(id)}/video", format=format_, **choice)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-        return path
+        return self._connection.save(path, f"/experiments/{segment(id)}/video", format=format_, **choice)
 
     def robot_picture(self, name: str, file: str | Path, *, theme: str = "light", width: int = 640) -> Path:
         """Write a picture of a robot of the catalogue, as it stands at the start, into a PNG file.
@@ -52,7 +49,4 @@ class Replays:
         path = Path(file)
         if path.suffix.lower() != ".png":
             raise ValueError(f"{path} has no suffix of a picture; permitted: .png")
-        content = self._connection.get_bytes(f"/catalogue/robots/{segment(name)}/picture", theme=theme, width=width)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-        return path
+        return self._connection.save(path, f"/catalogue/robots/{segment(name)}/picture", theme=theme, width=width)

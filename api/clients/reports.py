@@ -42,10 +42,7 @@ class Reports:
         if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
             raise ValueError(f"{path} has no suffix of a report; permitted: {', '.join(FORMATS)}")
         query = {"margin": margin, "margin_of_direct": margin_of_direct}
-        content = self._connection.get_bytes(f"{path_of(self._records.find(id))}/report", format=format_, **query)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-        return path
+        return self._connection.save(path, f"{path_of(self._records.find(id))}/report", format=format_, **query)
 
     def take_home(self, id: str, file: str | Path) -> Path:
         """Write what an experiment found into a file with the suffix .zip, or a page to print into one with .html.
@@ -60,7 +57,4 @@ class Reports:
         path = Path(file)
         if (format_ := path.suffix.removeprefix(".").lower()) not in ("zip", "html"):
             raise ValueError(f"{path} has another suffix; permitted: zip, html")
-        content = self._connection.get_bytes(f"/experiments/{segment(id)}/takehome", format=format_)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-        return path
+        return self._connection.save(path, f"/experiments/{segment(id)}/takehome", format=format_)

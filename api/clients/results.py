@@ -13,7 +13,7 @@ from gaplab.schemas.records import Page
 from gaplab.schemas.results import SimulatorRead
 
 PAGE = 5_000
-"""Simulators of one request."""
+"""Samples or simulators of one request: the most that the service permits."""
 
 MOST_CURVES = 100
 """Experiments of one request: the most that the service permits."""
@@ -27,11 +27,7 @@ class Results:
         self._records = records
 
     def best_simulator(self, id: str) -> SimulatorRead | None:
-        """Return the tuned simulator of the latest iteration with the smallest error; None if there is none yet.
-
-        Args:
-            id: id of the experiment.
-        """
+        """Return the tuned simulator of the latest iteration with the smallest error; None if there is none yet."""
         simulators = self._connection.items(Page[SimulatorRead], f"/experiments/{segment(id)}/simulators", limit=PAGE)
         best = [each for each in simulators if each.rank == 0 and each.error is not None]
         latest = max((each.iteration for each in best), default=0)
@@ -89,8 +85,7 @@ class Results:
             intervals: with intervals; left out: for up to 20 experiments.
             fitness: whose fitness counts, as in `curves`.
         """
-        records = [each for id in _several(experiments) for each in experiments_of(self._records.find(id))]
-        query: dict[str, Parameter] = {"experiment": [each.id for each in records], "from": first, "to": last}
+        query: dict[str, Parameter] = {"experiment": self._experiments(experiments), "from": first, "to": last}
         query |= {"margin": margin, "margin_of_direct": margin_of_direct, "intervals": intervals, "fitness": fitness}
         pairs = self._connection.get(tuple[Comparison, ...], "/comparisons", **query)
         query |= {"from": pairs[0].from_evaluations, "to": pairs[0].to_evaluations}  # also if an experiment goes on

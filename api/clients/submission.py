@@ -19,8 +19,6 @@ Spec = ExperimentSpec | StudySpec | Mapping[str, Any]
 NOT_CHECKED = {"name", "strategy", "strategies", "direct_repetitions", "priority", "max_parallel"}
 """Fields of a spec that a sensitivity check does not have."""
 
-_KINDS = {True: "experiments", False: "studies"}
-
 
 class Submission:
     """Requests that send a spec; the service validates it."""
@@ -52,7 +50,8 @@ class Submission:
     def estimate(self, spec: Spec) -> EstimateRead:
         """Return the rollouts, the duration and the resolved specs of an experiment or a study; nothing is stored."""
         body = _body(spec)
-        return self._connection.post(EstimateRead, f"/{_KINDS[is_experiment(body)]}/estimate", body)
+        kind = "experiments" if is_experiment(body) else "studies"
+        return self._connection.post(EstimateRead, f"/{kind}/estimate", body)
 
     def check(self, spec: Spec | SensitivitySpec, *, every_s: float = 0.5) -> SensitivityRead:
         """Return the effect of the tunables of a spec on fitness; the service computes it if it is not known yet.

@@ -6,16 +6,13 @@ from typing import TYPE_CHECKING
 
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.frames import frame, pandas_library
-from gaplab.api.clients.results import Results
+from gaplab.api.clients.results import PAGE, Results
 from gaplab.schemas.curves import CurvePoint
 from gaplab.schemas.records import ExperimentRead, Page, SampleRead, SensorsRead, SimulatorRead
 from gaplab.schemas.replays import Prediction, Predictions
 
 if TYPE_CHECKING:
     import pandas
-
-PAGE = 5_000
-"""Items of a page: the most that the service permits."""
 
 WHOLE = ("repetition", "iteration", "rank", "evaluations", "n", "repeats")
 """Columns of whole numbers, in whatever table."""

@@ -76,14 +76,10 @@ class Watcher:
     def show(
         self, id: str, console: Console, *, curves: bool = False, every_s: float = 1.0, patience_s: float = 60.0
     ) -> Record:
-        """Show the progress of a study or an experiment until it has ended, and return it.
+        """Show the progress of a study or an experiment until it has ended, and return it; see `watch`.
 
-        Args:
-            id: id of the study or the experiment.
-            console: a terminal gets a live table, anything else a line every ten seconds.
-            curves: in a terminal, show curves and repetitions too, and leave the last table on the screen.
-            every_s: interval between requests.
-            patience_s: longest time without a service before the error is raised.
+        A terminal gets a live table, anything else a line every ten seconds. With `curves`, the table has curves and
+        repetitions too, and its last state stays on the screen.
         """
         source = Snapshots(self._records, self._results if curves and console.is_terminal else None)
         return _print(source.of(id, every_s=every_s, patience_s=patience_s), console, keep=curves)

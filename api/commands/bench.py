@@ -1,6 +1,5 @@
 """Commands for a robot on a bench: what to measure, answers by hand, and corrections."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal, cast
 
@@ -8,7 +7,7 @@ import typer
 
 from gaplab.api.clients.bench import Details
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.errors import ServiceError
+from gaplab.api.clients.errors import if_found
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import BENCH, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
@@ -47,9 +46,10 @@ def requests(
 ) -> None:
     """List the measurements that experiments wait for, or read one request with its answers."""
     with connect(url) as client:
-        if id is not None and (found := _one(client.bench.request, id)) is not None:
-            _print_request(found, as_json=as_json)
-            return
+        if id is not None:
+            with if_found():
+                _print_request(client.bench.request(id), as_json=as_json)
+                return
         read = client.bench.history if all_ else client.bench.pending
         items = read(id, bench=bench)
         if not items and not as_json:
@@ -197,15 +197,6 @@ def _words_of(found: TracesRead) -> str:
         for value, trace in zip(found.values, found.traces, strict=True)
     ]
     return "\n".join([*lines, *(f"doubtful: {each}" for each in found.doubts)])
-
-
-def _one(read: Callable[[str], RequestRead], id: str) -> RequestRead | None:
-    try:
-        return read(id)
-    except ServiceError as error:
-        if error.problem.status != 404:
-            raise
-        return None
 
 
 def _print_request(found: RequestRead, *, as_json: bool) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from rich.markup import escape
 from rich.table import Table
 
-from gaplab.api.commands.tables import table
+from gaplab.api.commands.tables import number, table
 from gaplab.schemas.comparison_columns import UNPAIRED, shown_tests
 from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
 
@@ -19,12 +19,8 @@ NAMES = {
 }
 
 
-def comparisons(pairs: Sequence[Comparison]) -> list[Table | str]:
-    """Return the experiments, the differences of their pairs, the tests, and the verdicts that were asked for."""
-    return [*_tables(pairs)]
-
-
-def _tables(pairs: Sequence[Comparison]) -> Iterator[Table | str]:
+def comparisons(pairs: Sequence[Comparison]) -> Iterator[Table | str]:
+    """Yield the experiments, the differences of their pairs, the tests, and the verdicts that were asked for."""
     first, last = pairs[0].from_evaluations, pairs[0].to_evaluations
     several = first != last
     where = f"mean of each repetition over {first} to {last}" if several else f"after {first}"
@@ -50,7 +46,7 @@ def _summaries(pairs: Sequence[Comparison]) -> tuple[list[str], list[Summary]]:
 
 
 def _experiment(name: str, one: Summary) -> tuple[str, ...]:
-    return escape(name), f"{one.n}", _estimate(one.mean), _estimate(one.interquartile_mean), _number(one.sd)
+    return escape(name), f"{one.n}", _estimate(one.mean), _estimate(one.interquartile_mean), number(one.sd)
 
 
 def _sizes(pair: Comparison) -> tuple[str, ...]:
@@ -72,11 +68,11 @@ def _names(pair: Comparison) -> str:
 
 
 def _p(test: Test) -> str:
-    return "-" if test.p is None else f"{_number(test.p)} ({_number(test.p_holm)})"
+    return "-" if test.p is None else f"{number(test.p)} ({number(test.p_holm)})"
 
 
 def _estimate(found: Estimate) -> str:
-    return _number(found.value) + _interval(found.lower, found.upper)
+    return number(found.value) + _interval(found.lower, found.upper)
 
 
 def _interval(lower: float | None, upper: float | None) -> str:
@@ -85,7 +81,3 @@ def _interval(lower: float | None, upper: float | None) -> str:
 
 def _signed(value: float | None) -> str:
     return "-" if value is None else f"{value:+.3g}"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"

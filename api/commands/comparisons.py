@@ -90,12 +90,8 @@ def margins(text: str | None) -> tuple[float | None, float | None]:
     return (None, number / 100) if text.endswith("%") else (number, None)
 
 
-def _print_table(pairs: Comparisons) -> None:
-    console().print(*comparison_tables.comparisons(pairs))
-
-
 _PRINTERS: dict[Format, Callable[[Comparisons], None]] = {
-    Format.TABLE: _print_table,
+    Format.TABLE: lambda pairs: console().print(*comparison_tables.comparisons(pairs)),
     Format.CSV: lambda pairs: typer.echo(pairs.csv(), nl=False),
     Format.JSON: print_json,
     Format.LATEX: lambda pairs: typer.echo(pairs.latex(), nl=False),

@@ -34,12 +34,7 @@ SIZED = "quadruped"
 
 
 def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
-    """Run both studies, and print where the results are.
-
-    Args:
-        folder: receives the database, the figures and the service's log; created if absent.
-        console: shows progress and results.
-        specs_from: folder with the specs of the studies.
+    """Run both studies; the folder, created if absent, receives the database, the figures and the service's log.
 
     Raises:
         CommandError: the service does not start, a study fails, or Ctrl-C interrupts.

@@ -16,11 +16,6 @@ def print_result(value: object, text: str, *, as_json: bool) -> None:
 
 
 def print_json(value: object, *, line: bool = False) -> None:
-    """Print a value in the JSON of the API.
-
-    Args:
-        value: schemas, mappings, lists and plain values.
-        line: on one line, for several documents in one output.
-    """
+    """Print a value in the JSON of the API, perhaps on one line, for several documents in one output."""
     plain = TypeAdapter(Any).dump_python(value, mode="json")
     typer.echo(json.dumps(plain, ensure_ascii=False, allow_nan=False, indent=None if line else 2))

@@ -19,7 +19,7 @@ from gaplab.schemas.mistakes import sentence
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
 
 if TYPE_CHECKING:
-    from gaplab.services.robots.importing import ImportedFile, MassRow
+    from gaplab.services.robots.importing import ImportedFile
     from gaplab.services.robots.options import ImportOptions
 
 MOTORS = "servo, position, velocity or torque"
@@ -137,13 +137,12 @@ def _setting(text: str) -> tuple[str, str]:
 
 
 def _facts(imported: "ImportedFile", written: Path) -> dict[str, Any]:
-    rows = [vars(row) for row in imported.masses]
     return {
         "file": str(written),
         "name": imported.robot.name,
         "sha256": imported.robot.sha256,
         "lost": imported.robot.lost,
-        "masses": rows,
+        "masses": [vars(row) for row in imported.masses],
         "mass_before_kg": imported.before_kg,
         "mass_after_kg": imported.after_kg,
     }
@@ -161,13 +160,9 @@ def _lines(imported: "ImportedFile", written: Path) -> Iterator[str | Table]:
 def _mass_table(imported: "ImportedFile") -> Table:
     table = Table("body", "of the file's", "kg in the file", "kg imported", box=None)
     for row in imported.masses:
-        table.add_row(escape(row.body), str(len(row.members)), *_both(row))
+        table.add_row(escape(row.body), str(len(row.members)), f"{row.before_kg:.6g}", f"{row.after_kg:.6g}")
     table.add_row("all", "", f"{imported.before_kg:.6g}", f"{imported.after_kg:.6g}", style="bold")
     return table
-
-
-def _both(row: "MassRow") -> tuple[str, str]:
-    return f"{row.before_kg:.6g}", f"{row.after_kg:.6g}"
 
 
 @robot.command()

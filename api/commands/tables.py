@@ -8,7 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from gaplab.api.clients.progress.text import colored, fitness, percent, standing, time_left
+from gaplab.api.clients.progress.text import colored, fitness, left, percent, standing
 from gaplab.api.clients.records import Record
 from gaplab.api.commands.completion import KINDS
 from gaplab.schemas.curves import Curve, CurvePoint
@@ -104,6 +104,11 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     return made
 
 
+def number(value: float | None) -> str:
+    """Return a number with three digits; - for None."""
+    return "-" if value is None else f"{value:.3g}"
+
+
 def minute(moment: datetime | None) -> str:
     """Return a moment in local time, to the minute; nothing for None."""
     return moment.astimezone().strftime("%Y-%m-%d %H:%M") if moment else ""
@@ -111,8 +116,7 @@ def minute(moment: datetime | None) -> str:
 
 def _record(record: Record) -> tuple[str, ...]:
     many = f" ({len(record.experiments)})" if isinstance(record, StudyRead) else ""
-    unknown = "not known yet" if record.state is State.RUNNING else "-"
-    progress = (fitness(record), percent(record.progress), time_left(record) or unknown)
+    progress = (fitness(record), percent(record.progress), left(record))
     tags = f" [dim]{escape(' '.join(record.tags))}[/]" if record.tags else ""
     return record.id, escape(record.name) + many + tags, standing(record), *progress, minute(record.created_at)
 
@@ -149,19 +153,15 @@ def _parts(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _effect(found: Sensitivity) -> tuple[str, ...]:
-    numbers = map(_number, (found.effect, found.relative_effect, found.roughness))
+    numbers = map(number, (found.effect, found.relative_effect, found.roughness))
     return found.name, f"{found.values[0]:g} to {found.values[-1]:g}", *numbers, f"{found.failures}", found.verdict
 
 
 def _tuned(found: TunableDistribution) -> tuple[str, ...]:
     sides = ((found.lower, found.at_lower), (found.upper, found.at_upper))
     bounds = ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
-    mean_sd = f"{_number(found.mean)}±{_number(found.sd)}"
-    return found.name, mean_sd, _number(found.least), _number(found.greatest), bounds
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
+    mean_sd = f"{number(found.mean)}±{number(found.sd)}"
+    return found.name, mean_sd, number(found.least), number(found.greatest), bounds
 
 
 def _mean(point: CurvePoint | None) -> str:

@@ -76,12 +76,9 @@ def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="id of the token
 def _store() -> Iterator["Store"]:
     from gaplab.services.store.session import Store
 
-    store = Store(Settings.from_environment().database_url)
-    try:
+    with Store(Settings.from_environment().database_url) as store:
         store.check()
         yield store
-    finally:
-        store.dispose()
 
 
 def _row(token: TokenRead) -> tuple[str, ...]:

@@ -40,9 +40,7 @@ ASKING = {"/studies/estimate", "/experiments/estimate", "/samples/check"}
 class Access:
     """Middleware that sets `request.state.caller`, or answers with a problem.
 
-    Args:
-        app: the application to protect.
-        settings: settings of the service; None accepts any host name, for a program that calls the app directly.
+    Without settings, it accepts any host name, for a program that calls the app directly.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings | None) -> None:

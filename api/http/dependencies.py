@@ -3,7 +3,7 @@
 import logging
 import re
 from dataclasses import replace
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Depends, Header, Request, Response
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -18,6 +18,7 @@ from gaplab.services.experiments.idempotency import Once
 from gaplab.services.experiments.limits import Admission
 from gaplab.services.plugins import watching
 from gaplab.services.replay.process import RolloutProcess
+from gaplab.services.settings import Limits
 from gaplab.services.store.session import Store
 
 R = TypeVar("R", bound=Frozen)
@@ -56,14 +57,13 @@ def _caller(request: Request) -> Caller:
     return caller
 
 
-def _rollout_process(request: Request) -> RolloutProcess:
-    process: RolloutProcess = request.app.state.rollout_process
-    return process
+def of_app(name: str) -> Any:  # noqa: ANN401 - a dependency has no type of its own
+    """Return the dependency on what the app keeps under this name."""
 
+    def kept(request: Request) -> object:
+        return getattr(request.app.state, name)
 
-def _drawing_process(request: Request) -> RolloutProcess:
-    process: RolloutProcess = request.app.state.drawing_process
-    return process
+    return Depends(kept)
 
 
 def _limited(request: Request) -> Admission:
@@ -76,8 +76,9 @@ def _admission(admitted: Annotated[Admission, Depends(_limited)], key: Idempoten
 
 StoreDep = Annotated[Store, Depends(_store)]
 CallerDep = Annotated[Caller, Depends(_caller)]
-RolloutProcessDep = Annotated[RolloutProcess, Depends(_rollout_process)]
-DrawingProcessDep = Annotated[RolloutProcess, Depends(_drawing_process)]
+LimitsDep = Annotated[Limits, of_app("limits")]
+RolloutProcessDep = Annotated[RolloutProcess, of_app("rollout_process")]
+DrawingProcessDep = Annotated[RolloutProcess, of_app("drawing_process")]
 LimitedDep = Annotated[Admission, Depends(_limited)]
 AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]

@@ -26,8 +26,7 @@ def install(app: FastAPI) -> None:
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is None:
             _complete(generate())
-        assert app.openapi_schema is not None
-        return app.openapi_schema
+        return generate()
 
     app.openapi = openapi  # type: ignore[method-assign]
 

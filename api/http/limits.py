@@ -81,12 +81,7 @@ def most_requests(limits: Limits, files: int | None = None) -> int:
 
 
 class RequestLimit:
-    """Middleware that answers 503 beyond the most requests at once, but always says that the process lives.
-
-    Args:
-        app: the application to protect.
-        most: requests at once.
-    """
+    """Middleware that answers 503 beyond the most requests at once, but always says that the process lives."""
 
     def __init__(self, app: ASGIApp, most: int) -> None:
         self.app = app

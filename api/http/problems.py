@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from http import HTTPStatus
 from string import Template
@@ -130,7 +130,8 @@ def of_gaplab(request: Request, error: Exception) -> Response:
 
 def _shown(request: Request, refused: Problem, headers: dict[str, str]) -> Response:
     """Return the problem; as a page if a person looks for something that does not exist."""
-    if refused.status == HTTPStatus.NOT_FOUND and asks_for_a_page(request):
+    in_a_browser = request.method == "GET" and "text/html" in request.headers.get("accept", "")
+    if refused.status == HTTPStatus.NOT_FOUND and in_a_browser:
         return lost(request, refused)
     return response(refused, headers)
 
@@ -167,14 +168,10 @@ def _of_validation(request: Request, error: Exception) -> Response:
         where, what = found[0]["loc"][-1], found[0]["ctx"]["error"]
         return response(problem(*FRAMEWORK[400], f"The body is not JSON: {what} at character {where}."))
     errors = [explain(each, error.body, request) for each in found[:MOST_ERRORS]]
-    in_body = all(each["loc"][0] == "body" for each in found)
-    kind = KINDS[InvalidSpec] if in_body else INVALID_REQUEST
-    return response(problem(*(FRAMEWORK[415] if _is_not_json(found) else kind), _sentence(errors, len(found)), errors))
-
-
-def _is_not_json(found: Sequence[Mapping[str, Any]]) -> bool:
-    """Return whether the content type of the body is not JSON, so that FastAPI did not parse it."""
-    return any(each["loc"] == ("body",) and isinstance(each["input"], bytes) for each in found)
+    kind = KINDS[InvalidSpec] if all(each["loc"][0] == "body" for each in found) else INVALID_REQUEST
+    if any(each["loc"] == ("body",) and isinstance(each["input"], bytes) for each in found):
+        kind = FRAMEWORK[415]  # FastAPI did not parse it
+    return response(problem(*kind, _sentence(errors, len(found)), errors))
 
 
 def _sentence(errors: Sequence[SpecError], count: int) -> str:
@@ -230,11 +227,6 @@ _PAGE = Template("""<!doctype html>
 </body>
 </html>
 """)
-
-
-def asks_for_a_page(request: Request) -> bool:
-    """Return whether a browser wants to show the answer as a page."""
-    return request.method == "GET" and "text/html" in request.headers.get("accept", "")
 
 
 def lost(request: Request, problem: Problem) -> HTMLResponse:

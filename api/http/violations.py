@@ -11,7 +11,7 @@ from fastapi import Request
 from pydantic import BaseModel
 
 from gaplab.schemas.mistakes import SpecError, permitted_by, pointer_to, sentence
-from gaplab.services.core.errors import Violation
+from gaplab.services.core.errors import Violation, unknown_name
 
 MOST_ERRORS = 50
 """Most errors in one answer: a hostile body could cause thousands."""
@@ -96,12 +96,14 @@ def _nearest(value: object, permitted: tuple[str, ...] | str | None) -> str | No
 def _unknown_field(place: str, path: Sequence[str | int], value: object, request: Request) -> SpecError:
     name = _text(path[-1])
     fields = _fields(request, path[:-1]) if place == "body" else tuple(_parameters(request))
-    nearest = _nearest(name, fields)
-    hint = f" (did you mean {nearest!r}?)" if nearest else ""
     kind = "field" if place == "body" else "parameter"
-    message = f"unknown {kind} {name!r}{hint}; permitted: {', '.join(fields)}"
+    found = unknown_name(_pointer(place, path), kind, name, fields)
     return SpecError(
-        pointer=_pointer(place, path), value=finite(value), message=message, permitted=fields, nearest=nearest
+        pointer=found.pointer,
+        value=finite(value),
+        message=found.message,
+        permitted=fields,
+        nearest=found.nearest,
     )
 
 

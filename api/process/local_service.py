@@ -91,13 +91,11 @@ def _wait_until_ready(url: str, process: "subprocess.Popen[bytes]", log: Path) -
 
 def _token(database_url: str) -> str | None:
     """Return None, for GAPLAB_TOKEN, if the database has tokens; else "", because it would refuse any token."""
-    store = Store(database_url)
-    try:
-        authenticate(store, None, required=False)
-    except Unauthenticated:
-        return None
-    finally:
-        store.dispose()
+    with Store(database_url) as store:
+        try:
+            authenticate(store, None, required=False)
+        except Unauthenticated:
+            return None
     return ""
 
 

@@ -178,15 +178,11 @@ def serve_api(
     exit_on_signals()
     folders.load()
     require_token(settings)
-    store = Store(settings.database_url)
-    try:
-        with in_use(store.file):
-            app = create_app(store, settings, limits, notify)
-            app.state.supervisor, app.state.lease_s = supervisor, settings.lease_s
-            with courier(store, notify, settings.url):
-                Server(app).run([listener])
-    finally:
-        store.dispose()
+    with Store(settings.database_url) as store, in_use(store.file):
+        app = create_app(store, settings, limits, notify)
+        app.state.supervisor, app.state.lease_s = supervisor, settings.lease_s
+        with courier(store, notify, settings.url):
+            Server(app).run([listener])
 
 
 def require_token(settings: Settings) -> None:
@@ -196,20 +192,12 @@ def require_token(settings: Settings) -> None:
         Unauthenticated: none does; the message has the command that creates one.
         StoreUnavailable: the database does not answer.
     """
-    store = Store(settings.database_url)
-    try:
+    with Store(settings.database_url) as store:
         demand_token_beyond_loopback(store, settings.host)
-    finally:
-        store.dispose()
 
 
 class Server(uvicorn.Server):
-    """Uvicorn that ends event streams at shutdown, rather than waiting for them forever.
-
-    Args:
-        app: to serve.
-        connection: class of its connections.
-    """
+    """Uvicorn that ends event streams at shutdown, rather than waiting for them forever."""
 
     def __init__(self, app: FastAPI, connection: type[TimedConnection] = TimedConnection) -> None:
         config = uvicorn.Config(

@@ -51,22 +51,17 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
 
 @contextmanager
 def _kept_supervisor(settings: Settings) -> Iterator[SupervisorProcess]:
-    store = Store(settings.database_url)
-    supervisor = SupervisorProcess(environment_of(settings), silence=Silence.of(settings), store=store)
-    supervisor.start()
-    try:
-        yield supervisor
-    finally:
-        supervisor.stop()
-        store.dispose()
+    with Store(settings.database_url) as store:
+        supervisor = SupervisorProcess(environment_of(settings), silence=Silence.of(settings), store=store)
+        supervisor.start()
+        try:
+            yield supervisor
+        finally:
+            supervisor.stop()
 
 
 def migrate(database_url: str, *, only_new: bool = False) -> None:
-    """Migrate the database to the schema of this version.
-
-    Args:
-        database_url: its URL.
-        only_new: whether a database that has a schema already stays as it is.
+    """Migrate the database to the schema of this version; with `only_new`, one that has a schema stays as it is.
 
     Raises:
         StoreUnavailable: the database does not answer or cannot be changed.

@@ -7,12 +7,11 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
-from gaplab.api.http.dependencies import Id, StoreDep
+from gaplab.api.http.dependencies import Id, LimitsDep, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.archives import ImportRead
 from gaplab.services import archives
 from gaplab.services.archives import Archive
-from gaplab.services.settings import Limits
 
 router = APIRouter(tags=["archives"])
 
@@ -56,13 +55,12 @@ def export_study(id: Id, store: StoreDep) -> Response:
     responses=documented(409, 413, 422),
     openapi_extra={"requestBody": {"required": True, "content": {MEDIA_TYPE: _BINARY}}},
 )
-async def import_archive(store: StoreDep, request: Request, response: Response) -> ImportRead:
+async def import_archive(store: StoreDep, limits: LimitsDep, request: Request, response: Response) -> ImportRead:
     """Store all of an exported archive, or nothing; experiments that had not ended become CANCELLED."""
     with TemporaryFile() as file:
         async for chunk in request.stream():
             file.write(chunk)
         file.seek(0)
-        limits: Limits = request.app.state.limits
         stored = await run_in_threadpool(archives.import_archive, store, file, most_rows=limits.imported_rows)
     route, id = ("read_study", stored.study) if stored.study else ("read_experiment", stored.experiments[0])
     response.headers["Location"] = str(request.app.url_path_for(route, id=id))

@@ -7,11 +7,10 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from gaplab.api.http.attachments import saved_as
-from gaplab.api.http.dependencies import Id, Parameters, StoreDep
+from gaplab.api.http.dependencies import Id, LimitsDep, Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.measurements import AttachmentRead
 from gaplab.services.bench import attachments
-from gaplab.services.settings import Limits
 
 router = APIRouter(prefix="/attachments", tags=["bench"])
 
@@ -34,11 +33,10 @@ class AttachmentQuery(Parameters):
     openapi_extra={"requestBody": {"required": True, "content": _BINARY}},
 )
 async def store_attachment(
-    query: Annotated[AttachmentQuery, Query()], request: Request, store: StoreDep
+    query: Annotated[AttachmentQuery, Query()], request: Request, store: StoreDep, limits: LimitsDep
 ) -> AttachmentRead:
     """Store a file, sent as the body, under the hash of its content; answers name it by that."""
     content, media_type = await request.body(), request.headers.get("content-type", "application/octet-stream")
-    limits: Limits = request.app.state.limits
     most = limits.unnamed_attachment_bytes
     return await run_sync(attachments.store_attachment, store, content, query.name, media_type[:100], most)
 

@@ -87,7 +87,8 @@ class MotionQuery(Parameters):
 @router.get("", summary="List the requests for measurements", responses=documented(404, 422))
 async def list_requests(query: Annotated[RequestQuery, Query()], store: StoreDep) -> Page[RequestRead]:
     """List what experiments wait for, the oldest first."""
-    wanted, until = _filter_of(query), monotonic() + query.wait_s
+    wanted = RequestFilter(query.experiment, query.bench, query.pending, query.conflicts)
+    until = monotonic() + query.wait_s
     while True:
         page = await run_sync(taking.list_requests, store, wanted, query.limit, query.cursor)
         if page.items or monotonic() >= until or await run_sync(taking.none_will_follow, store, wanted):
@@ -196,7 +197,3 @@ def evaluate_traces(
     clock is aligned by cross-correlation with the motion that the best simulator expects.
     """
     return traces.evaluate_traces(store, process, id, spec)
-
-
-def _filter_of(query: RequestQuery) -> RequestFilter:
-    return RequestFilter(query.experiment, query.bench, query.pending, query.conflicts)

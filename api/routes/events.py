@@ -6,11 +6,11 @@ from contextlib import suppress
 from typing import Annotated
 
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, Depends, Header, Query, Request
+from fastapi import APIRouter, Depends, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import Field
 
-from gaplab.api.http.dependencies import CallerDep, Id, Parameters, StoreDep
+from gaplab.api.http.dependencies import CallerDep, Id, Parameters, StoreDep, of_app
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import Streams
 from gaplab.api.http.problems import Responses, documented
@@ -48,18 +48,8 @@ class EventPaging(EventFilter):
     wait_s: float = Field(default=0.0, ge=0.0, le=60.0, description="seconds to wait for an event if there is none")
 
 
-def _feed(request: Request) -> EventFeed:
-    feed: EventFeed = request.app.state.feed
-    return feed
-
-
-def _streams(request: Request) -> Streams:
-    streams: Streams = request.app.state.streams
-    return streams
-
-
-FeedDep = Annotated[EventFeed, Depends(_feed)]
-StreamsDep = Annotated[Streams, Depends(_streams)]
+FeedDep = Annotated[EventFeed, of_app("feed")]
+StreamsDep = Annotated[Streams, of_app("streams")]
 
 
 async def _count_stream(streams: StreamsDep, caller: CallerDep) -> AsyncIterator[None]:

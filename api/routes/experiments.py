@@ -6,6 +6,7 @@ from fastapi import APIRouter, Body, Path, Query, Request, Response
 from pydantic import Field
 
 from gaplab.api.http import conditional, links
+from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import (
     AdmissionDep,
     CallerDep,
@@ -196,8 +197,7 @@ def read_misfit(id: Id, store: StoreDep, query: Annotated[MisfitQuery, Query()])
     found = misfit(store, id)
     if query.format == "json":
         return found
-    name = {"Content-Disposition": f'attachment; filename="gaplab-misfit-{id}.csv"'}
-    return Response(misfit_csv(found), media_type="text/csv", headers=name)
+    return attachment(misfit_csv(found), "text/csv", f"gaplab-misfit-{id}.csv")
 
 
 @router.get(

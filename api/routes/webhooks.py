@@ -2,23 +2,19 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Depends, Request
+from fastapi import APIRouter, Body
 
-from gaplab.api.http.dependencies import Id, StoreDep
+from gaplab.api.http.dependencies import Id, StoreDep, of_app
 from gaplab.api.http.problems import documented
 from gaplab.schemas.notifications import WebhookRead, WebhookSpec
 from gaplab.services.notifications import webhooks
+from gaplab.services.settings import Notify
 
 _experiment = APIRouter(prefix="/experiments/{id}/webhook", tags=["experiments"])
 _study = APIRouter(prefix="/studies/{id}/webhook", tags=["studies"])
 
 
-def _hosts(request: Request) -> frozenset[str]:
-    hosts: frozenset[str] = request.app.state.notify.permitted_hosts
-    return hosts
-
-
-HostsDep = Annotated[frozenset[str], Depends(_hosts)]
+NotifyDep = Annotated[Notify, of_app("notify")]
 Spec = Annotated[WebhookSpec, Body(openapi_examples=WebhookSpec.EXAMPLES)]
 
 
@@ -29,15 +25,15 @@ def read_experiment_webhook(id: Id, store: StoreDep) -> WebhookRead:
 
 
 @_experiment.put("", summary="Set an experiment's webhook", responses=documented(404, 409, 413, 415, 422))
-def set_experiment_webhook(id: Id, spec: Spec, store: StoreDep, hosts: HostsDep) -> WebhookRead:
+def set_experiment_webhook(id: Id, spec: Spec, store: StoreDep, notify: NotifyDep) -> WebhookRead:
     """Send a POST to this address when the experiment has ended; `GAPLAB_NOTIFY_HOSTS` lists the permitted hosts."""
-    return webhooks.set_webhook(store, "experiment", id, spec, hosts)
+    return webhooks.set_webhook(store, "experiment", id, spec, notify.permitted_hosts)
 
 
 @_experiment.delete("", summary="Remove an experiment's webhook", responses=documented(404))
-def drop_experiment_webhook(id: Id, store: StoreDep, hosts: HostsDep) -> WebhookRead:
+def drop_experiment_webhook(id: Id, store: StoreDep, notify: NotifyDep) -> WebhookRead:
     """Tell no webhook of its own when the experiment has ended."""
-    return webhooks.set_webhook(store, "experiment", id, None, hosts)
+    return webhooks.set_webhook(store, "experiment", id, None, notify.permitted_hosts)
 
 
 @_study.get("", summary="Read a study's webhook", responses=documented(404))
@@ -47,15 +43,15 @@ def read_study_webhook(id: Id, store: StoreDep) -> WebhookRead:
 
 
 @_study.put("", summary="Set a study's webhook", responses=documented(404, 409, 413, 415, 422))
-def set_study_webhook(id: Id, spec: Spec, store: StoreDep, hosts: HostsDep) -> WebhookRead:
+def set_study_webhook(id: Id, spec: Spec, store: StoreDep, notify: NotifyDep) -> WebhookRead:
     """Send a POST to this address when all experiments of the study have ended, as `GAPLAB_NOTIFY_HOSTS` permits."""
-    return webhooks.set_webhook(store, "study", id, spec, hosts)
+    return webhooks.set_webhook(store, "study", id, spec, notify.permitted_hosts)
 
 
 @_study.delete("", summary="Remove a study's webhook", responses=documented(404))
-def drop_study_webhook(id: Id, store: StoreDep, hosts: HostsDep) -> WebhookRead:
+def drop_study_webhook(id: Id, store: StoreDep, notify: NotifyDep) -> WebhookRead:
     """Tell no webhook of its own when the study has ended."""
-    return webhooks.set_webhook(store, "study", id, None, hosts)
+    return webhooks.set_webhook(store, "study", id, None, notify.permitted_hosts)
 
 
 router = APIRouter()

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from functools import cache, wraps
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Concatenate, ParamSpec, Self, TypeVar
 
 from sqlalchemy import StaticPool, create_engine, event, text
 from sqlalchemy.exc import DBAPIError
@@ -60,6 +60,12 @@ class Store:
         self._hasty = self._engine.execution_options(**{WRITES: True, HASTENS: True})
         self._reader = sessionmaker(self._engine.execution_options(**snapshot), expire_on_commit=False)
         robot_library.add_source(self)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.dispose()
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
@@ -162,11 +168,8 @@ def private_store(file: Path) -> Iterator[Store]:
     """
     create(file)
     file.write_bytes(_without_rows())
-    store = Store(f"sqlite:///{file}")
-    try:
+    with Store(f"sqlite:///{file}") as store:
         yield store
-    finally:
-        store.dispose()
 
 
 @cache

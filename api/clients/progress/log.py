@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from rich.console import Console
 from rich.markup import escape
 
-from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
-from gaplab.api.clients.progress.text import counts, percent, state_text
+from gaplab.api.clients.progress.snapshots import Snapshot
+from gaplab.api.clients.progress.text import counts, percent, state_text, time_left
 from gaplab.api.clients.records import Record
 from gaplab.schemas.lifecycle import State
 
@@ -27,14 +27,14 @@ def show(snapshots: Iterable[Snapshot], console: Console) -> Record:
         ended |= {row.record.id for row in snapshot.rows if row.record.state.ended}
         if snapshot.record.state.ended or time.monotonic() - printed_at >= LINE_EVERY_S:
             printed_at = time.monotonic()
-            lines.append(snapshot.warning or _line(snapshot.rows[0]))
+            lines.append(snapshot.warning or _line(snapshot.record))
         for line in lines:
             console.print(f"{time.strftime('%H:%M:%S')} {escape(line)}")
     return snapshot.record
 
 
-def _line(row: RecordProgress) -> str:
-    progress, state = row.record.progress, row.record.state
-    left = f"{row.time_left} left" if row.time_left else "time left not known yet"
-    rest = left if state is State.RUNNING else state_text(row.record)
-    return f"{row.record.name}: {percent(progress)}, {counts(progress)}; {rest}"
+def _line(record: Record) -> str:
+    left = time_left(record)
+    running = f"{left} left" if left else "time left not known yet"
+    rest = running if record.state is State.RUNNING else state_text(record)
+    return f"{record.name}: {percent(record.progress)}, {counts(record.progress)}; {rest}"

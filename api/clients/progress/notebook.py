@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
-from gaplab.api.clients.progress.text import state_text
+from gaplab.api.clients.progress.text import fraction, state_text, time_left
 from gaplab.api.clients.records import Record
 from gaplab.schemas.records import StudyRead
 
@@ -37,10 +37,11 @@ def table(snapshot: Snapshot) -> str:
 
 
 def _row(row: RecordProgress) -> str:
-    name, record = escape(row.name), row.record
+    name, record, left = escape(row.name), row.record, time_left(row.record)
+    done = fraction(record.progress)
     return (
         f"<tr><td>{f'<b>{name}</b>' if isinstance(record, StudyRead) else name}</td>"
-        f'<td><progress max="1" value="{row.done:.3f}" aria-label="{name}">{row.done:.0%}</progress></td>'
+        f'<td><progress max="1" value="{done:.3f}" aria-label="{name}">{done:.0%}</progress></td>'
         f"<td>{escape(state_text(record))}</td><td>{record.progress.rollouts_done:,} rollouts</td>"
-        f"<td>{f'{row.time_left} left' if row.time_left else ''}</td></tr>"
+        f"<td>{f'{left} left' if left else ''}</td></tr>"
     )

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
-from gaplab.api.clients.progress.text import fraction, time_left
 from gaplab.api.clients.records import Record, Records, experiments_of
 from gaplab.api.clients.results import Results
 from gaplab.schemas.curves import Curve
@@ -27,20 +26,10 @@ class RecordProgress:
     repetitions: tuple[RepetitionRead, ...] = ()
 
     @property
-    def time_left(self) -> str | None:
-        """The interval of the time left, like "2 to 4 min"; None while unknown."""
-        return time_left(self.record)
-
-    @property
     def name(self) -> str:
         """The name; that of a strategy, which an experiment has by default, with spaces, where a line can break."""
         name = self.record.name
         return name.replace("_", " ") if name == getattr(self.record, "strategy", None) else name
-
-    @property
-    def done(self) -> float:
-        """The finished fraction."""
-        return fraction(self.record.progress)
 
 
 @dataclass(frozen=True)
@@ -67,12 +56,7 @@ class Snapshot:
 
 
 class Snapshots:
-    """Snapshots of a study or an experiment.
-
-    Args:
-        records: records of the service.
-        results: results of the service; left out: snapshots without curves and repetitions.
-    """
+    """Snapshots of a study or an experiment; without `results`, they have no curves and repetitions."""
 
     def __init__(self, records: Records, results: Results | None = None) -> None:
         self._records = records
@@ -81,17 +65,7 @@ class Snapshots:
         self._settled: set[str] = set()
 
     def of(self, id: str, *, every_s: float, patience_s: float) -> Iterator[Snapshot]:
-        """Yield snapshots until the study or the experiment has ended.
-
-        Args:
-            id: id of the study or the experiment.
-            every_s: interval between requests.
-            patience_s: longest time without a service before the error is raised.
-
-        Raises:
-            ServiceError: the service refuses.
-            ServiceUnreachable: the service was away for too long.
-        """
+        """Yield snapshots until the study or the experiment has ended; see `Watcher.watch`."""
         snapshot = self._snapshot(self._records.find(id))
         yield snapshot
         answered_at = time.monotonic()

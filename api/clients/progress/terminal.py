@@ -10,10 +10,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
-from gaplab.api.clients.progress.text import COLORS, counts, percent, standing
+from gaplab.api.clients.progress.text import COLORS, counts, fraction, left, percent, standing
 from gaplab.api.clients.records import Record
 from gaplab.schemas.curves import Curve
-from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
 
 BLOCKS = "▁▂▃▄▅▆▇█"
@@ -22,13 +21,7 @@ MOST_REPETITIONS = 60
 
 
 def show(snapshots: Iterable[Snapshot], console: Console, *, keep: bool = False) -> Record:
-    """Show each snapshot in place of the one before; return the last record.
-
-    Args:
-        snapshots: at least one.
-        console: a terminal.
-        keep: leave the last snapshot on the screen.
-    """
+    """Show each snapshot in place of the one before, and perhaps keep the last on the screen; return its record."""
     with Live(console=console, auto_refresh=False, transient=not keep) as live:
         for snapshot in snapshots:
             live.update(view(snapshot), refresh=True)
@@ -45,12 +38,12 @@ def view(snapshot: Snapshot) -> RenderableType:
         table.add_column(head, overflow="fold")
     for row in snapshot.rows:
         name, record = escape(row.name), row.record
-        bar = ProgressBar(1.0, row.done, width=20), f"{record.progress.rollouts_done:,}"
+        bar = ProgressBar(1.0, fraction(record.progress), width=20), f"{record.progress.rollouts_done:,}"
         table.add_row(
             f"[bold]{name}[/]" if isinstance(record, StudyRead) else name,
             standing(record),
             percent(record.progress),
-            _time_left(row),
+            left(record),
             *((_curve(row.curve, scale), _repetitions(row)) if curves else bar),
         )
     lines: list[RenderableType] = [table, counts(snapshot.record.progress)]
@@ -61,10 +54,6 @@ def spark(values: Sequence[float], least: float, greatest: float) -> str:
     """Return numbers as blocks of eight heights, from the least to the greatest."""
     height = (greatest - least) or 1.0
     return "".join(BLOCKS[min(7, int(8 * (value - least) / height))] for value in values)
-
-
-def _time_left(row: RecordProgress) -> str:
-    return row.time_left or ("not known yet" if row.record.state is State.RUNNING else "-")
 
 
 def _means(curve: Curve) -> list[float]:

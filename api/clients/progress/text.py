@@ -47,15 +47,20 @@ def state_text(record: Record) -> str:
 
 def time_left(record: Record) -> str | None:
     """Return the interval of the time left, like "2 to 4 min"; None while it is unknown, and unless it runs."""
-    left = record.progress.time_left
-    return span(left) if left and record.state is State.RUNNING else None
+    found = record.progress.time_left
+    return span(found) if found and record.state is State.RUNNING else None
 
 
-def span(left: TimeLeft) -> str:
+def span(time: TimeLeft) -> str:
     """Return an interval in minutes, or in hours if it is long."""
-    unit, name = (3600, "h") if left.high_s > 3 * 3600 else (60, "min")
-    low, high = math.floor(left.low_s / unit), math.ceil(left.high_s / unit)
+    unit, name = (3600, "h") if time.high_s > 3 * 3600 else (60, "min")
+    low, high = math.floor(time.low_s / unit), math.ceil(time.high_s / unit)
     return f"{low} to {high} {name}" if low else f"less than {high} {name}"
+
+
+def left(record: Record) -> str:
+    """Return the time left, as a cell of a table."""
+    return time_left(record) or ("not known yet" if record.state is State.RUNNING else "-")
 
 
 def fitness(record: Record) -> str:
