@@ -44,15 +44,20 @@ def observed_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> F
     """
     if observes_base(world):
         return poses
-    carriers = {joint.child: place for place, joint in enumerate(world.joints)}
-    chain, name = [], world.observed
-    while name in carriers:
-        chain.append(carriers[name])
-        name = world.joints[chain[-1]].parent
     position, turn = poses[:, :3], poses[:, 3:]
-    for place in reversed(chain):
+    for place in reversed(chain(world, world.observed)):
         position, turn = _carried(world.joints[place], position, turn, angles_rad[:, place])
     return np.hstack([position, turn])
+
+
+def chain(world: World, body: str) -> list[int]:
+    """Return the numbers of the joints that carry a body, from its own to the one at the base."""
+    carriers = {joint.child: number for number, joint in enumerate(world.joints)}
+    found: list[int] = []
+    while body in carriers:
+        found.append(carriers[body])
+        body = world.joints[found[-1]].parent
+    return found
 
 
 def observes_base(world: World) -> bool:

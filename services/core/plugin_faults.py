@@ -122,7 +122,8 @@ def fault_of(plugin: type[Any], kind: str, folders: Iterable[Path]) -> str | Non
         kind: its kind, one of `KINDS`.
         folders: the plug-in folders; the place of an error in them is named.
     """
-    if missing := [name for name in dir(plugin) if _is_abstract(plugin, name)]:
+    members = ((name, getattr(plugin, name, None)) for name in dir(plugin))
+    if missing := [name for name, member in members if getattr(member, "__isabstractmethod__", False)]:
         return f"does not define {', '.join(missing)}"
     doing = "described"
     try:
@@ -135,10 +136,6 @@ def fault_of(plugin: type[Any], kind: str, folders: Iterable[Path]) -> str | Non
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
         return f"cannot be {doing}: {quoted(error, folders)}"
     return None
-
-
-def _is_abstract(plugin: type, name: str) -> bool:
-    return bool(getattr(getattr(plugin, name, None), "__isabstractmethod__", False))
 
 
 def _fault_of_name(plugin: type[Any], kind: str) -> str | None:
