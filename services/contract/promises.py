@@ -9,6 +9,7 @@ from gaplab.services.core.arrays import FloatArray, Genome, Genomes, frozen
 from gaplab.services.core.motions import Loop, Motion, Trajectory
 from gaplab.services.core.observations import names
 from gaplab.services.core.sensors import Sensors
+from gaplab.services.core.space import Space
 from gaplab.services.core.world import World
 
 P = TypeVar("P")
@@ -64,6 +65,18 @@ def check_targets(motion: Motion, actuators: int) -> None:
     assert np.isfinite(motion.targets).all(), "targets are not finite"
     assert motion.times_s[0] == 0.0, f"times_s begin at {motion.times_s[0]}, not at 0"
     assert np.all(np.diff(motion.times_s) > 0), "times_s do not ascend"
+
+
+def check_known(known: Genome, space: Space) -> None:
+    """Check that a known genome is within the bounds of its space.
+
+    Raises:
+        AssertionError: it is not.
+    """
+    known = np.asarray(known)
+    assert known.shape == (space.size,), f"its known genome has the shape {known.shape}, its space {space.size} genes"
+    inside = bool(np.all((known >= space.lower) & (known <= space.upper)))
+    assert inside, f"its known genome {known.tolist()} is outside its bounds"
 
 
 def numbers(mover: Moves, world: World, genomes: Genomes) -> FloatArray:

@@ -84,7 +84,7 @@ def mean_and_deviation(values: FloatArray) -> tuple[int, float | None, float | N
 
 def _deviation(values: FloatArray) -> float:
     """Return the standard deviation; exactly 0 for equal values, whose mean may be rounded."""
-    return float(values.std(ddof=1)) if not equal(values) else 0.0
+    return 0.0 if np.all(values == values[:1]) else float(values.std(ddof=1))
 
 
 def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | None, float | None]:
@@ -92,11 +92,6 @@ def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | Non
         return None, None
     half = _quantile(n - 1) * sd / n**0.5
     return known(mean - half), known(mean + half)
-
-
-def equal(values: FloatArray) -> bool:
-    """Return whether all values `(n,)` are equal."""
-    return bool(np.all(values == values[:1]))
 
 
 @lru_cache(maxsize=1024)

@@ -37,18 +37,14 @@ def pooled_variance(repeated: Iterable[FloatArray]) -> float:
     return sum(float(((values - values.mean()) ** 2).sum()) for values in shifted) / freedom if freedom else 0.0
 
 
-def variance(samples: Sequence[Sample]) -> float:
-    """Return the variance of one value, pooled over samples, in the unit of fitness squared; 0 if none has repeats."""
-    return pooled_variance(sample.repeats for sample in samples)
-
-
 def variance_of_mean(samples: Sequence[Sample]) -> float:
     """Return the variance of a sample's fitness, weighted as by `weights`; 0 if none has repeats.
 
     A fitness is the mean of c values, and its squared error weighs c over the mean of all c. So every weighted error of
     the right simulator has the same variance: that of one value over the mean of all c.
     """
-    return variance(samples) / float(np.mean([count(sample) for sample in samples])) if samples else 0.0
+    variance = pooled_variance(sample.repeats for sample in samples)
+    return variance / float(np.mean([count(sample) for sample in samples])) if samples else 0.0
 
 
 def weights(samples: Sequence[Sample]) -> FloatArray | None:

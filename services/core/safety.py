@@ -116,16 +116,17 @@ def safety(rollouts: Sequence[Extremes], limits: LimitsSpec | None, engine: str)
         engine: name of the engine, for the words.
     """
     ran = [rollout for rollout in rollouts if np.isfinite(rollout.fitness)]
+    falls = sum(rollout.tilt > FALL_RAD for rollout in ran)
     worst = {limit.name: _worst(ran, limit.name, min if limit.least else max) for limit in LIMITS}
     return Safety(
         simulators=len(rollouts),
         failed=len(rollouts) - len(ran),
         **worst,
         clearance=_worst(ran, "clearance", min),
-        falls=sum(rollout.tilt > FALL_RAD for rollout in ran),
+        falls=falls,
         fitness_low=_worst(ran, "fitness", min),
         fitness_high=_worst(ran, "fitness", max),
-        beyond=tuple(_beyond(ran, limits)),
+        beyond=tuple(_beyond(ran, falls, limits)),
         unknown=tuple(_unknown(len(rollouts) - len(ran), len(rollouts), worst, limits, engine)),
     )
 
@@ -143,8 +144,7 @@ def expected(found: Safety, unit: str) -> Iterator[str]:
             yield f"{limit.words}: at {'least' if limit.least else 'most'} {value:.3g} {limit.unit}"
 
 
-def _beyond(ran: Sequence[Extremes], limits: LimitsSpec | None) -> list[str]:
-    falls = sum(rollout.tilt > FALL_RAD for rollout in ran)
+def _beyond(ran: Sequence[Extremes], falls: int, limits: LimitsSpec | None) -> list[str]:
     found = [f"it falls in {falls} of {len(ran)} simulators"] if falls and getattr(limits, "tilt", None) is None else []
     found += dict.fromkeys(sentence for rollout in ran for sentence in rollout.out_of_range)
     for limit in LIMITS:

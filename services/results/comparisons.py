@@ -71,7 +71,9 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
         raise InvalidSpec([Violation("experiment", list(experiment_ids), message)])
     with store.reading() as session:
         rows, values = values_of(session, experiment_ids, fitness)
-        final = _common_count(session, rows) if to_evaluations is None else to_evaluations
+        final = to_evaluations
+        if final is None:
+            final = common_count(view_experiments(session, rows)) or 0
         within = None if margin is None else _in_units(session, rows, margin)
         concealed = hidden(session, rows)
     first = final if from_evaluations is None else from_evaluations
@@ -106,10 +108,6 @@ def _check_the_end(compared: Sequence[Compared], last: int) -> None:
 def _compared(row: ExperimentRow, recorded: FloatArray) -> Compared:
     spec = spec_of(row.spec)
     return Compared(row.id, row.name, recorded, not takes_samples(spec), spec.seed, spec.strategy.name)
-
-
-def _common_count(session: Session, rows: Sequence[ExperimentRow]) -> int:
-    return common_count(view_experiments(session, rows)) or 0
 
 
 def _in_units(session: Session, rows: Sequence[ExperimentRow], margin: Margin) -> float:

@@ -94,9 +94,6 @@ def samples_of(spec: ResolvedSpec) -> tuple[Sample, ...]:
     return tuple(found)
 
 
-_REMEDY = "give the readings of each value in `readings`"
-
-
 def bench_violations(spec: ExperimentSpec, robot: Robot, discrepancy: Discrepancy) -> Iterator[Violation]:
     """Yield limits that nothing can check, a refusal without limits, and samples that cannot be, or teach nothing."""
     if spec.reality.kind != "physical":
@@ -104,7 +101,8 @@ def bench_violations(spec: ExperimentSpec, robot: Robot, discrepancy: Discrepanc
     yield from _limit_violations(spec, robot)
     for place, sample in enumerate(spec.reality.samples):
         found = list(sample_violations(sample, robot))
-        lacks = lack_violations(discrepancy, robot.sensors, sample.values, sample.readings, _REMEDY)
+        remedy = "give the readings of each value in `readings`"
+        lacks = lack_violations(discrepancy, robot.sensors, sample.values, sample.readings, remedy)
         for violation in found or lacks:
             yield violation.moved("", f"/reality/samples/{place}")
 

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 from gaplab.schemas.mistakes import pointer_to
 from gaplab.schemas.plugin import TunableRef
@@ -178,24 +177,13 @@ def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[V
         yield Violation("/reality/probes", reality.probes, message, ["each", "last"])
 
 
-class Searches(NamedTuple):
-    """What the searches of a spec are made with.
-
-    Attributes:
-        controllers: optimizer of controllers.
-        simulators: optimizer of simulators, if the tuner uses one.
-        tuner: finds simulators.
-        divisor: number that divides the evaluations of the last tuning.
-    """
-
-    controllers: Optimizer
-    simulators: Optimizer
-    tuner: Tuner
-    divisor: int
-
-
 def budget_violations(
-    budget: ResolvedBudget, strategy: Strategy, tunables: int, searches: Searches
+    budget: ResolvedBudget,
+    strategy: Strategy,
+    tunables: int,
+    optimizers: tuple[Optimizer, Optimizer],
+    tuner: Tuner,
+    divisor: int,
 ) -> Iterator[Violation]:
     """Yield searches whose budget is smaller than what they begin with: of most, a population.
 
@@ -203,9 +191,12 @@ def budget_violations(
         budget: with every number.
         strategy: selects and transfers.
         tunables: number of tunables.
-        searches: optimizers, and what divides their evaluations.
+        optimizers: of controllers, and of simulators, if the tuner uses one.
+        tuner: finds simulators.
+        divisor: number that divides the evaluations of the last tuning.
     """
-    least, shared = searches.controllers.least_evaluations, strategy.equal_rollouts
+    of_controllers, of_simulators = optimizers
+    least, shared = of_controllers.least_evaluations, strategy.equal_rollouts
     transfer = strategy.transfer_simulators(tunables) if shared else 1
     needed = {"controller_evaluations": (budget.controller_evaluations, least, transfer, "simulators")}
     if strategy.searches and strategy.takes_samples:
@@ -214,8 +205,8 @@ def budget_violations(
     if strategy.tunes and strategy.takes_samples:
         needed["simulator_evaluations"] = (
             budget.simulator_evaluations,
-            searches.tuner.least_evaluations(searches.simulators, strategy.ensemble),
-            searches.divisor,
+            tuner.least_evaluations(of_simulators, strategy.ensemble),
+            divisor,
             "samples",
         )
     for name, (given, population, count, what) in needed.items():

@@ -175,6 +175,7 @@ class Untuned(Strategy):
 
 
 EnsembleSize = Annotated[int, Field(strict=True, ge=2, le=1_000)]
+Weight = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 
 
 class DiverseOptions(Frozen):
