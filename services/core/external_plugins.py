@@ -109,7 +109,8 @@ def classes(base: type[P], kind: str) -> tuple[list[type[P]], list[Unusable]]:
     """Return the valid external plug-ins of one kind, and the invalid ones."""
     valid, invalid = list[type[P]](), list[Unusable]()
     for module in loaded().modules:
-        for each in [each for each in vars(module).values() if _is_of(module, each) and issubclass(each, base)]:
+        members = list(vars(module).values())
+        for each in (each for each in members if _is_of(module, each) and issubclass(each, base)):
             fault, file = fault_of(each, kind, folders()), file_of(each) or ""
             if fault is None:
                 valid.append(each)

@@ -35,12 +35,9 @@ def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple
 
 
 def observed_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> FloatArray:
-    """Return `(k, 7)`: poses of the body whose motion is the trajectory.
+    """Return `(k, 7)`: poses of the body whose motion is the trajectory; arguments are as of `body_poses`.
 
-    Args:
-        world: bodies and joints.
-        poses: `(k, 7)`: poses of the base.
-        angles_rad: `(k, joints)`, in the world's order; not read if the base is observed.
+    Angles are not read if the base is observed.
     """
     if observes_base(world):
         return poses
@@ -100,9 +97,7 @@ def _carried(joint: Joint, position: FloatArray, turn: FloatArray, angles: Float
 def lowest_m(world: World, turn: FloatArray) -> float:
     """Return the height of the lowest point that touches the ground, at the start, above the frame of the base.
 
-    Args:
-        world: bodies and joints.
-        turn: `(4,)`: rotation of the base.
+    The base has the rotation `turn`, `(4,)`.
     """
     pose = np.array([[0.0, 0.0, 0.0, *turn]])
     positions, turns = body_poses(world, pose, np.array([[joint.start for joint in world.joints]]))

@@ -83,14 +83,7 @@ def recording_times(motion: Motion | Loop, world: World) -> FloatArray:
 
 
 def extremes(world: World, motion: Motion | Loop, recording: Recording, fitness: float) -> Extremes:
-    """Return the extremes of a rollout.
-
-    Args:
-        world: world of the rollout; its first body is the base.
-        motion: what drove it.
-        recording: rollout, recorded at every time step.
-        fitness: its fitness.
-    """
+    """Return the extremes of a rollout in a world that a motion drove, recorded at every time step."""
     poses = recording.poses
     if not (np.isfinite(fitness) and np.all(np.isfinite(poses))):
         return Extremes()
@@ -108,13 +101,7 @@ def extremes(world: World, motion: Motion | Loop, recording: Recording, fitness:
 
 
 def safety(rollouts: Sequence[Extremes], limits: LimitsSpec | None, engine: str) -> Safety:
-    """Return the worst of the rollouts of a controller in all simulators.
-
-    Args:
-        rollouts: extremes in each simulator.
-        limits: limits of the robot; None if the spec has none.
-        engine: name of the engine, for the words.
-    """
+    """Return the worst of the rollouts of a controller in all simulators; the name of the engine is for the words."""
     ran = [rollout for rollout in rollouts if np.isfinite(rollout.fitness)]
     falls = sum(rollout.tilt > FALL_RAD for rollout in ran)
     worst = {limit.name: _worst(ran, limit.name, min if limit.least else max) for limit in LIMITS}

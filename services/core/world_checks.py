@@ -179,12 +179,12 @@ def _is_unit(vector: Iterable[float]) -> bool:
 
 
 def _name_violations(world: World) -> Iterator[Violation]:
-    kinds: tuple[tuple[str, tuple[str, ...]], ...] = (
-        ("bodies", tuple(body.name for body in world.bodies)),
-        ("joints", tuple(joint.name for joint in world.joints)),
-        ("surfaces", tuple(name for name, _ in world.surfaces)),
-    )
-    for kind, names in kinds:
+    kinds = {
+        "bodies": [body.name for body in world.bodies],
+        "joints": [joint.name for joint in world.joints],
+        "surfaces": [name for name, _ in world.surfaces],
+    }
+    for kind, names in kinds.items():
         for name, times in Counter(names).items():
             if times > 1:
                 yield _violation(f"/{kind}", name, f"{kind} with unique names")

@@ -71,9 +71,7 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
         raise InvalidSpec([Violation("experiment", list(experiment_ids), message)])
     with store.reading() as session:
         rows, values = values_of(session, experiment_ids, fitness)
-        final = to_evaluations
-        if final is None:
-            final = common_count(view_experiments(session, rows)) or 0
+        final = _common_count(session, rows) if to_evaluations is None else to_evaluations
         within = None if margin is None else _in_units(session, rows, margin)
         concealed = hidden(session, rows)
     first = final if from_evaluations is None else from_evaluations
@@ -110,6 +108,10 @@ def _compared(row: ExperimentRow, recorded: FloatArray) -> Compared:
     return Compared(row.id, row.name, recorded, not takes_samples(spec), spec.seed, spec.strategy.name)
 
 
+def _common_count(session: Session, rows: Sequence[ExperimentRow]) -> int:
+    return common_count(view_experiments(session, rows)) or 0
+
+
 def _in_units(session: Session, rows: Sequence[ExperimentRow], margin: Margin) -> float:
     """Return a margin in the unit of fitness.
 
@@ -136,10 +138,7 @@ def _direct(rows: Sequence[ExperimentRow]) -> list[ExperimentRow]:
 def warnings(first: ExperimentRow, second: ExperimentRow, hidden: Set[str]) -> Iterator[str]:
     """Yield why two experiments should not be compared: other robots, other tasks, or other realities.
 
-    Args:
-        first: an experiment.
-        second: another one.
-        hidden: ids of the experiments whose parameters of reality may not be shown yet.
+    The parameters of reality of the experiments with `hidden` ids may not be shown yet.
     """
     one, other = spec_of(first.spec), spec_of(second.spec)
     if one.robot != other.robot:

@@ -26,10 +26,7 @@ from gaplab.services.specs.tunables import bounds_of, honoured
 def tunable_violations(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> Iterator[Violation]:
     """Yield tunables that are unknown, repeated, or of what the robot lacks or the engine ignores; bounds out of range.
 
-    Args:
-        spec: as submitted.
-        robot: that it names.
-        engine: of the simulators.
+    The engine is that of the simulators.
     """
     counts = Counter(proper(ref.name) for ref in spec.tunables)
     for index, ref in enumerate(spec.tunables):
@@ -80,9 +77,7 @@ def strategy_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) 
 def engine_violations(robot: Robot, places: Mapping[type[Engine], str]) -> Iterator[Violation]:
     """Yield what the robot's world uses and an engine does not honour, and a loop that an engine does not close.
 
-    Args:
-        robot: driven and rated.
-        places: the engines, each with its place in the spec.
+    Each engine has its place in the spec.
     """
     able = {name: each for name, each in engines.items() if runs(each, robot.world)}
     for engine, pointer in places.items():
@@ -132,12 +127,7 @@ def reality_violations(
 ) -> Iterator[Violation]:
     """Yield parameters of reality that are unknown, out of range, or ignored by its engine; direct use of hardware.
 
-    Args:
-        spec: as submitted.
-        strategy: that it names.
-        robot: likewise.
-        simulated: engine of the simulators.
-        engine: of reality.
+    `simulated` is the engine of the simulators, `engine` that of reality.
     """
     if spec.reality.kind == "physical":
         yield from _physical_violations(spec, strategy)
