@@ -30,11 +30,7 @@ def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
 def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
     """Return mean, sample standard deviation and 95 % interval of the mean by Student's t, over the finite values.
 
-    A statistic is None if there are too few values, or if it overflows.
-
-    Args:
-        evaluations: number of real-world evaluations.
-        values: `(r,)` by repetition.
+    Values are `(r,)`, by repetition. A statistic is None if there are too few, or if it overflows.
     """
     n, mean, sd = mean_and_deviation(values)
     lower, upper = _interval(mean, sd, n)
@@ -54,10 +50,8 @@ def best_of_searches(values: FloatArray) -> tuple[float | None, ...]:
     """Return the expected largest fitness of 1, 2, 3 … direct searches, up to half of all; empty for fewer than 20.
 
     Each is the mean of the largest over all choices of so many searches. So it is an unbiased estimate for new,
-    independent searches, whatever their distribution. None if it overflows.
-
-    Args:
-        values: `(r,)`: the fitness that each search reached; nan is left out.
+    independent searches, whatever their distribution. None if it overflows. Values `(r,)` are what each reached; nan is
+    left out.
     """
     largest_first = np.sort(values[np.isfinite(values)])[::-1]
     n = len(largest_first)

@@ -24,12 +24,9 @@ def unit_violations(robot: str, unit: str | None, own: str) -> Iterator[Violatio
 
 
 def readings_violations(tables: Sequence[Table], repeats: int | None, sensors: Sensors) -> Iterator[Violation]:
-    """Yield readings of another shape than the sensors have.
+    """Yield readings, a table for each repeat, of another shape than the sensors have.
 
-    Args:
-        tables: readings of each repeat.
-        repeats: number of values; None if the measurement failed.
-        sensors: sensors of the robot.
+    The number of repeats is None if the measurement failed.
     """
     if repeats is None:
         yield Violation("/readings", "given", "a failed measurement has no readings", "left out")

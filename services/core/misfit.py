@@ -82,13 +82,9 @@ class Tuning:
 
 
 def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str], space: Space) -> MisfitPoint:
-    """Return the misfit of an iteration, over the repetitions that have reached it.
+    """Return the misfit of an iteration, over the tunings of the repetitions that have reached it, maybe none.
 
-    Args:
-        iteration: number of the iteration.
-        tunings: tunings of the iteration, one for each of these repetitions; may be empty.
-        names: names of the p tunables.
-        space: bounds of the tunables.
+    Names and bounds are those of the p tunables.
     """
     parameters = np.array([each.parameters for each in tunings]).reshape(-1, space.size)
     widths = [each.interval[:, 1] - each.interval[:, 0] for each in tunings if each.interval is not None]

@@ -187,13 +187,9 @@ def given_names(options: type[BaseModel]) -> list[str]:
 
 
 def option_violation(name: str, options: type[BaseModel], error: Mapping[str, Any], pointer: str = "") -> Violation:
-    """Return the violation of an option that the model refuses.
+    """Return the violation of an option that the model of a plug-in's options refuses.
 
-    Args:
-        name: the plug-in's name.
-        options: model of its options.
-        error: an item of `ValidationError.errors()`.
-        pointer: place of the options in the spec.
+    The error is an item of `ValidationError.errors()`; the pointer is the place of the options in the spec.
     """
     place = pointer_to(error["loc"])
     if error["type"] == "extra_forbidden":

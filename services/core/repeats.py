@@ -26,11 +26,8 @@ def standard_error(values: FloatArray) -> float | None:
 def pooled_variance(repeated: Iterable[FloatArray]) -> float:
     """Return the variance of one value, pooled over measurements; 0 if none has repeats, or all repeats are equal.
 
-    It is pooled because two or three values say little about their own variance: a sample that happens to agree with
-    itself would silence all others.
-
-    Args:
-        repeated: values `(r,)` of each measurement.
+    It is pooled because two or three values `(r,)` say little about their own variance: a sample that happens to agree
+    with itself would silence all others.
     """
     shifted = [values - values[0] for values in repeated if len(values) > 1]
     freedom = sum(len(values) - 1 for values in shifted)

@@ -16,6 +16,7 @@ from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.identification import Means, overfitting, verdicts
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.core.repeats import pooled_variance
+from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.unreproduced import unreproduced
@@ -44,6 +45,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         members = tunings.posteriors(session, experiment_id)
         repeated = tunings.repeats(session, experiment_id)
     spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
+    robot = installed_robot(spec)
     posteriors = {place: _deviations(*found) for place, found in members.items()}
     by_iteration: dict[int, list[Tuning]] = defaultdict(list)
     for best in simulators:
@@ -58,7 +60,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
     unseen = overfitting(points[-1], error_unit) if points else ""
-    wrong = _unreproduced(row.id, spec, by_iteration[points[-1].iteration], error_unit) if points else ""
+    wrong = _unreproduced(row.id, robot, by_iteration[points[-1].iteration], error_unit) if points else ""
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
@@ -68,7 +70,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
-        verdicts=verdicts(points, samples, _means(spec), unreproduced=bool(wrong)),
+        verdicts=verdicts(points, samples, _means(spec, robot), unreproduced=bool(wrong)),
     )
 
 
@@ -78,8 +80,7 @@ def _known(measured: MeasuredIterations) -> str:
     return f"samples from before the experiment: {told}" if told else ""
 
 
-def _unreproduced(id: str, spec: ResolvedSpec, latest: Sequence[Tuning], error_unit: str) -> str:
-    robot = installed_robot(spec)
+def _unreproduced(id: str, robot: Robot | None, latest: Sequence[Tuning], error_unit: str) -> str:
     found = unreproduced(latest, None if robot is None else robot.sensors, error_unit)
     return f"{found}. `gaplab try-tunables {id}` tries further tunables, and `search`" if found else ""
 
@@ -136,10 +137,9 @@ def _deviations(members: list[list[float]], weights: list[float]) -> FloatArray 
     return frozen(np.sqrt(np.average((values - mean) ** 2, axis=0, weights=weights)))
 
 
-def _means(spec: ResolvedSpec) -> Means:
+def _means(spec: ResolvedSpec, robot: Robot | None) -> Means:
     """Return what the experiment has not used: readings that its robot has, and tuners with intervals."""
     sensing = spec.discrepancy.name in discrepancies and discrepancies[spec.discrepancy.name].senses
-    robot = installed_robot(spec)
     has_sensors = robot is not None and robot.sensors.size > 0
     certain = spec.tuner.name in tuners and tuners[spec.tuner.name].intervals
     return Means(

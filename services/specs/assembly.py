@@ -159,11 +159,7 @@ def edits_of(names: Iterable[str]) -> list[Tunable]:
 
 
 def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
-    """Check that the plug-ins that a stored spec simulates with are installed here.
-
-    Args:
-        spec: spec of the experiment.
-        reality: also check the plug-ins of reality.
+    """Check that the plug-ins that a stored spec simulates with, or also those of reality, are installed here.
 
     Raises:
         InvalidSpec: a plug-in is missing; perhaps its file was removed.

@@ -18,10 +18,7 @@ class SafetyForecast:
         self._robot, self._simulation = robot, simulation
 
     def __call__(self, genome: Genome, parameters: Parameters, progress: Callable[[], None] = lambda: None) -> Safety:
-        """Return what simulators `(m, p)`, the best first, expect of a genome `(g,)`; the first 20 are asked.
-
-        After each rollout, `progress` is called.
-        """
+        """Return what simulators `(m, p)`, the best first, expect of a genome `(g,)`; the first 20 are asked."""
         rollouts, errors = list[Extremes](), set[str]()
         for simulator in parameters[:MOST_SIMULATORS]:
             try:

@@ -51,12 +51,7 @@ def lack_violations(
 ) -> Iterator[Violation]:
     """Yield that measured values, as of `outcome_of`, lack what the discrepancy compares: every simulator would fit.
 
-    Args:
-        discrepancy: of the experiment.
-        sensors: of the robot.
-        values: fitness of each repeat.
-        readings: `(r, times, sensors)`, or None.
-        remedy: what to do.
+    The remedy is what to do.
     """
     if not (discrepancy.senses and sensors.size):
         return

@@ -82,9 +82,7 @@ def _gives(spec: Spec, wanted: Sequence[ResolvedSpec], *, hidden: bool) -> bool:
 def _shortest(spec: ResolvedSpec, within: str | None = None) -> Spec:
     """Return the spec without the fields whose absence changes nothing; complete if it cannot be resolved here.
 
-    Args:
-        spec: spec of an experiment.
-        within: shorten this field only; left out: all fields.
+    With `within`, that field alone is shortened.
     """
     complete = spec.model_dump(mode="json", exclude=SCHEDULE)
     target = _resolved(complete)
