@@ -17,7 +17,7 @@ def sample_violations(sample: KnownSample, robot: Robot) -> Iterator[Violation]:
 
 
 def unit_violations(robot: str, unit: str | None, own: str) -> Iterator[Violation]:
-    """Yield a unit of the values that is not the robot's own; None is left out."""
+    """Yield the unit of values that is not the robot's own; None if it is left out."""
     if unit is not None and unit != own:
         message = f"the fitness of the {robot} is in {own or 'no unit'}, not in {unit or 'no unit'}"
         yield Violation("/unit", unit, message, [own])

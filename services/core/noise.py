@@ -35,7 +35,7 @@ def stream_of(genome: Genome, purpose: str) -> Generator:
 
 
 def disturbed(world: World, motion: Motion | Loop, genome: Genome) -> Motion | Loop:
-    """Return the motion or the loop of a genome `(g,)`, which is the address of the draws, with the noise of a world.
+    """Return the motion or the loop of a genome `(g,)`, the address of the draws, with noise and latency of a world.
 
     A target is disturbed when it changes, and stays so until it changes again. A longer rollout has the same noise, and
     more of it.

@@ -83,7 +83,7 @@ def recording_times(motion: Motion | Loop, world: World) -> FloatArray:
 
 
 def extremes(world: World, motion: Motion | Loop, recording: Recording, fitness: float) -> Extremes:
-    """Return the extremes of a rollout in a world that a motion drove, recorded at every time step."""
+    """Return the extremes of a rollout in a world, whose first body is the base, recorded at every time step."""
     poses = recording.poses
     if not (np.isfinite(fitness) and np.all(np.isfinite(poses))):
         return Extremes()

@@ -51,7 +51,7 @@ def lack_violations(
 ) -> Iterator[Violation]:
     """Yield that measured values, as of `outcome_of`, lack what the discrepancy compares: every simulator would fit.
 
-    The remedy is what to do.
+    The remedy says what to do.
     """
     if not (discrepancy.senses and sensors.size):
         return
