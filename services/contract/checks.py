@@ -82,8 +82,6 @@ def _reason(error: BaseException) -> str:
     return f"{told}: it changes an array that it was given; change a copy" if changes else told
 
 
-KINDS = tuple(CHECKS)
-
 _IMPORT = re.compile(r"^(?:from \S+ )?import (.+)$", re.MULTILINE)
 
 
@@ -113,7 +111,7 @@ def write_skeleton(kind: str, name: str, folder: Path) -> Path:
     """Write a plug-in that runs into a new file of a folder, and return the file.
 
     Args:
-        kind: one of `KINDS`.
+        kind: one of `CHECKS`.
         name: name in specs, and of the file.
         folder: is created if absent.
 
@@ -189,7 +187,7 @@ def _needed(path: Path) -> str:
     """Return what a file without a plug-in lacks."""
     if (why := why_no_plugin(path)) != NO_CLASS:
         return why
-    return f"it needs a class of one of {', '.join(kind.capitalize() for kind in KINDS)} from gaplab.plugins"
+    return f"it needs a class of one of {', '.join(kind.capitalize() for kind in CHECKS)} from gaplab.plugins"
 
 
 def _unusable(module: str) -> list[tuple[str, str | None, str]]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gaplab.services.contract.promises import check_targets, is_described, numbers
+from gaplab.services.contract.promises import check_known, check_targets, is_described, numbers
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.controllers.base import Controller
 from gaplab.services.core.motions import Loop
@@ -49,12 +49,7 @@ def prepared(plugin: Plugin) -> Iterator[tuple[Controller, World]]:
 def has_its_known_genome_in_its_space(plugin: Plugin) -> None:
     """Has a known genome within the bounds of its space."""
     for controller, _ in prepared(plugin):
-        known, space = np.asarray(controller.known), controller.space
-        assert known.shape == (space.size,), (
-            f"its known genome has the shape {known.shape}, its space {space.size} genes"
-        )
-        inside = bool(np.all((known >= space.lower) & (known <= space.upper)))
-        assert inside, f"its known genome {known.tolist()} is outside its bounds"
+        check_known(controller.known, controller.space)
 
 
 def drives_every_actuator(plugin: Plugin) -> None:

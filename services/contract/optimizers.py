@@ -2,13 +2,12 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from gaplab.services.contract.promises import check_repeats
 from gaplab.services.core.arrays import FloatArray, Genomes, frozen
-from gaplab.services.core.optimizers.base import Optimizer
+from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.search import Question, maximise
 from gaplab.services.core.space import Space
 
@@ -34,7 +33,7 @@ class Hill:
         return self.transform(-(((genomes - SUMMIT) / SPACE.extent) ** 2).sum(axis=1))
 
 
-def searched(plugin: Plugin, hill: Hill, evaluations: int = 300) -> Any:  # noqa: ANN401 - a population
+def searched(plugin: Plugin, hill: Hill, evaluations: int = 300) -> Population:
     """Return what a new optimizer finds on a hill."""
     return maximise(plugin(), SPACE, hill, evaluations, np.random.default_rng(3))
 
@@ -95,16 +94,14 @@ def compares_by_rank(plugin: Plugin) -> None:
 def lets_nan_never_win(plugin: Plugin) -> None:
     """Lets nan and infinities never win."""
     for bad in (np.nan, np.inf, -np.inf):
-        found = searched(plugin, Hill(_spoilt(bad)), 500)
+        hill = Hill(partial(_spoilt, bad=bad))
+        found = searched(plugin, hill, 500)
         finite = np.isfinite(found.fitness[0]) and found.fitness[0] <= -0.05
         assert finite, f"where fitness is {bad} near the summit, its best is {found.fitness[0]}"
 
 
-def _spoilt(bad: float) -> Callable[[FloatArray], FloatArray]:
-    def spoil(fitness: FloatArray) -> FloatArray:
-        return np.where(fitness > -0.05, bad, fitness)
-
-    return spoil
+def _spoilt(fitness: FloatArray, bad: float) -> FloatArray:
+    return np.where(fitness > -0.05, bad, fitness)
 
 
 def goes_on_where_everything_fails(plugin: Plugin) -> None:

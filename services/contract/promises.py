@@ -1,14 +1,18 @@
 """What the contracts of several kinds ask: a description, repeated answers, motions, and ratings of them."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, frozen
+from gaplab.services.core.controllers.base import Controller
 from gaplab.services.core.motions import Loop, Motion, Trajectory
 from gaplab.services.core.observations import names
+from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sensors import Sensors
+from gaplab.services.core.space import Space
+from gaplab.services.core.tasks.base import Task
 from gaplab.services.core.world import World
 
 P = TypeVar("P")
@@ -45,14 +49,6 @@ CALLS = 12
 """Calls of `act` whose numbers are compared."""
 
 
-class Moves(Protocol):
-    """A controller or a robot."""
-
-    def motion(self, genome: Genome) -> Motion | Loop:
-        """Return the motion that the genome `(g,)` describes."""
-        ...
-
-
 def check_targets(motion: Motion, actuators: int) -> None:
     """Check that a motion has finite targets for each actuator, at times that ascend from 0.
 
@@ -66,7 +62,19 @@ def check_targets(motion: Motion, actuators: int) -> None:
     assert np.all(np.diff(motion.times_s) > 0), "times_s do not ascend"
 
 
-def numbers(mover: Moves, world: World, genomes: Genomes) -> FloatArray:
+def check_known(known: Genome, space: Space) -> None:
+    """Check that a known genome is within the bounds of its space.
+
+    Raises:
+        AssertionError: it is not.
+    """
+    known = np.asarray(known)
+    assert known.shape == (space.size,), f"its known genome has the shape {known.shape}, its space {space.size} genes"
+    inside = bool(np.all((known >= space.lower) & (known <= space.upper)))
+    assert inside, f"its known genome {known.tolist()} is outside its bounds"
+
+
+def numbers(mover: Controller | Robot, world: World, genomes: Genomes) -> FloatArray:
     """Return the numbers of each genome, `(k, n, ...)`: targets; of a loop also memories, of a few calls.
 
     Raises:
@@ -98,23 +106,6 @@ LATE_S = 1e-9
 """Rounding by which the last reading may be later than the end of a rollout."""
 
 
-class Rates(Protocol):
-    """A task or a robot."""
-
-    @property
-    def sensors(self) -> Sensors:
-        """Return its sensors."""
-        ...
-
-    def fitness(self, trajectory: Trajectory) -> FloatArray:
-        """Return `(...)`: the fitness of each trajectory."""
-        ...
-
-    def sense(self, trajectory: Trajectory) -> FloatArray:
-        """Return `(..., r, s)`: what the sensors say."""
-        ...
-
-
 def check_times(observe_s: FloatArray, sensors: Sensors) -> None:
     """Check that a rollout is observed at times that ascend, the last of them above 0, and is sensed within them.
 
@@ -141,7 +132,7 @@ def _check_seconds(name: str, times_s: FloatArray) -> None:
     assert np.all(np.diff(times_s) > 0), f"{name} does not ascend: {times_s.tolist()}"
 
 
-def check_rates_many(rates: Rates, observe_s: FloatArray) -> None:
+def check_rates_many(rates: Task | Robot, observe_s: FloatArray) -> None:
     """Check that the fitness of many trajectories at once is that of each.
 
     Raises:
@@ -154,7 +145,7 @@ def check_rates_many(rates: Rates, observe_s: FloatArray) -> None:
     assert np.allclose(together, one_by_one), "its fitness of many trajectories differs from that of each"
 
 
-def check_failed_physics(rates: Rates, observe_s: FloatArray) -> None:
+def check_failed_physics(rates: Task | Robot, observe_s: FloatArray) -> None:
     """Check that the fitness of a trajectory of nan is nan.
 
     Raises:
@@ -166,7 +157,7 @@ def check_failed_physics(rates: Rates, observe_s: FloatArray) -> None:
     assert np.isnan(fitness), f"its fitness of a trajectory of nan is {fitness}"
 
 
-def check_sensors(rates: Rates) -> None:
+def check_sensors(rates: Task | Robot) -> None:
     """Check that each sensor has a unit and a noise, and is read at each of its times, many trajectories as each.
 
     Raises:

@@ -5,7 +5,6 @@ from functools import partial
 import numpy as np
 
 from gaplab.services.contract import promises
-from gaplab.services.contract.promises import check_repeats
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Genomes, frozen
 from gaplab.services.core.motions import Loop
 from gaplab.services.core.robots.base import Robot
@@ -24,10 +23,7 @@ def names_an_engine_that_runs_it(plugin: Plugin) -> None:
 def has_its_known_genome_in_its_space(plugin: Plugin) -> None:
     """Has a known genome within the bounds of its space."""
     robot = plugin.example()
-    known, size = np.asarray(robot.known), robot.space.size
-    assert known.shape == (size,), f"its known genome has the shape {known.shape}, its space {size} genes"
-    inside = bool(np.all((known >= robot.space.lower) & (known <= robot.space.upper)))
-    assert inside, f"its known genome {known.tolist()} is outside its bounds"
+    promises.check_known(robot.known, robot.space)
 
 
 def drives_every_actuator(plugin: Plugin) -> None:
@@ -51,7 +47,8 @@ def repeats_itself(plugin: Plugin) -> None:
         "the motion of a genome": partial(_moved, genome=one),
         "the motion of another genome": partial(_moved, genome=other),
     }
-    check_repeats(plugin.example, questions, "use no random numbers, and keep nothing from one genome for the next")
+    advice = "use no random numbers, and keep nothing from one genome for the next"
+    promises.check_repeats(plugin.example, questions, advice)
 
 
 def observes_at_times_that_ascend(plugin: Plugin) -> None:

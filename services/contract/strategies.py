@@ -86,26 +86,21 @@ class GridSearch:
         return best
 
 
-def selected(strategy: Strategy, samples: Sequence[Sample] = (), seed: int = 0) -> Genome:
-    """Return the genome that a strategy selects, or transfers if it takes no samples."""
-    return chosen(strategy, samples, seed, transfer=not strategy.takes_samples)
-
-
-def chosen(strategy: Strategy, samples: Sequence[Sample] = (), seed: int = 0, *, transfer: bool = False) -> Genome:
-    """Return the genome that a strategy selects or transfers."""
-    believed = belief(strategy, samples)
+def chosen(strategy: Strategy, samples: Sequence[Sample], *, transfer: bool) -> tuple[FloatArray, GridSearch]:
+    """Return the genome that a strategy selects or transfers, and how it searched for it."""
+    search = GridSearch(belief(strategy, samples))
     choose = strategy.transfer if transfer else strategy.select
-    return choose(believed, GridSearch(believed), np.random.default_rng(seed))
+    return np.asarray(choose(search.believed, search, np.random.default_rng(0))), search
 
 
 def selects_a_genome_of_the_space(plugin: Plugin) -> None:
     """Selects a genome within the bounds of the space."""
-    _check_inside(np.asarray(selected(plugin())), "selects")
+    _check_inside(chosen(plugin(), (), transfer=not plugin.takes_samples)[0], "selects")
 
 
 def transfers_a_genome_of_the_space(plugin: Plugin) -> None:
     """Transfers a genome within the bounds of the space."""
-    _check_inside(np.asarray(chosen(plugin(), SAMPLES, transfer=True)), "transfers")
+    _check_inside(chosen(plugin(), SAMPLES, transfer=True)[0], "transfers")
 
 
 def _check_inside(genome: FloatArray, verb: str) -> None:
@@ -126,16 +121,13 @@ def selects_the_same_from_the_same(plugin: Plugin) -> None:
 
 def _numbers(strategy: Strategy, samples: Sequence[Sample], *, transfer: bool) -> FloatArray:
     """Return the drawn simulators, the scores of a search and the chosen genome, as one vector."""
-    believed = belief(strategy, samples)
-    search = GridSearch(believed)
-    choose = strategy.transfer if transfer else strategy.select
-    genome = choose(believed, search, np.random.default_rng(0))
-    return np.concatenate([np.ravel(each) for each in (believed.parameters, search.scores, genome)])
+    genome, search = chosen(strategy, samples, transfer=transfer)
+    return np.concatenate([np.ravel(each) for each in (search.believed.parameters, search.scores, genome)])
 
 
 def copes_with_failed_measurements(plugin: Plugin) -> None:
     """Copes with samples, of which some have a fitness of nan."""
-    genome = selected(plugin(), SAMPLES)
+    genome, _ = chosen(plugin(), SAMPLES, transfer=not plugin.takes_samples)
     assert np.isfinite(genome).all(), f"with a failed sample it selects {genome.tolist()}: use `belief.learnable`"
 
 
@@ -144,8 +136,7 @@ def searches_as_it_says(plugin: Plugin) -> None:
     strategy = plugin()
     if not strategy.takes_samples:
         return
-    search = GridSearch(belief(strategy))
-    strategy.select(belief(strategy), search, np.random.default_rng(0))
+    _, search = chosen(strategy, (), transfer=False)
     expected = int(strategy.searches)
     assert search.calls == expected, f"it has searches = {strategy.searches}, but searches {search.calls} times"
     stated = strategy.selection_simulators(TUNABLES.size)
@@ -155,8 +146,7 @@ def searches_as_it_says(plugin: Plugin) -> None:
 def transfers_as_it_says(plugin: Plugin) -> None:
     """Searches at most once for a transfer, in as many simulators as it states."""
     strategy = plugin()
-    search = GridSearch(belief(strategy, SAMPLES))
-    strategy.transfer(belief(strategy, SAMPLES), search, np.random.default_rng(0))
+    _, search = chosen(strategy, SAMPLES, transfer=True)
     stated = strategy.transfer_simulators(TUNABLES.size)
     assert search.calls <= 1, f"its transfer searches {search.calls} times"
     assert search.simulators <= stated, f"it transfers from {search.simulators} simulators, but states {stated}"

@@ -8,7 +8,7 @@ import numpy as np
 
 from gaplab.services.contract.promises import check_repeats, is_described
 from gaplab.services.core.answers import Answers
-from gaplab.services.core.arrays import NO_READINGS, Fitnesses, FloatArray, Genomes, Outcomes, Parameters, frozen
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.discrepancies.readings import Readings
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.space import Space
@@ -71,10 +71,9 @@ def tuned(
 
 
 def _tuned(
-    tuner: Tuner, physics: Physics, ensemble: int, seed: int = 0, evaluations: int = EVALUATIONS
+    tuner: Tuner, physics: Physics, ensemble: int, seed: int, evaluations: int = EVALUATIONS
 ) -> Sequence[Simulator]:
-    answers = Answers(physics.fitness, sense=physics.sense)
-    misfit = Misfit(answers, samples(), Readings(), TIMES_S if Readings.senses else NO_READINGS)
+    misfit = _misfit(physics)
     optimizer = SteadyState().diverse(ensemble) if ensemble > 1 else SteadyState()
     rng = np.random.default_rng(seed)
     previous = tuple(Simulator(frozen(row)) for row in SPACE.draw(ensemble, rng))
@@ -88,6 +87,10 @@ def _tuned(
         )
         for each in found
     )
+
+
+def _misfit(physics: Physics) -> Misfit:
+    return Misfit(Answers(physics.fitness, sense=physics.sense), samples(), Readings(), TIMES_S)
 
 
 def finds_the_simulator(plugin: Plugin) -> None:
@@ -109,8 +112,7 @@ def returns_as_many_as_wanted(plugin: Plugin) -> None:
 def states_the_discrepancy_of_each(plugin: Plugin) -> None:
     """Returns each simulator with its own discrepancy."""
     found = tuned(plugin, Physics(), 7)
-    misfit = Misfit(Answers(Physics().fitness, sense=Physics().sense), samples(), Readings(), TIMES_S)
-    own = misfit.of(np.array([each.parameters for each in found]))
+    own = _misfit(Physics()).of(np.array([each.parameters for each in found]))
     stated = np.array([each.squared_error for each in found])
     assert np.allclose(own, stated), "its simulators have the discrepancy of others"
 

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import rotated
+from gaplab.services.core.kinematics import chain, rotated
 from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part
-from gaplab.services.core.world import Body, Joint, World
+from gaplab.services.core.world import Body, World
 
 
 class Clearances:
@@ -107,13 +107,9 @@ class _Parts:
 
 def _levels(world: World) -> list[list[int]]:
     """Return the numbers of the joints by the number of joints between them and the base."""
-    carriers: dict[str, Joint] = {joint.child: joint for joint in world.joints}
     levels: dict[int, list[int]] = {}
     for number, joint in enumerate(world.joints):
-        depth, name = 0, joint.parent
-        while name in carriers:
-            depth, name = depth + 1, carriers[name].parent
-        levels.setdefault(depth, []).append(number)
+        levels.setdefault(len(chain(world, joint.parent)), []).append(number)
     return [levels[depth] for depth in sorted(levels)]
 
 

@@ -113,7 +113,8 @@ def compare_all(
         intervals: with intervals.
     """
     over = Range(first, last)
-    summaries = {one.id: summary(over.values(one), intervals=intervals) for one in experiments}
+    values = {one.id: over.values(one) for one in experiments}
+    summaries = {id_: summary(each, intervals=intervals) for id_, each in values.items()}
     pairs = [
         _compared(one, other, over, (summaries[one.id], summaries[other.id]), intervals=intervals)
         for one, other in combinations(experiments, 2)
@@ -122,10 +123,7 @@ def compare_all(
     if pooled:
         pairs = [pair.model_copy(update={"pooled": each}) for pair, each in zip(pairs, pooled, strict=True)]
     pairs = _judged(_corrected(pairs, TESTS))
-    if margin is None:
-        return tuple(pairs)
-    values = {one.id: over.values(one) for one in experiments}
-    return equivalent(pairs, values, margin)
+    return tuple(pairs) if margin is None else equivalent(pairs, values, margin)
 
 
 def _compared(

@@ -12,7 +12,6 @@ from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.search import maximise
 from gaplab.services.core.sensors import nearest
-from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Score, Strategy
 from gaplab.services.core.types import Belief
 
@@ -101,7 +100,9 @@ class ControllerSearch:
                 self.optimizer, space, lambda asked: scored(asked.genomes, asked.following), evaluations, self.rng
             )
         else:
-            found = _best_first(space, candidates[:evaluations], scored(candidates[:evaluations]))
+            scores = scored(candidates[:evaluations])
+            scores = np.where(np.isfinite(scores), scores, -np.inf)
+            found = Population(space, candidates[:evaluations], scores).ranked()
         best: Genome = found.genomes[0]
         self._found, self._score = best, float(found.fitness[0])
         return best
@@ -134,7 +135,3 @@ class ControllerSearch:
             outcomes = self.answers.sense(genomes, simulators)
             return nearest(outcomes, outcomes[:, :1], self.answers.periods)
         return self.answers(genomes, simulators, following)[..., None]
-
-
-def _best_first(space: Space, genomes: Genomes, scores: FloatArray) -> Population:
-    return Population(space, genomes, np.where(np.isfinite(scores), scores, -np.inf)).ranked()

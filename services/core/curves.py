@@ -30,11 +30,7 @@ def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
 def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
     """Return mean, sample standard deviation and 95 % interval of the mean by Student's t, over the finite values.
 
-    A statistic is None if there are too few values, or if it overflows.
-
-    Args:
-        evaluations: number of real-world evaluations.
-        values: `(r,)` by repetition.
+    Values are `(r,)`, by repetition. A statistic is None if there are too few, or if it overflows.
     """
     n, mean, sd = mean_and_deviation(values)
     lower, upper = _interval(mean, sd, n)
@@ -54,10 +50,8 @@ def best_of_searches(values: FloatArray) -> tuple[float | None, ...]:
     """Return the expected largest fitness of 1, 2, 3 … direct searches, up to half of all; empty for fewer than 20.
 
     Each is the mean of the largest over all choices of so many searches. So it is an unbiased estimate for new,
-    independent searches, whatever their distribution. None if it overflows.
-
-    Args:
-        values: `(r,)`: the fitness that each search reached; nan is left out.
+    independent searches, whatever their distribution. None if it overflows. Values `(r,)` are what each reached; nan is
+    left out.
     """
     largest_first = np.sort(values[np.isfinite(values)])[::-1]
     n = len(largest_first)
@@ -84,7 +78,7 @@ def mean_and_deviation(values: FloatArray) -> tuple[int, float | None, float | N
 
 def _deviation(values: FloatArray) -> float:
     """Return the standard deviation; exactly 0 for equal values, whose mean may be rounded."""
-    return float(values.std(ddof=1)) if not equal(values) else 0.0
+    return 0.0 if np.all(values == values[:1]) else float(values.std(ddof=1))
 
 
 def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | None, float | None]:
@@ -92,11 +86,6 @@ def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | Non
         return None, None
     half = _quantile(n - 1) * sd / n**0.5
     return known(mean - half), known(mean + half)
-
-
-def equal(values: FloatArray) -> bool:
-    """Return whether all values `(n,)` are equal."""
-    return bool(np.all(values == values[:1]))
 
 
 @lru_cache(maxsize=1024)

@@ -40,11 +40,7 @@ def difference_interval(first: FloatArray, second: FloatArray, *, paired: bool) 
 def equivalence_p(first: FloatArray, second: FloatArray, margin: float, *, paired: bool) -> float | None:
     """Return p of the hypothesis that the means differ by `margin` or more, either way; None if undefined.
 
-    Args:
-        first: `(r,)` by repetition; nan is missing.
-        second: `(s,)` by repetition; nan is missing.
-        margin: above 0, in the unit of the values.
-        paired: whether the values of one repetition belong together.
+    The margin is above 0, in the unit of the values; the other arguments are as of `difference_interval`.
     """
     above = _one_test(first, second, margin, "greater", paired=paired)
     below = _one_test(first, second, -margin, "less", paired=paired)

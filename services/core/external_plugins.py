@@ -17,6 +17,11 @@ from typing import TypeGuard, TypeVar
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.plugin_faults import Unusable, fault_of, from_file, quoted, remedied
 
+PACKAGE = "gaplab_plugins"
+"""Name of a package without a file; plug-in files import each other as `from gaplab_plugins.other import …`."""
+
+P = TypeVar("P")
+
 
 class _Uncached(SourceFileLoader):
     """A loader that compiles the file at each import.
@@ -30,36 +35,16 @@ class _Uncached(SourceFileLoader):
         return self.source_to_code(self.get_data(path), path)
 
 
-class Uncached:
-    """A finder of the modules of one package, which are imported without the cache.
+class _Finder:
+    """A finder of the modules of the plug-in folders, which are imported without the cache."""
 
-    Args:
-        package: name of the package.
-    """
-
-    def __init__(self, package: str) -> None:
-        self._prefix = f"{package}."
-
-    def find_spec(
-        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
+    @staticmethod
+    def find_spec(name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> ModuleSpec | None:
         """Return where to import a module of the package from; None for any other module."""
-        found = PathFinder.find_spec(name, path, target) if name.startswith(self._prefix) else None
+        found = PathFinder.find_spec(name, path, target) if name.startswith(f"{PACKAGE}.") else None
         if found is not None and type(found.loader) is SourceFileLoader:
             found.loader, found.cached = _Uncached(name, found.loader.path), None
         return found
-
-
-def import_uncached(package: str) -> None:
-    """Import the modules of a package without the cache from now on; again, it does nothing."""
-    if not any(isinstance(finder, Uncached) for finder in sys.meta_path):
-        sys.meta_path.insert(0, Uncached(package))
-
-
-PACKAGE = "gaplab_plugins"
-"""Name of a package without a file; plug-in files import each other as `from gaplab_plugins.other import …`."""
-
-P = TypeVar("P")
 
 
 @dataclass(frozen=True)
@@ -98,7 +83,8 @@ def set_folders(folders: tuple[Path, ...], only: str | None = None) -> None:
     for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
         del sys.modules[name]
     sys.modules[PACKAGE] = _Package(folders, only)
-    import_uncached(PACKAGE)
+    if _Finder not in sys.meta_path:
+        sys.meta_path.insert(0, _Finder)
     _load.cache_clear()
     invalidate_caches()
 
@@ -123,7 +109,8 @@ def classes(base: type[P], kind: str) -> tuple[list[type[P]], list[Unusable]]:
     """Return the valid external plug-ins of one kind, and the invalid ones."""
     valid, invalid = list[type[P]](), list[Unusable]()
     for module in loaded().modules:
-        for each in _classes(module, base):
+        members = list(vars(module).values())
+        for each in (each for each in members if _is_of(module, each) and issubclass(each, base)):
             fault, file = fault_of(each, kind, folders()), file_of(each) or ""
             if fault is None:
                 valid.append(each)
@@ -201,10 +188,6 @@ def _told_apart(paths: list[Path]) -> list[str]:
         if len(set(ends)) == len(ends):
             return ends
     return list(map(str, paths))
-
-
-def _classes(module: ModuleType, base: type[P]) -> Iterator[type[P]]:
-    return (each for each in list(vars(module).values()) if _is_of(module, each) and issubclass(each, base))
 
 
 def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:

@@ -6,8 +6,7 @@ Source: gaplab; cross-validation.
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
+from gaplab.services.core.arrays import known
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Sample, Simulator
 
@@ -48,4 +47,4 @@ def tested(simulators: Sequence[Simulator], misfit: Misfit) -> tuple[Simulator, 
     """
     best, *others = simulators
     error = float(misfit.of(best.parameters[None, :])[0])
-    return (replace(best, held_out_error=error if np.isfinite(error) else None), *others)
+    return (replace(best, held_out_error=known(error)), *others)

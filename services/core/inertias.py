@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.kinematics import body_poses, product, rotated
+from gaplab.services.core.kinematics import body_poses, chain, product, rotated
 from gaplab.services.core.shapes import UNTURNED, Box, Capsule, Cylinder, Hull, Shape
 from gaplab.services.core.world import Body, Inertia, World
 
@@ -91,24 +91,21 @@ def _inertia_matrix(world: World) -> FloatArray:
     start = np.array([[0.0, 0.0, 0.0, *world.start_turn]])
     positions, turns = (each[0] for each in body_poses(world, start, np.array([[each.start for each in world.joints]])))
     places = {body.name: place for place, body in enumerate(world.bodies)}
-    carriers = {joint.child: number for number, joint in enumerate(world.joints)}
     total = np.diag([0.0] * 6 + [joint.armature for joint in world.joints])
     for place, body in enumerate(world.bodies):
         center = positions[place] + rotated(turns[place], np.array(body.center_m))
         moving, turning = np.zeros((3, len(total))), np.zeros((3, len(total)))
         moving[:, :3] = turning[:, 3:6] = np.eye(3)
         moving[:, 3:6] = np.cross(np.eye(3), center - positions[0]).T
-        name = body.name
-        while name in carriers:
-            number = carriers[name]
-            joint, child = world.joints[number], places[name]
+        for number in chain(world, body.name):
+            joint = world.joints[number]
+            child = places[joint.child]
             axis = rotated(turns[child], np.array(joint.axis))
             if joint.slides:
                 moving[:, 6 + number] = axis
             else:
                 turning[:, 6 + number] = axis
                 moving[:, 6 + number] = np.cross(axis, center - positions[child])
-            name = joint.parent
         inertia = inertia_of(body)
         frame = turns[place] if inertia.turn == UNTURNED else product(turns[place], np.array(inertia.turn))
         axes = rotated(frame, np.eye(3)).T

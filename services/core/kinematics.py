@@ -35,24 +35,26 @@ def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple
 
 
 def observed_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> FloatArray:
-    """Return `(k, 7)`: poses of the body whose motion is the trajectory.
+    """Return `(k, 7)`: poses of the body whose motion is the trajectory; arguments are as of `body_poses`.
 
-    Args:
-        world: bodies and joints.
-        poses: `(k, 7)`: poses of the base.
-        angles_rad: `(k, joints)`, in the world's order; not read if the base is observed.
+    Angles are not read if the base is observed.
     """
     if observes_base(world):
         return poses
-    carriers = {joint.child: place for place, joint in enumerate(world.joints)}
-    chain, name = [], world.observed
-    while name in carriers:
-        chain.append(carriers[name])
-        name = world.joints[chain[-1]].parent
     position, turn = poses[:, :3], poses[:, 3:]
-    for place in reversed(chain):
+    for place in reversed(chain(world, world.observed)):
         position, turn = _carried(world.joints[place], position, turn, angles_rad[:, place])
     return np.hstack([position, turn])
+
+
+def chain(world: World, body: str) -> list[int]:
+    """Return the numbers of the joints that carry a body, from its own to the one at the base."""
+    carriers = {joint.child: number for number, joint in enumerate(world.joints)}
+    found: list[int] = []
+    while body in carriers:
+        found.append(carriers[body])
+        body = world.joints[found[-1]].parent
+    return found
 
 
 def observes_base(world: World) -> bool:
@@ -95,9 +97,7 @@ def _carried(joint: Joint, position: FloatArray, turn: FloatArray, angles: Float
 def lowest_m(world: World, turn: FloatArray) -> float:
     """Return the height of the lowest point that touches the ground, at the start, above the frame of the base.
 
-    Args:
-        world: bodies and joints.
-        turn: `(4,)`: rotation of the base.
+    The base has the rotation `turn`, `(4,)`.
     """
     pose = np.array([[0.0, 0.0, 0.0, *turn]])
     positions, turns = body_poses(world, pose, np.array([[joint.start for joint in world.joints]]))

@@ -17,25 +17,16 @@ def sample_violations(sample: KnownSample, robot: Robot) -> Iterator[Violation]:
 
 
 def unit_violations(robot: str, unit: str | None, own: str) -> Iterator[Violation]:
-    """Yield a unit that is not the robot's own.
-
-    Args:
-        robot: name of the robot.
-        unit: unit of the values; None if it is left out.
-        own: unit of the robot's fitness.
-    """
+    """Yield the unit of values that is not the robot's own; None if it is left out."""
     if unit is not None and unit != own:
         message = f"the fitness of the {robot} is in {own or 'no unit'}, not in {unit or 'no unit'}"
         yield Violation("/unit", unit, message, [own])
 
 
 def readings_violations(tables: Sequence[Table], repeats: int | None, sensors: Sensors) -> Iterator[Violation]:
-    """Yield readings of another shape than the sensors have.
+    """Yield readings, a table for each repeat, of another shape than the sensors have.
 
-    Args:
-        tables: readings of each repeat.
-        repeats: number of values; None if the measurement failed.
-        sensors: sensors of the robot.
+    The number of repeats is None if the measurement failed.
     """
     if repeats is None:
         yield Violation("/readings", "given", "a failed measurement has no readings", "left out")

@@ -82,13 +82,9 @@ class Tuning:
 
 
 def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str], space: Space) -> MisfitPoint:
-    """Return the misfit of an iteration, over the repetitions that have reached it.
+    """Return the misfit of an iteration, over the tunings of the repetitions that have reached it, maybe none.
 
-    Args:
-        iteration: number of the iteration.
-        tunings: tunings of the iteration, one for each of these repetitions; may be empty.
-        names: names of the p tunables.
-        space: bounds of the tunables.
+    Names and bounds are those of the p tunables.
     """
     parameters = np.array([each.parameters for each in tunings]).reshape(-1, space.size)
     widths = [each.interval[:, 1] - each.interval[:, 0] for each in tunings if each.interval is not None]
@@ -96,15 +92,12 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
     shares = _shares(widths, PRIOR_95 * space.extent), _shares(deviations, PRIOR_SD * space.extent)
     return MisfitPoint(
         iteration=iteration,
-        error=Distribution.model_validate(_distribution([each.error for each in tunings])),
-        expected_error=Distribution.model_validate(_distribution([each.expected for each in tunings])),
-        held_out_error=Distribution.model_validate(_distribution([each.error_on_held_out for each in tunings])),
-        gap=Distribution.model_validate(_distribution([abs(each.simulated - each.real) for each in tunings])),
+        error=_distribution([each.error for each in tunings]),
+        expected_error=_distribution([each.expected for each in tunings]),
+        held_out_error=_distribution([each.error_on_held_out for each in tunings]),
+        gap=_distribution([abs(each.simulated - each.real) for each in tunings]),
         tunables=tuple(
-            _tunable_distribution(
-                name, parameters[:, index], float(space.lower[index]), float(space.upper[index])
-            ).model_copy(update={"interval": shares[0][index], "posterior": shares[1][index]})
-            for index, name in enumerate(names)
+            map(_tunable_distribution, names, parameters.T, space.lower.tolist(), space.upper.tolist(), *shares)
         ),
     )
 
@@ -125,14 +118,21 @@ def remarks(points: Sequence[MisfitPoint], unit: str, error_unit: str | None = N
     return (_remaining(last, unit if error_unit is None else error_unit), *_gaps(first, last, unit), *stuck)
 
 
-def _tunable_distribution(name: str, values: FloatArray, lower: float, upper: float) -> TunableDistribution:
-    near = AT_BOUND * (upper - lower)
-    at_lower = float((values <= lower + near).mean()) if len(values) else None
-    at_upper = float((values >= upper - near).mean()) if len(values) else None
-    bounds = {"lower": lower, "upper": upper, "at_lower": at_lower, "at_upper": at_upper}
-    found = _distribution(values)
-    spread = None if found["sd"] is None else found["sd"] / (PRIOR_SD * (upper - lower))
-    return TunableDistribution.model_validate({"name": name, "spread": spread} | bounds | found)
+def _tunable_distribution(
+    name: str, values: FloatArray, lower: float, upper: float, interval: float | None, posterior: float | None
+) -> TunableDistribution:
+    near, found = AT_BOUND * (upper - lower), _distribution(values)
+    return TunableDistribution(
+        **found.model_dump(),
+        name=name,
+        lower=lower,
+        upper=upper,
+        at_lower=float((values <= lower + near).mean()) if len(values) else None,
+        at_upper=float((values >= upper - near).mean()) if len(values) else None,
+        spread=None if found.sd is None else found.sd / (PRIOR_SD * (upper - lower)),
+        interval=interval,
+        posterior=posterior,
+    )
 
 
 def _shares(found: Sequence[FloatArray], prior: FloatArray) -> list[float | None]:
@@ -140,19 +140,19 @@ def _shares(found: Sequence[FloatArray], prior: FloatArray) -> list[float | None
     return [None] * len(prior) if not found else [known(each) for each in np.mean(found, axis=0) / prior]
 
 
-def _distribution(values: Sequence[float] | FloatArray) -> dict[str, float | int | None]:
+def _distribution(values: Sequence[float] | FloatArray) -> Distribution:
     there = np.asarray(values, dtype=np.float64)
     there = there[np.isfinite(there)]
     with np.errstate(over="ignore", invalid="ignore"):
         mean = known(there.mean()) if len(there) else None
         sd = known((there - there.min()).std(ddof=1)) if len(there) > 1 else None  # exactly 0 if all are equal
-    return {
-        "n": len(there),
-        "mean": mean,
-        "sd": sd,
-        "least": float(there.min()) if len(there) else None,
-        "greatest": float(there.max()) if len(there) else None,
-    }
+    return Distribution(
+        n=len(there),
+        mean=mean,
+        sd=sd,
+        least=float(there.min()) if len(there) else None,
+        greatest=float(there.max()) if len(there) else None,
+    )
 
 
 def _remaining(point: MisfitPoint, unit: str) -> str:

@@ -52,13 +52,9 @@ def fitted(simulators: tuple[Simulator, ...], misfit: Misfit, space: Space, rng:
 
 
 def fit_of(best: Simulator, misfit: Misfit, space: Space, rng: Generator) -> Fit | None:
-    """Return how well a simulator reproduces the samples; None if the noise is unknown, or the physics fails around it.
+    """Return how well the best simulator reproduces the samples that it was tuned on, whose misfit this is.
 
-    Args:
-        best: the best simulator.
-        misfit: discrepancy from the samples that it was tuned on.
-        space: bounds of the tunables.
-        rng: random stream.
+    None if the noise is unknown, or the physics fails around it.
     """
     noise = misfit.noise
     if not noise:

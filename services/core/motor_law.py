@@ -33,13 +33,7 @@ class PDLaw(NamedTuple):
 
 
 def pd_law(motor: PDMotor, inverse_inertia: float, step_s: float) -> PDLaw:
-    """Return the law of a motor.
-
-    Args:
-        motor: motor.
-        inverse_inertia: acceleration of the joint by torque, 1/(kg m²): see `inverse_inertias`.
-        step_s: time step.
-    """
+    """Return the law of a motor of a joint with this inverse inertia, 1/(kg m²): see `inverse_inertias`."""
     kp, kd, strongest = motor.kp, motor.kd, motor.max_torque_nm
     if motor.follows == "torque":
         return PDLaw(0.0, 0.0, 1.0, strongest)

@@ -35,15 +35,10 @@ def stream_of(genome: Genome, purpose: str) -> Generator:
 
 
 def disturbed(world: World, motion: Motion | Loop, genome: Genome) -> Motion | Loop:
-    """Return the motion or the loop of a genome with the noise and the latency of a world.
+    """Return the motion or the loop of a genome `(g,)`, the address of the draws, with noise and latency of a world.
 
     A target is disturbed when it changes, and stays so until it changes again. A longer rollout has the same noise, and
     more of it.
-
-    Args:
-        world: robot and noise.
-        motion: what the genome `(g,)` describes.
-        genome: address of the draws.
     """
     if world.noise == QUIET:
         return motion

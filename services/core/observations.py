@@ -36,12 +36,7 @@ class Bearing:
 def observations(world: World, senses: Sequence[str], bearing: Bearing) -> FloatArray:
     """Return `(n, s)`: the groups that a controller observes, in its order, without noise.
 
-    A row depends on the same row of the bearing alone, to the last bit.
-
-    Args:
-        world: robot and ground.
-        senses: names of `GROUPS`.
-        bearing: what the engine knows.
+    A row depends on the same row of the bearing alone, to the last bit. Senses are names of `GROUPS`.
     """
     groups = [_GROUPS[name].look(world, bearing) for name in senses]
     return np.hstack([np.empty((len(bearing.poses), 0)), *groups])

@@ -122,7 +122,8 @@ def fault_of(plugin: type[Any], kind: str, folders: Iterable[Path]) -> str | Non
         kind: its kind, one of `KINDS`.
         folders: the plug-in folders; the place of an error in them is named.
     """
-    if missing := [name for name in dir(plugin) if _is_abstract(plugin, name)]:
+    members = ((name, getattr(plugin, name, None)) for name in dir(plugin))
+    if missing := [name for name, member in members if getattr(member, "__isabstractmethod__", False)]:
         return f"does not define {', '.join(missing)}"
     doing = "described"
     try:
@@ -135,10 +136,6 @@ def fault_of(plugin: type[Any], kind: str, folders: Iterable[Path]) -> str | Non
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
         return f"cannot be {doing}: {quoted(error, folders)}"
     return None
-
-
-def _is_abstract(plugin: type, name: str) -> bool:
-    return bool(getattr(getattr(plugin, name, None), "__isabstractmethod__", False))
 
 
 def _fault_of_name(plugin: type[Any], kind: str) -> str | None:
@@ -190,13 +187,9 @@ def given_names(options: type[BaseModel]) -> list[str]:
 
 
 def option_violation(name: str, options: type[BaseModel], error: Mapping[str, Any], pointer: str = "") -> Violation:
-    """Return the violation of an option that the model refuses.
+    """Return the violation of an option that the model of a plug-in's options refuses.
 
-    Args:
-        name: the plug-in's name.
-        options: model of its options.
-        error: an item of `ValidationError.errors()`.
-        pointer: place of the options in the spec.
+    The error is an item of `ValidationError.errors()`; the pointer is the place of the options in the spec.
     """
     place = pointer_to(error["loc"])
     if error["type"] == "extra_forbidden":

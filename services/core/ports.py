@@ -49,10 +49,7 @@ class Forecast(Protocol):
     def __call__(self, genome: Genome, parameters: Parameters, progress: Callable[[], None]) -> Safety:
         """Return the worst that simulators `(m, p)`, the best first, expect of the genome `(g,)`.
 
-        Args:
-            genome: controller to run.
-            parameters: simulators.
-            progress: called after each rollout.
+        After each rollout, `progress` is called.
         """
         ...
 

@@ -183,13 +183,9 @@ class Registry(Mapping[str, type[P]], Generic[P]):
 
 
 def _of_one_name(kind: str, name: str, files: list[str], owner: list[str]) -> Iterator[Unusable]:
-    """Yield for each file that its plug-in has the name of another.
+    """Yield for each file that its plug-in has the name of another; a file with several of them is there as often.
 
-    Args:
-        kind: kind of the plug-ins.
-        name: their name.
-        files: the file of each; one with several of them is here as often.
-        owner: "gaplab", if it has the name too.
+    The owner is "gaplab", if it has the name too.
     """
     for file in dict.fromkeys(files):
         others = [*owner, *(each for each in files if each != file), "another class in it"]

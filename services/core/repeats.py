@@ -26,20 +26,12 @@ def standard_error(values: FloatArray) -> float | None:
 def pooled_variance(repeated: Iterable[FloatArray]) -> float:
     """Return the variance of one value, pooled over measurements; 0 if none has repeats, or all repeats are equal.
 
-    It is pooled because two or three values say little about their own variance: a sample that happens to agree with
-    itself would silence all others.
-
-    Args:
-        repeated: values `(r,)` of each measurement.
+    It is pooled because two or three values `(r,)` say little about their own variance: a sample that happens to agree
+    with itself would silence all others.
     """
     shifted = [values - values[0] for values in repeated if len(values) > 1]
     freedom = sum(len(values) - 1 for values in shifted)
     return sum(float(((values - values.mean()) ** 2).sum()) for values in shifted) / freedom if freedom else 0.0
-
-
-def variance(samples: Sequence[Sample]) -> float:
-    """Return the variance of one value, pooled over samples, in the unit of fitness squared; 0 if none has repeats."""
-    return pooled_variance(sample.repeats for sample in samples)
 
 
 def variance_of_mean(samples: Sequence[Sample]) -> float:
@@ -48,7 +40,8 @@ def variance_of_mean(samples: Sequence[Sample]) -> float:
     A fitness is the mean of c values, and its squared error weighs c over the mean of all c. So every weighted error of
     the right simulator has the same variance: that of one value over the mean of all c.
     """
-    return variance(samples) / float(np.mean([count(sample) for sample in samples])) if samples else 0.0
+    variance = pooled_variance(sample.repeats for sample in samples)
+    return variance / float(np.mean([count(sample) for sample in samples])) if samples else 0.0
 
 
 def weights(samples: Sequence[Sample]) -> FloatArray | None:

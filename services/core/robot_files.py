@@ -77,17 +77,8 @@ class RobotFile(Frozen):
     @cached_property
     def content(self) -> dict[str, Any]:
         """The file as JSON values, without what has its default value."""
-        refs = {name: getattr(self, name).model_dump(mode="json") for name in ("usual_controller", "usual_task")}
-        source = {} if self.source is None else {"source": self.source.model_dump(mode="json")}
-        return {
-            "format_version": self.format_version,
-            "name": self.name,
-            **source,
-            **refs,
-            "lost": list(self.lost),
-            **({"comments": list(self.comments)} if self.comments else {}),
-            "world": _plain(self.world),
-        }
+        left_out = {"world"} | {name for name in ("source", "comments") if not getattr(self, name)}
+        return {**self.model_dump(mode="json", exclude=left_out), "world": _plain(self.world)}
 
     @cached_property
     def text(self) -> str:
@@ -107,7 +98,7 @@ def read_robot_file(text: str | bytes) -> RobotFile:
         InvalidSpec: with every violation; pointers are places in the file.
     """
     robot = stored_robot_file(text)
-    if violations := tuple(world_violations(robot.world, "/world")):
+    if violations := [each.moved("", "/world") for each in world_violations(robot.world)]:
         raise InvalidSpec(violations)
     return robot
 

@@ -42,8 +42,11 @@ def learn(texts: Iterable[str]) -> None:
     Raises:
         InvalidSpec: one is no robot file.
     """
-    for text in texts:
-        _remember(stored_robot_file(text))
+    for file in map(stored_robot_file, texts):
+        _known[file.sha256] = file
+        _known.move_to_end(file.sha256)
+        while len(_known) > MOST_KNOWN:
+            _known.popitem(last=False)
 
 
 def robot_file(sha256: str) -> RobotFile | None:
@@ -63,10 +66,3 @@ def needed_by(robot: PluginRef) -> tuple[str, ...]:
 def label_of(robot: PluginRef) -> str:
     """Return the name that people know a robot by."""
     return str(robot.options.get("name") or robot.name) if robot.name == IMPORTED else robot.name
-
-
-def _remember(file: RobotFile) -> None:
-    _known[file.sha256] = file
-    _known.move_to_end(file.sha256)
-    while len(_known) > MOST_KNOWN:
-        _known.popitem(last=False)

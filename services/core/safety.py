@@ -83,14 +83,7 @@ def recording_times(motion: Motion | Loop, world: World) -> FloatArray:
 
 
 def extremes(world: World, motion: Motion | Loop, recording: Recording, fitness: float) -> Extremes:
-    """Return the extremes of a rollout.
-
-    Args:
-        world: world of the rollout; its first body is the base.
-        motion: what drove it.
-        recording: rollout, recorded at every time step.
-        fitness: its fitness.
-    """
+    """Return the extremes of a rollout in a world, whose first body is the base, recorded at every time step."""
     poses = recording.poses
     if not (np.isfinite(fitness) and np.all(np.isfinite(poses))):
         return Extremes()
@@ -108,24 +101,19 @@ def extremes(world: World, motion: Motion | Loop, recording: Recording, fitness:
 
 
 def safety(rollouts: Sequence[Extremes], limits: LimitsSpec | None, engine: str) -> Safety:
-    """Return the worst of the rollouts of a controller in all simulators.
-
-    Args:
-        rollouts: extremes in each simulator.
-        limits: limits of the robot; None if the spec has none.
-        engine: name of the engine, for the words.
-    """
+    """Return the worst of the rollouts of a controller in all simulators; the name of the engine is for the words."""
     ran = [rollout for rollout in rollouts if np.isfinite(rollout.fitness)]
+    falls = sum(rollout.tilt > FALL_RAD for rollout in ran)
     worst = {limit.name: _worst(ran, limit.name, min if limit.least else max) for limit in LIMITS}
     return Safety(
         simulators=len(rollouts),
         failed=len(rollouts) - len(ran),
         **worst,
         clearance=_worst(ran, "clearance", min),
-        falls=sum(rollout.tilt > FALL_RAD for rollout in ran),
+        falls=falls,
         fitness_low=_worst(ran, "fitness", min),
         fitness_high=_worst(ran, "fitness", max),
-        beyond=tuple(_beyond(ran, limits)),
+        beyond=tuple(_beyond(ran, falls, limits)),
         unknown=tuple(_unknown(len(rollouts) - len(ran), len(rollouts), worst, limits, engine)),
     )
 
@@ -143,8 +131,7 @@ def expected(found: Safety, unit: str) -> Iterator[str]:
             yield f"{limit.words}: at {'least' if limit.least else 'most'} {value:.3g} {limit.unit}"
 
 
-def _beyond(ran: Sequence[Extremes], limits: LimitsSpec | None) -> list[str]:
-    falls = sum(rollout.tilt > FALL_RAD for rollout in ran)
+def _beyond(ran: Sequence[Extremes], falls: int, limits: LimitsSpec | None) -> list[str]:
     found = [f"it falls in {falls} of {len(ran)} simulators"] if falls and getattr(limits, "tilt", None) is None else []
     found += dict.fromkeys(sentence for rollout in ran for sentence in rollout.out_of_range)
     for limit in LIMITS:

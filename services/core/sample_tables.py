@@ -76,12 +76,7 @@ class FirstErrors:
 
 
 def read_samples(text: str, robot: Robot) -> SamplesRead:
-    """Return the samples of a table, or everything that is wrong with it.
-
-    Args:
-        text: content of the file.
-        robot: the robot that was measured.
-    """
+    """Return the samples of the text of a table, measured on this robot, or everything that is wrong with it."""
     rows = rows_of(lines_of(text))
     samples, errors = list[KnownSample](), FirstErrors()
     line, headings, broken = next(rows, CsvRow(1, []))

@@ -23,7 +23,7 @@ def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
     """Return the expected fitness: the mean over simulators, weighted by accuracy. Source: paper, section 2.
 
     Args:
-        fitnesses: `(n, m)`.
+        fitnesses: `(n, m)` of n genomes in m simulators.
         weights: `(m,)`, non-negative, summing to 1.
     """
     return _weighty(fitnesses, weights) @ weights
@@ -32,11 +32,9 @@ def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
 def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
     """Return the disagreement `(n,)`: the standard deviation over simulators, weighted by accuracy.
 
-    Source: paper, section 2, *Informative*.
+    Arguments are as of `weighted_mean`.
 
-    Args:
-        fitnesses: `(n, m)` of n genomes in m simulators.
-        weights: `(m,)`, non-negative, summing to 1.
+    Source: paper, section 2, *Informative*.
     """
     deviations = _weighty(fitnesses, weights) - weighted_mean(fitnesses, weights)[:, None]
     return np.sqrt(deviations**2 @ weights)

@@ -85,10 +85,7 @@ class Subject:
 def check(subject: Subject, optimizer: Optimizer, effort: Effort) -> tuple[Sensitivity, ...]:
     """Return the effect of each tunable on fitness, in their order. Repeated checks give the same numbers.
 
-    Args:
-        subject: the simulation and its tunables.
-        optimizer: optimizer of the short evolutions.
-        effort: the size of the check.
+    The optimizer is that of the short evolutions.
     """
     genomes = controllers(subject, optimizer, effort.evaluations)
     values = np.linspace(subject.parameters.lower, subject.parameters.upper, effort.points)

@@ -81,7 +81,8 @@ class Space:
         except (TypeError, ValueError):
             found = np.empty((0, 0))
         if found.shape != self.lower.shape:
-            raise PluginBroken(f"{source} returned {_brief(vector)}; permitted: one vector of {self.size} numbers")
+            brief = f"an array of shape {vector.shape}" if isinstance(vector, np.ndarray) else f"{vector!r:.100}"
+            raise PluginBroken(f"{source} returned {brief}; permitted: one vector of {self.size} numbers")
         inside = (self.lower <= found) & (found <= self.upper)  # false for nan
         if not inside.all():
             where = int(np.argmin(inside))
@@ -95,7 +96,3 @@ class Space:
         """Return the vectors `(..., g)` moved into the box: periodic coordinates wrap, the others clip."""
         wrapped = self.lower + np.mod(vectors - self.lower, self.extent)
         return np.minimum(np.maximum(np.where(self.periodic, wrapped, vectors), self.lower), self.upper)
-
-
-def _brief(value: object) -> str:
-    return f"an array of shape {value.shape}" if isinstance(value, np.ndarray) else f"{value!r:.100}"

@@ -62,11 +62,8 @@ def compare_paired(first: FloatArray, second: FloatArray) -> tuple[Test, Test]:
 def brown_forsythe(first: FloatArray, second: FloatArray) -> Test:
     """Return Brown and Forsythe's test of equal spread, which is Levene's with the median, between two groups.
 
-    It is also undefined if the distances from the median do not vary within a group, as those of two values.
-
-    Args:
-        first: `(n,)`; nan is ignored.
-        second: `(m,)`; nan is ignored.
+    It is also undefined if the distances from the median do not vary within a group, as those of two values. Arguments
+    are as of `compare`.
     """
     groups = [finite(first), finite(second)]
     if min(map(len, groups)) < 2 or all(constant(np.abs(each - np.median(each)), each) for each in groups):

@@ -42,7 +42,10 @@ def unlikely(trace: Trace, expected: Trace, alignment: Alignment) -> Iterator[st
     yield from _jump(trace.times_s[inside], trace.positions_m[inside], expected)
     seen = trace.at(np.clip(alignment.lag_s + expected.times_s, trace.times_s[0], trace.times_s[-1]))
     yield from _start(seen.positions_m[0, 2], expected.positions_m[0, 2], seen.orientations, expected.orientations)
-    far, wanted = (_farthest(positions) for positions in (seen.positions_m, expected.positions_m))
+    far, wanted = (
+        float(np.linalg.norm(positions_m[:, :2] - positions_m[0, :2], axis=1).max())
+        for positions_m in (seen.positions_m, expected.positions_m)
+    )
     if far > FARTHER * wanted + FARTHER_M:
         yield f"the base moves {far:.2g} m, and the simulators expect {wanted:.2g} m"
     if alignment.match is None or alignment.match >= (WEAKEST if alignment.after_rest else WEAK):
@@ -91,7 +94,3 @@ def _start(height_m: float, wanted_m: float, seen: FloatArray, wanted: FloatArra
     if angle > TILTED_RAD:
         what = "is z upwards, and is qw the last of the quaternion?"
         yield f"the base begins tilted by {np.degrees(angle):.0f}° from what the simulators expect: {what}"
-
-
-def _farthest(positions_m: FloatArray) -> float:
-    return float(np.linalg.norm(positions_m[:, :2] - positions_m[0, :2], axis=1).max())

@@ -83,9 +83,7 @@ def _unknown(line: int, units: Sequence[str]) -> Iterator[str]:
 def _table(rows: Iterable[CsvRow], places: Sequence[int]) -> tuple[list[list[float]], list[str]]:
     """Return the numbers of all poses, and what is wrong; nothing is read after `MOST_ERRORS`.
 
-    Args:
-        rows: the rows below the header.
-        places: place of each of `COLUMNS`.
+    Rows are those below the header, places those of `COLUMNS`.
     """
     numbers, errors = list[list[float]](), list[str]()
     for line, cells, error in rows:

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaplab.schemas.curves import CurvePoint
 from gaplab.schemas.reports import Trend
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import curve_point
@@ -60,7 +59,8 @@ def curve_end(recorded: FloatArray, last: int) -> CurveEnd:
         return CurveEnd(Trend.TOO_FEW, n, last)
     gains = [curve_point(start, recorded[:, last] - recorded[:, start]) for start in range(last)]
     latest = last - FEWEST_EVALUATIONS
-    without_gain = next((start + 1 for start in reversed(range(last)) if not _contains_zero(gains[start])), 0)
+    unsure = [gain.lower is not None and gain.upper is not None and gain.lower <= 0 <= gain.upper for gain in gains]
+    without_gain = next((start + 1 for start in reversed(range(last)) if not unsure[start]), 0)
     starts = range(without_gain, latest + 1)
     limit = SMALL * abs(curve_point(last, recorded[:, last]).mean or 0.0)
     flat = next((start for start in starts if (gains[start].upper or 0.0) < limit), None)
@@ -69,10 +69,6 @@ def curve_end(recorded: FloatArray, last: int) -> CurveEnd:
         return CurveEnd(Trend.TOO_FEW, gain.n, last)
     trend = Trend.FLAT if flat is not None else _direction(gain.lower, gain.upper)
     return CurveEnd(trend, gain.n, last, gain.evaluations, gain.mean, gain.lower, gain.upper)
-
-
-def _contains_zero(gain: CurvePoint) -> bool:
-    return gain.lower is not None and gain.upper is not None and gain.lower <= 0 <= gain.upper
 
 
 def _direction(lower: float, upper: float) -> Trend:

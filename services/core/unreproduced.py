@@ -21,31 +21,22 @@ SHOWN = 2
 """Sensors that are named, those with the largest differences."""
 
 
-def fits_of(tunings: Sequence[Tuning]) -> list[Fit]:
-    """Return the fits of tunings that know theirs."""
-    return [each.fit for each in tunings if each.fit is not None]
-
-
-def is_unreproduced(tunings: Sequence[Tuning]) -> bool:
-    """Return whether at least half of the repetitions that know say that no simulator reproduces their samples."""
-    surprised = [fit.surprise <= SURPRISING for fit in fits_of(tunings)]
-    return bool(surprised) and sum(surprised) >= OFTEN * len(surprised)
-
-
 def unreproduced(tunings: Sequence[Tuning], sensors: Sensors | None, unit: str) -> str:
     """Return that no simulator reproduces the samples, with numbers; "" if one does, or nobody knows.
+
+    At least half of the repetitions that know must say so.
 
     Args:
         tunings: the latest tuning of each repetition.
         sensors: of the robot; None if they are not known.
         unit: of errors.
     """
-    if not is_unreproduced(tunings):
+    fits = [each.fit for each in tunings if each.fit is not None]
+    said = sum(fit.surprise <= SURPRISING for fit in fits)
+    if not fits or said < OFTEN * len(fits):
         return ""
-    fits = fits_of(tunings)
     errors = [each.error for each in tunings if each.fit is not None]
     left = [each.expected for each in tunings if each.fit is not None]
-    said = sum(fit.surprise <= SURPRISING for fit in fits)
     of = f"{said} of {len(fits)} repetitions say so" if len(fits) > 1 else "by one repetition"
     return (
         f"no simulator reproduces the samples: the best err by {np.nanmean(errors):.2g} {unit} a sample, where noise "

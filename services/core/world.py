@@ -230,11 +230,7 @@ class World:
         return replace(self, **changes, origin=self.origin or self, edits=self.edits | {name})
 
     def built(self, in_place: frozenset[str]) -> "World":
-        """Return the world that an engine builds, in the default material, before it sets the other values in place.
-
-        Args:
-            in_place: names of the fields that the engine sets in place.
-        """
+        """Return the world that an engine builds, in the default material, before it sets the fields in place."""
         if self.origin is None:
             return self.kind
         return self.origin.kind if self.edits <= in_place else self._as_built

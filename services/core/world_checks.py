@@ -41,26 +41,21 @@ _Check = tuple[str, Any, bool, str]
 """The end of a pointer, the value, whether it is permitted, and what is permitted."""
 
 
-def world_violations(world: World, prefix: str = "") -> Iterator[Violation]:
-    """Return every reason why a world cannot be that of a robot.
-
-    Args:
-        world: world whose values have the types that its fields say.
-        prefix: place of the world, for pointers.
-    """
+def world_violations(world: World) -> Iterator[Violation]:
+    """Yield every reason why a world, whose values have the types that its fields say, cannot be that of a robot."""
     count = len(world.bodies)
     if not 1 <= count <= MOST_BODIES:
-        yield _violation(f"{prefix}/bodies", count, f"1 to {MOST_BODIES} bodies")
+        yield _violation("/bodies", count, f"1 to {MOST_BODIES} bodies")
         return
     for at, body in enumerate(world.bodies):
-        yield from _failed(f"{prefix}/bodies/{at}", _body_checks(body, world))
+        yield from _failed(f"/bodies/{at}", _body_checks(body, world))
     for at, joint in enumerate(world.joints):
-        yield from _failed(f"{prefix}/joints/{at}", _joint_checks(joint))
-    yield from _failed(prefix, _world_checks(world))
+        yield from _failed(f"/joints/{at}", _joint_checks(joint))
+    yield from _failed("", _world_checks(world))
     for at, (name, material) in enumerate(world.surfaces):
-        yield from _failed(f"{prefix}/surfaces/{at}", [_name_check("/0", name), *_material_checks(material, "/1")])
-    yield from _name_violations(world, prefix)
-    yield from _tree_violations(world, prefix)
+        yield from _failed(f"/surfaces/{at}", [_name_check("/0", name), *_material_checks(material, "/1")])
+    yield from _name_violations(world)
+    yield from _tree_violations(world)
 
 
 def _failed(place: str, checks: Iterable[_Check]) -> Iterator[Violation]:
@@ -183,19 +178,19 @@ def _is_unit(vector: Iterable[float]) -> bool:
     return abs(math.hypot(*vector) - 1) <= UNIT
 
 
-def _name_violations(world: World, prefix: str) -> Iterator[Violation]:
-    kinds: tuple[tuple[str, tuple[str, ...]], ...] = (
-        ("bodies", tuple(body.name for body in world.bodies)),
-        ("joints", tuple(joint.name for joint in world.joints)),
-        ("surfaces", tuple(name for name, _ in world.surfaces)),
-    )
-    for kind, names in kinds:
+def _name_violations(world: World) -> Iterator[Violation]:
+    kinds = {
+        "bodies": [body.name for body in world.bodies],
+        "joints": [joint.name for joint in world.joints],
+        "surfaces": [name for name, _ in world.surfaces],
+    }
+    for kind, names in kinds.items():
         for name, times in Counter(names).items():
             if times > 1:
-                yield _violation(f"{prefix}/{kind}", name, f"{kind} with unique names")
+                yield _violation(f"/{kind}", name, f"{kind} with unique names")
 
 
-def _tree_violations(world: World, prefix: str) -> Iterator[Violation]:
+def _tree_violations(world: World) -> Iterator[Violation]:
     """Return what keeps the joints from joining all bodies into one tree with the first body as its root."""
     names = {body.name for body in world.bodies}
     base = world.bodies[0].name
@@ -208,10 +203,10 @@ def _tree_violations(world: World, prefix: str) -> Iterator[Violation]:
     for at, joint in enumerate(world.joints):
         for field, good, permitted in rules:
             if not good(joint):
-                yield _violation(f"{prefix}/joints/{at}/{field}", getattr(joint, field), permitted)
+                yield _violation(f"/joints/{at}/{field}", getattr(joint, field), permitted)
     reached = {base}
     for _ in world.joints:
         reached |= {joint.child for joint in world.joints if joint.parent in reached}
     for at, body in enumerate(world.bodies):
         if body.name not in reached:
-            yield _violation(f"{prefix}/bodies/{at}", body.name, f"joined to the base {base!r} by joints")
+            yield _violation(f"/bodies/{at}", body.name, f"joined to the base {base!r} by joints")

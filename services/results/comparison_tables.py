@@ -1,13 +1,11 @@
 """Comparisons as tables that leave the service: CSV for programs, LaTeX for papers."""
 
-import csv
-import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from gaplab.schemas.comparison_columns import COLUMNS, UNPAIRED, row, shown_tests
 from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
-from gaplab.services.results.files import cell
+from gaplab.services.results.files import csv_text
 
 NAMES = {
     "student": "Student",
@@ -36,11 +34,7 @@ _SPECIAL = {
 
 def comparisons_csv(comparisons: Sequence[Comparison]) -> str:
     """Return a line for each pair, with every number of every test; an undefined number is empty."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(map(_cell, row(pair)) for pair in comparisons)
-    return text.getvalue()
+    return csv_text(COLUMNS, map(row, comparisons))
 
 
 def comparisons_latex(comparisons: Sequence[Comparison], unit: str) -> str:
@@ -117,10 +111,6 @@ def _table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> 
 def escaped(text: str) -> str:
     """Return a text whose signs LaTeX prints as they are."""
     return "".join(_SPECIAL.get(sign, sign) for sign in re.sub(r"\s+", " ", text))
-
-
-def _cell(value: object) -> object:
-    return cell(value) if isinstance(value, str) else value
 
 
 def _where(pair: Comparison) -> str:

@@ -138,10 +138,7 @@ def _direct(rows: Sequence[ExperimentRow]) -> list[ExperimentRow]:
 def warnings(first: ExperimentRow, second: ExperimentRow, hidden: Set[str]) -> Iterator[str]:
     """Yield why two experiments should not be compared: other robots, other tasks, or other realities.
 
-    Args:
-        first: an experiment.
-        second: another one.
-        hidden: ids of the experiments whose parameters of reality may not be shown yet.
+    The parameters of reality of the experiments with `hidden` ids may not be shown yet.
     """
     one, other = spec_of(first.spec), spec_of(second.spec)
     if one.robot != other.robot:

@@ -32,10 +32,11 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
         measured = tunings.measured(session, row)
     spec = spec_of(row.spec)
     space = parameters_of(spec.tunables)
-    samples = [measured.tuned_until(each.repetition, each.iteration) for each in found]
     discrepancy = discrepancy_of(row.spec)
-    pairs = zip(found, samples, strict=True)
-    errors = tuple(tunings.per_sample(each.squared_error, count, discrepancy) for each, count in pairs)
+    errors = tuple(
+        tunings.per_sample(each.squared_error, measured.tuned_until(each.repetition, each.iteration), discrepancy)
+        for each in found
+    )
     axes = [
         Coordinate("Iteration", tuple(float(each.iteration) for each in found)),
         *(

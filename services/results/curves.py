@@ -1,7 +1,5 @@
 """Curves of stored experiments, computed by the core."""
 
-import csv
-import io
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +9,7 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import best_of_searches, curve_points
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.results.files import cell
+from gaplab.services.results.files import csv_text
 from gaplab.services.specs.resolution import is_direct
 from gaplab.services.specs.robots import unit
 from gaplab.services.store.models import ExperimentRow
@@ -78,17 +76,14 @@ def curves_csv(curves: Sequence[Curve]) -> str:
 
     A text that a spreadsheet would take for a formula begins with an apostrophe. Numbers are numbers, also negative.
     """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(
-        (each.experiment, cell(each.name), cell(each.strategy), repetition, point.evaluations, value)
+    rows = (
+        (each.experiment, each.name, each.strategy, repetition, point.evaluations, value)
         for each in curves
         for point in each.points
         for repetition, value in enumerate(point.values)
         if value is not None
     )
-    return text.getvalue()
+    return csv_text(COLUMNS, rows)
 
 
 def values_of(

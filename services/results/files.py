@@ -1,5 +1,8 @@
 """Files that leave the service: texts of people in CSV, and entries of zips, the same bytes for the same content."""
 
+import csv
+import io
+from collections.abc import Iterable, Sequence
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipInfo
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -13,6 +16,15 @@ def cell(text: str) -> str:
     """
     lines = text.replace("\r\n", "\n").replace("\r", "\n")
     return f"'{lines}" if text.startswith(_FORMULA) else lines
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+    """Return a file of CSV, whose texts are as `cell` writes them; None is empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([cell(each) if isinstance(each, str) else each for each in row] for row in rows)
+    return text.getvalue()
 
 
 _EARLIEST = (1980, 1, 1, 0, 0, 0)

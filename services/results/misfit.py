@@ -1,10 +1,7 @@
 """The misfit of an experiment, from its stored simulators and measurements."""
 
-import csv
-import io
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from math import inf, nan
 from statistics import fmean
 from typing import Any
@@ -15,12 +12,15 @@ from gaplab.schemas.misfit import Distribution, MisfitRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.discrepancies import discrepancies
+from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.identification import Means, overfitting, verdicts
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.core.repeats import pooled_variance
+from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.unreproduced import unreproduced
+from gaplab.services.results.files import csv_text
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import installed_robot, unit
@@ -29,8 +29,7 @@ from gaplab.services.store.queries.tunings import BestSimulator, MeasuredIterati
 from gaplab.services.store.session import Store
 
 DISTRIBUTIONS = ("error", "expected_error", "held_out_error", "gap")
-STATISTICS = tuple(Distribution.model_fields)
-OF_A_TUNABLE = (*STATISTICS, "at_lower", "at_upper", "spread", "interval", "posterior")
+NUMBERS = (*Distribution.model_fields, "at_lower", "at_upper", "spread", "interval", "posterior")
 
 
 def misfit(store: Store, experiment_id: str) -> MisfitRead:
@@ -46,13 +45,12 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         members = tunings.posteriors(session, experiment_id)
         repeated = tunings.repeats(session, experiment_id)
     spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
+    robot = installed_robot(spec)
     posteriors = {place: _deviations(*found) for place, found in members.items()}
     by_iteration: dict[int, list[Tuning]] = defaultdict(list)
     for best in simulators:
         posterior = posteriors.get((best.repetition, best.iteration))
-        by_iteration[best.iteration].append(
-            replace(_tuning(best, measured, posterior, row.spec["tunables"]), discrepancy=discrepancy)
-        )
+        by_iteration[best.iteration].append(_tuning(best, measured, posterior, row.spec["tunables"], discrepancy))
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, by_iteration[iteration], names, parameters_of(spec.tunables))
@@ -62,7 +60,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
     unseen = overfitting(points[-1], error_unit) if points else ""
-    wrong = _unreproduced(row.id, spec, by_iteration[points[-1].iteration], error_unit) if points else ""
+    wrong = _unreproduced(row.id, robot, by_iteration[points[-1].iteration], error_unit) if points else ""
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
@@ -72,7 +70,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
-        verdicts=verdicts(points, samples, _means(spec), unreproduced=bool(wrong)),
+        verdicts=verdicts(points, samples, _means(spec, robot), unreproduced=bool(wrong)),
     )
 
 
@@ -82,25 +80,23 @@ def _known(measured: MeasuredIterations) -> str:
     return f"samples from before the experiment: {told}" if told else ""
 
 
-def _unreproduced(id: str, spec: ResolvedSpec, latest: Sequence[Tuning], error_unit: str) -> str:
-    robot = installed_robot(spec)
+def _unreproduced(id: str, robot: Robot | None, latest: Sequence[Tuning], error_unit: str) -> str:
     found = unreproduced(latest, None if robot is None else robot.sensors, error_unit)
     return f"{found}. `gaplab try-tunables {id}` tries further tunables, and `search`" if found else ""
 
 
 def misfit_csv(found: MisfitRead) -> str:
     """Return a line for each iteration and each number over repetitions; an undefined number is empty."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("iteration", "what", *OF_A_TUNABLE))
-    for point in found.points:
-        for name in DISTRIBUTIONS:
-            numbers = getattr(point, name)
-            blanks = [None] * (len(OF_A_TUNABLE) - len(STATISTICS))
-            writer.writerow((point.iteration, name, *(getattr(numbers, each) for each in STATISTICS), *blanks))
-        for tunable in point.tunables:
-            writer.writerow((point.iteration, tunable.name, *(getattr(tunable, each) for each in OF_A_TUNABLE)))
-    return text.getvalue()
+    named = (
+        (point.iteration, name, numbers)
+        for point in found.points
+        for name, numbers in (
+            *((name, getattr(point, name)) for name in DISTRIBUTIONS),
+            *((tunable.name, tunable) for tunable in point.tunables),
+        )
+    )
+    rows = ((at, name, *(getattr(numbers, each, None) for each in NUMBERS)) for at, name, numbers in named)
+    return csv_text(("iteration", "what", *NUMBERS), rows)
 
 
 def _tuning(
@@ -108,6 +104,7 @@ def _tuning(
     measured: MeasuredIterations,
     posterior: FloatArray | None,
     tunables: Sequence[Mapping[str, Any]],
+    discrepancy: Discrepancy,
 ) -> Tuning:
     place = best.repetition, best.iteration
     return Tuning(
@@ -120,6 +117,7 @@ def _tuning(
         held_out=measured.tested_until(*place),
         interval=tunings.intervals(best.parameters, best.lower, best.upper, best.fit, tunables),
         posterior=posterior,
+        discrepancy=discrepancy,
         fit=best.fit,
     )
 
@@ -139,10 +137,9 @@ def _deviations(members: list[list[float]], weights: list[float]) -> FloatArray 
     return frozen(np.sqrt(np.average((values - mean) ** 2, axis=0, weights=weights)))
 
 
-def _means(spec: ResolvedSpec) -> Means:
+def _means(spec: ResolvedSpec, robot: Robot | None) -> Means:
     """Return what the experiment has not used: readings that its robot has, and tuners with intervals."""
     sensing = spec.discrepancy.name in discrepancies and discrepancies[spec.discrepancy.name].senses
-    robot = installed_robot(spec)
     has_sensors = robot is not None and robot.sensors.size > 0
     certain = spec.tuner.name in tuners and tuners[spec.tuner.name].intervals
     return Means(

@@ -7,18 +7,17 @@ import numpy as np
 
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.toy import ToyIteration, ToySample, ToyTransfer, Values
-from gaplab.services.core.arrays import FloatArray
+from gaplab.schemas.toy import ToyIteration, ToySample, ToyTransfer
+from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
 from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.experiments import hiding
 from gaplab.services.figures.words import titled
-from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
+from gaplab.services.specs.assembly import reality_of, simulation_of
 from gaplab.services.specs.resolution import is_direct
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays, results
 from gaplab.services.store.queries.replays import MeasuredController
@@ -72,10 +71,8 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
     _refuse_outside("repetition", [repetition], row.spec["repetitions"])
     _refuse_outside("iteration", iterations, row.iterations)
     measured = results.page_of_samples(session, row.id, repetition=repetition, kind=None, limit=MOST_ROWS, cursor=None)
-    simulators = results.page_of_simulators(
-        session, row, repetition=repetition, iteration=None, limit=MOST_ROWS, cursor=None
-    )
-    simulators = () if is_direct(spec) else simulators
+    page = results.page_of_simulators(session, row, repetition=repetition, iteration=None, limit=MOST_ROWS, cursor=None)
+    simulators = () if is_direct(spec) else page
     wanted = iterations or [max((each.iteration for each in simulators), default=0)]
     return _Stored(
         row=row,
@@ -109,8 +106,7 @@ def _truth(found: _Stored, genes: FloatArray) -> FloatArray | None:
 def _approximations(found: _Stored, simulators: Sequence[SimulatorRead], genes: FloatArray) -> FloatArray:
     if not simulators:
         return np.empty((0, len(genes)))
-    edits = edits_of(ref.name for ref in found.spec.tunables)
-    simulate = Simulation(found.robot, engine_of(found.spec.engine), edits)
+    simulate = simulation_of(found.spec, found.robot)
     return simulate(genes[:, None], np.array([list(each.parameters.values()) for each in simulators])).T
 
 
@@ -141,8 +137,8 @@ def _toy(
         iteration=iteration,
         unit=found.robot.unit,
         genes=tuple(genes.tolist()),
-        truth=None if truth is None else _values(truth),
-        approximations=tuple(map(_values, _approximations(found, simulators, genes))),
+        truth=None if truth is None else tuple(map(known, truth.tolist())),
+        approximations=tuple(tuple(map(known, each)) for each in _approximations(found, simulators, genes).tolist()),
         squared_error=best and best.squared_error,
         squares=discrepancy_of(found.row.spec).squares,
         error=best and best.error,
@@ -152,7 +148,3 @@ def _toy(
         transfer=transfer and ToyTransfer(gene=transfer.genome[0], simulated=transfer.simulated, real=transfer.real),
         limits=limits,
     )
-
-
-def _values(function: FloatArray) -> Values:
-    return tuple(each if np.isfinite(each) else None for each in function.tolist())

@@ -34,12 +34,7 @@ from gaplab.services.specs.simulation import Simulation
 
 
 class HiddenReality:
-    """A simulation with hidden parameters.
-
-    Args:
-        simulation: the simulation on reality's engine.
-        parameters: `(p,)`, the hidden parameters.
-    """
+    """A simulation on reality's engine, with hidden parameters `(p,)`."""
 
     def __init__(self, simulation: Simulation, parameters: FloatArray) -> None:
         self._simulation = simulation
@@ -75,15 +70,10 @@ class EvolutionInReality(HiddenReality):
 
 
 def setting(spec: ResolvedSpec, repetition: int) -> Setting:
-    """Return the setting of one repetition.
-
-    Args:
-        spec: spec of the experiment.
-        repetition: the number of the repetition, from 0.
-    """
+    """Return the setting of a repetition of an experiment, by its number, from 0."""
     robot = robot_of(spec)
     strategy = strategies.create(spec.strategy)
-    engine, simulation = engine_of(spec.engine), _simulation(spec, robot)
+    engine, simulation = engine_of(spec.engine), simulation_of(spec, robot)
     simulate, reality = _realities(spec, robot, simulation, in_reality=strategy.in_reality)
     return Setting(
         simulate=simulate,
@@ -118,14 +108,15 @@ def simulated(spec: ResolvedSpec) -> tuple[Simulate, Sense]:
     So a process that only simulates opens no hardware.
     """
     robot = robot_of(spec)
-    simulation = _simulation(spec, robot)
+    simulation = simulation_of(spec, robot)
     if not strategies[spec.strategy.name].in_reality:
         return simulation, simulation.sense
     assert hardware_of(spec) is None, "a strategy that evolves in reality is refused for hardware"
     return _realities(spec, robot, simulation, in_reality=True)[0], simulation.sense
 
 
-def _simulation(spec: ResolvedSpec, robot: Robot) -> Simulation:
+def simulation_of(spec: ResolvedSpec | Checked, robot: Robot) -> Simulation:
+    """Return the simulation of a robot on the engine of a spec, in simulators of its tunables."""
     return Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
 
 
@@ -142,9 +133,8 @@ def _realities(
 def subject(checked: Checked) -> Subject:
     """Return what a sensitivity check simulates."""
     robot = robot_of(checked)
-    edits = edits_of(ref.name for ref in checked.tunables)
     return Subject(
-        simulate=Simulation(robot, engine_of(checked.engine), edits),
+        simulate=simulation_of(checked, robot),
         genomes=robot.space,
         known=robot.known,
         parameters=parameters_of(checked.tunables),
@@ -155,9 +145,8 @@ def subject(checked: Checked) -> Subject:
 def reality_of(spec: ResolvedSpec, robot: Robot) -> tuple[FloatArray, Simulation]:
     """Return the hidden parameters `(p,)` of a simulated reality, and the simulation on its engine."""
     assert spec.reality.engine is not None, "a physical reality has no engine"
-    edits = edits_of(spec.reality.parameters)
     truth = np.array(list(spec.reality.parameters.values()))
-    return truth, Simulation(robot, engine_of(spec.reality.engine), edits)
+    return truth, Simulation(robot, engine_of(spec.reality.engine), edits_of(spec.reality.parameters))
 
 
 def edits_of(names: Iterable[str]) -> list[Tunable]:
@@ -170,11 +159,7 @@ def edits_of(names: Iterable[str]) -> list[Tunable]:
 
 
 def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
-    """Check that the plug-ins that a stored spec simulates with are installed here.
-
-    Args:
-        spec: spec of the experiment.
-        reality: also check the plug-ins of reality.
+    """Check that the plug-ins that a stored spec simulates with, or also those of reality, are installed here.
 
     Raises:
         InvalidSpec: a plug-in is missing; perhaps its file was removed.

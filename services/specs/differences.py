@@ -118,11 +118,7 @@ def _differs(values: Sequence[Values]) -> bool:
 
 
 def _is_hidden(path: Path, cell: Values) -> bool:
-    return _is_parameter(path) and None in cell
-
-
-def _is_parameter(path: Path) -> bool:
-    return path[:2] == ("reality", "parameters")
+    return path[:2] == ("reality", "parameters") and None in cell
 
 
 def _order(path: Path) -> tuple[int, Path]:

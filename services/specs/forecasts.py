@@ -1,46 +1,24 @@
 """The safety forecast of a spec: what the believed simulators expect of a controller before a robot runs it."""
 
 from collections.abc import Callable
-from typing import Protocol
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.safety import Safety
 from gaplab.services.core.arrays import FloatArray, Genome, Parameters
-from gaplab.services.core.motions import Recording
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.safety import MOST_SIMULATORS, Extremes, extremes, recording_times, safety
-from gaplab.services.core.world import World
-
-
-class RecordsRollouts(Protocol):
-    """A simulation that records rollouts."""
-
-    def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
-        """Return the world of a simulator `(p,)`, and the recorded rollout of a genome `(g,)` in it."""
-        ...
+from gaplab.services.specs.simulation import Simulation
 
 
 class SafetyForecast:
-    """The safety forecast of an experiment with a physical robot.
+    """The safety forecast of an experiment with a physical robot, which has a body."""
 
-    Args:
-        spec: spec of the experiment.
-        robot: its robot, which has a body.
-        simulation: simulation of the robot.
-    """
-
-    def __init__(self, spec: ResolvedSpec, robot: Robot, simulation: RecordsRollouts) -> None:
+    def __init__(self, spec: ResolvedSpec, robot: Robot, simulation: Simulation) -> None:
         self._limits, self._engine = spec.reality.limits, spec.engine.name
         self._robot, self._simulation = robot, simulation
 
     def __call__(self, genome: Genome, parameters: Parameters, progress: Callable[[], None] = lambda: None) -> Safety:
-        """Return what simulators `(m, p)`, the best first, expect of a genome `(g,)`; the first 20 are asked.
-
-        Args:
-            genome: controller to run.
-            parameters: simulators.
-            progress: called after each rollout.
-        """
+        """Return what simulators `(m, p)`, the best first, expect of a genome `(g,)`; the first 20 are asked."""
         rollouts, errors = list[Extremes](), set[str]()
         for simulator in parameters[:MOST_SIMULATORS]:
             try:
@@ -59,7 +37,7 @@ class SafetyForecast:
         return extremes(world, motion, recording, float(self._robot.fitness(recording.trajectory)))
 
 
-def forecast_of(spec: ResolvedSpec, robot: Robot, simulation: RecordsRollouts) -> SafetyForecast | None:
+def forecast_of(spec: ResolvedSpec, robot: Robot, simulation: Simulation) -> SafetyForecast | None:
     """Return the forecast of a spec; None if its reality is simulated, or its robot has no body."""
     if spec.reality.kind != "physical" or not robot.world.bodies:
         return None

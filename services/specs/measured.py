@@ -51,12 +51,7 @@ def lack_violations(
 ) -> Iterator[Violation]:
     """Yield that measured values, as of `outcome_of`, lack what the discrepancy compares: every simulator would fit.
 
-    Args:
-        discrepancy: of the experiment.
-        sensors: of the robot.
-        values: fitness of each repeat.
-        readings: `(r, times, sensors)`, or None.
-        remedy: what to do.
+    The remedy says what to do.
     """
     if not (discrepancy.senses and sensors.size):
         return
@@ -94,9 +89,6 @@ def samples_of(spec: ResolvedSpec) -> tuple[Sample, ...]:
     return tuple(found)
 
 
-_REMEDY = "give the readings of each value in `readings`"
-
-
 def bench_violations(spec: ExperimentSpec, robot: Robot, discrepancy: Discrepancy) -> Iterator[Violation]:
     """Yield limits that nothing can check, a refusal without limits, and samples that cannot be, or teach nothing."""
     if spec.reality.kind != "physical":
@@ -104,7 +96,8 @@ def bench_violations(spec: ExperimentSpec, robot: Robot, discrepancy: Discrepanc
     yield from _limit_violations(spec, robot)
     for place, sample in enumerate(spec.reality.samples):
         found = list(sample_violations(sample, robot))
-        lacks = lack_violations(discrepancy, robot.sensors, sample.values, sample.readings, _REMEDY)
+        remedy = "give the readings of each value in `readings`"
+        lacks = lack_violations(discrepancy, robot.sensors, sample.values, sample.readings, remedy)
         for violation in found or lacks:
             yield violation.moved("", f"/reality/samples/{place}")
 

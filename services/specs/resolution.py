@@ -33,7 +33,6 @@ from gaplab.services.specs.realities import completed, physical_reality, simulat
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.tunables import shared_fields, with_bounds, with_usual_tunables
 from gaplab.services.specs.violations import (
-    Searches,
     budget_violations,
     engine_violations,
     reality_violations,
@@ -78,7 +77,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, robot, simulated=engine, engine=reality_engine),
         *bench_violations(spec, robot, discrepancy),
-        *budget_violations(budget, strategy, len(spec.tunables), Searches(controllers, simulators, tuner, divisor)),
+        *budget_violations(budget, strategy, len(spec.tunables), (controllers, simulators), tuner, divisor),
     ]:
         raise InvalidSpec(violations)
     return ResolvedSpec(

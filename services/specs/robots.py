@@ -3,10 +3,13 @@
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
-from typing import Protocol
+from typing import TypeAlias
 
 from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.results import SensorsRead
+from gaplab.schemas.sensitivity import Checked
+from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core import external_plugins, robot_library
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, gather
@@ -16,25 +19,6 @@ from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.tasks import tasks
 
 
-class NamesARobot(Protocol):
-    """A spec, or the subject of a sensitivity check."""
-
-    @property
-    def robot(self) -> PluginRef:
-        """Return the robot."""
-        ...
-
-    @property
-    def controller(self) -> PluginRef | None:
-        """Return the controller; None for the robot's own."""
-        ...
-
-    @property
-    def task(self) -> PluginRef | None:
-        """Return the task; None for the robot's own."""
-        ...
-
-
 @dataclass(frozen=True)
 class Driven:
     """A robot with a controller and a task; None for its own."""
@@ -42,6 +26,10 @@ class Driven:
     robot: PluginRef
     controller: PluginRef | None = None
     task: PluginRef | None = None
+
+
+NamesARobot: TypeAlias = Driven | ExperimentSpec | ResolvedSpec | Checked
+"""A robot with what drives and rates it, a spec, or the subject of a sensitivity check."""
 
 
 def robot_of(spec: NamesARobot) -> Robot:

@@ -25,7 +25,7 @@ ALONE = ("name", "preset")
 
 def experiment_spec(stored: Stored) -> SpecRead:
     """Return the spec of an experiment from its stored spec; null parameters of reality are left out."""
-    return SpecRead(spec=_shortest(_complete(spec_of(stored))), resolved=(dict(stored),), remarks=_hidden([stored]))
+    return SpecRead(spec=_shortest(spec_of(stored)), resolved=(dict(stored),), remarks=_hidden([stored]))
 
 
 def study_spec(name: str, stored: Sequence[Stored]) -> SpecRead:
@@ -39,8 +39,8 @@ def study_spec(name: str, stored: Sequence[Stored]) -> SpecRead:
         return SpecRead(spec=None, resolved=(), remarks=("the study has no experiments",))
     size, wanted = _common_size(specs)
     base = max(wanted, key=lambda spec: (takes_samples(spec), not is_direct(spec)))
-    strategies = [_shortest(_complete(spec), within="strategy")["strategy"] for spec in wanted]
-    shared = {field: value for field, value in _shortest(_complete(base)).items() if field not in {"name", "strategy"}}
+    strategies = [_shortest(spec, within="strategy")["strategy"] for spec in wanted]
+    shared = {field: value for field, value in _shortest(base).items() if field not in {"name", "strategy"}}
     spec = ({"name": name} if name != "study" else {}) | {"strategies": strategies} | shared | size
     remarks, is_given = _hidden(stored), _gives(spec, wanted, hidden=bool(_hidden(stored)))
     if not is_given:
@@ -79,34 +79,28 @@ def _gives(spec: Spec, wanted: Sequence[ResolvedSpec], *, hidden: bool) -> bool:
     ]
 
 
-def _complete(spec: ResolvedSpec) -> Spec:
-    return spec.model_dump(mode="json", exclude=SCHEDULE)
-
-
-def _shortest(complete: Spec, within: str | None = None) -> Spec:
+def _shortest(spec: ResolvedSpec, within: str | None = None) -> Spec:
     """Return the spec without the fields whose absence changes nothing; complete if it cannot be resolved here.
 
-    Args:
-        complete: spec of an experiment.
-        within: shorten this field only; left out: all fields.
+    With `within`, that field alone is shortened.
     """
-    try:
-        target = _resolved(complete)
-    except (GaplabError, ValueError):
+    complete = spec.model_dump(mode="json", exclude=SCHEDULE)
+    target = _resolved(complete)
+    if target is None:
         return complete
 
     def same(spec: Spec) -> bool:
-        try:
-            return _resolved(spec) == target
-        except (GaplabError, ValueError):
-            return False
+        return _resolved(spec) == target
 
     short = _bare(_without_defaults(complete, same, within))
     return short if same(short) else complete
 
 
-def _resolved(spec: Spec) -> ResolvedSpec:
-    return resolve_experiment(ExperimentSpec.model_validate(spec))
+def _resolved(spec: Spec) -> ResolvedSpec | None:
+    try:
+        return resolve_experiment(ExperimentSpec.model_validate(spec))
+    except (GaplabError, ValueError):
+        return None
 
 
 def _without_defaults(spec: Spec, same: Callable[[Spec], bool], within: str | None) -> Spec:

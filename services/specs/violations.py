@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 from gaplab.schemas.mistakes import pointer_to
 from gaplab.schemas.plugin import TunableRef
@@ -27,10 +26,7 @@ from gaplab.services.specs.tunables import bounds_of, honoured
 def tunable_violations(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> Iterator[Violation]:
     """Yield tunables that are unknown, repeated, or of what the robot lacks or the engine ignores; bounds out of range.
 
-    Args:
-        spec: as submitted.
-        robot: that it names.
-        engine: of the simulators.
+    The engine is that of the simulators.
     """
     counts = Counter(proper(ref.name) for ref in spec.tunables)
     for index, ref in enumerate(spec.tunables):
@@ -81,9 +77,7 @@ def strategy_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) 
 def engine_violations(robot: Robot, places: Mapping[type[Engine], str]) -> Iterator[Violation]:
     """Yield what the robot's world uses and an engine does not honour, and a loop that an engine does not close.
 
-    Args:
-        robot: driven and rated.
-        places: the engines, each with its place in the spec.
+    Each engine has its place in the spec.
     """
     able = {name: each for name, each in engines.items() if runs(each, robot.world)}
     for engine, pointer in places.items():
@@ -133,12 +127,7 @@ def reality_violations(
 ) -> Iterator[Violation]:
     """Yield parameters of reality that are unknown, out of range, or ignored by its engine; direct use of hardware.
 
-    Args:
-        spec: as submitted.
-        strategy: that it names.
-        robot: likewise.
-        simulated: engine of the simulators.
-        engine: of reality.
+    `simulated` is the engine of the simulators, `engine` that of reality.
     """
     if spec.reality.kind == "physical":
         yield from _physical_violations(spec, strategy)
@@ -178,24 +167,13 @@ def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[V
         yield Violation("/reality/probes", reality.probes, message, ["each", "last"])
 
 
-class Searches(NamedTuple):
-    """What the searches of a spec are made with.
-
-    Attributes:
-        controllers: optimizer of controllers.
-        simulators: optimizer of simulators, if the tuner uses one.
-        tuner: finds simulators.
-        divisor: number that divides the evaluations of the last tuning.
-    """
-
-    controllers: Optimizer
-    simulators: Optimizer
-    tuner: Tuner
-    divisor: int
-
-
 def budget_violations(
-    budget: ResolvedBudget, strategy: Strategy, tunables: int, searches: Searches
+    budget: ResolvedBudget,
+    strategy: Strategy,
+    tunables: int,
+    optimizers: tuple[Optimizer, Optimizer],
+    tuner: Tuner,
+    divisor: int,
 ) -> Iterator[Violation]:
     """Yield searches whose budget is smaller than what they begin with: of most, a population.
 
@@ -203,9 +181,12 @@ def budget_violations(
         budget: with every number.
         strategy: selects and transfers.
         tunables: number of tunables.
-        searches: optimizers, and what divides their evaluations.
+        optimizers: of controllers, and of simulators, if the tuner uses one.
+        tuner: finds simulators.
+        divisor: number that divides the evaluations of the last tuning.
     """
-    least, shared = searches.controllers.least_evaluations, strategy.equal_rollouts
+    of_controllers, of_simulators = optimizers
+    least, shared = of_controllers.least_evaluations, strategy.equal_rollouts
     transfer = strategy.transfer_simulators(tunables) if shared else 1
     needed = {"controller_evaluations": (budget.controller_evaluations, least, transfer, "simulators")}
     if strategy.searches and strategy.takes_samples:
@@ -214,8 +195,8 @@ def budget_violations(
     if strategy.tunes and strategy.takes_samples:
         needed["simulator_evaluations"] = (
             budget.simulator_evaluations,
-            searches.tuner.least_evaluations(searches.simulators, strategy.ensemble),
-            searches.divisor,
+            tuner.least_evaluations(of_simulators, strategy.ensemble),
+            divisor,
             "samples",
         )
     for name, (given, population, count, what) in needed.items():

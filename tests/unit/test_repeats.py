@@ -10,7 +10,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.repeats import mean, pooled_variance, standard_error, variance, variance_of_mean, weights
+from gaplab.services.core.repeats import mean, pooled_variance, standard_error, variance_of_mean, weights
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies.base import DiverseOptions
 from gaplab.services.core.tuners import tuners
@@ -40,9 +40,9 @@ def test_the_mean_of_equal_values_is_the_value_to_the_bit_and_they_have_no_sprea
 def test_noise_is_pooled_over_samples_with_repeats() -> None:
     samples = [sample(1.0, 3.0), sample(0.0, 0.0, 3.0), sample(9.0)]
 
-    assert variance(samples) == pytest.approx((2.0 + 6.0) / 3)
-    assert variance(samples) == pytest.approx(pooled_variance(each.repeats for each in samples))
-    assert variance([sample(9.0)]) == variance([]) == variance_of_mean([]) == 0.0
+    assert pooled_variance(each.repeats for each in samples) == pytest.approx((2.0 + 6.0) / 3)
+    assert variance_of_mean(samples) == pytest.approx((2.0 + 6.0) / 3 / 2)
+    assert variance_of_mean([sample(9.0)]) == variance_of_mean([]) == 0.0
     assert standard_error(frozen([1.0, 3.0])) == pytest.approx(1.0)
     assert standard_error(frozen([1.0])) is None
 

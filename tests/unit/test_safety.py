@@ -127,7 +127,8 @@ class _Broken:
 
 def test_a_forecast_that_fails_is_told_and_raises_nothing() -> None:
     spec = resolve_experiment(quadruped())
-    found = SafetyForecast(spec, ROBOT, _Broken())(ROBOT.known, np.ones((30, 3)))
+    broken: Any = _Broken()
+    found = SafetyForecast(spec, ROBOT, broken)(ROBOT.known, np.ones((30, 3)))
 
     assert (found.simulators, found.failed, found.beyond) == (20, 20, ())
     assert found.unknown[-1] == "ZeroDivisionError: the physics fell over"

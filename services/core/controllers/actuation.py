@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.kinematics import body_poses, rotated
+from gaplab.services.core.kinematics import body_poses, chain, rotated
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.world import Joint, PDMotor, World
 
@@ -63,20 +63,17 @@ class Limbs:
     @classmethod
     def of(cls, world: World) -> "Limbs":
         """Return the limbs of a robot."""
-        carriers = {joint.child: joint for joint in world.joints}
         starts = np.array([[joint.start for joint in world.joints]])
         positions, turns = body_poses(world, np.array([[0.0, 0, 0, *world.start_turn]]), starts)
         places = {body.name: place for place, body in enumerate(world.bodies)}
         roots: list[str] = []
         limb, depth, upward = [], [], []
         for actuator in world.actuators:
-            chain = [actuator]
-            while chain[-1].parent in carriers:
-                chain.append(carriers[chain[-1].parent])
-            root = chain[-1].child
+            carrying = [world.joints[number] for number in chain(world, actuator.child)]
+            root = carrying[-1].child
             roots += [] if root in roots else [root]
             limb.append(roots.index(root))
-            depth.append(sum(joint.motor is not None for joint in chain[1:]))
+            depth.append(sum(joint.motor is not None for joint in carrying[1:]))
             upward.append(float(rotated(turns[0, places[actuator.child]], np.array(actuator.axis))[2]))
         at_m = np.array([positions[0, places[root]] for root in roots]).reshape(-1, 3)
         return cls(np.array(limb, dtype=int), np.array(depth, dtype=int), at_m, frozen(upward))

@@ -37,10 +37,6 @@ class Scaling:
     """The scale of observations for a network: about 1 in usual motion.
 
     Angles count from the joint's start in units of its swing, speeds in 10 rad/s, turning in 5 rad/s.
-
-    Args:
-        world: robot.
-        senses: groups of observations.
     """
 
     def __init__(self, world: World, senses: Sequence[str]) -> None:

@@ -40,12 +40,7 @@ class Discrepancy(Plugin):
         raise NotImplementedError(f"{self.name} is no sum of squares")
 
     def noise(self, measured: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG002 - for those that know it
-        """Return the variance of a residual if the simulator is right; 0 if it is unknown.
-
-        Args:
-            measured: `(n, 1 + q)`: fitness and readings of n samples in reality.
-            times_s: `(q,)`: time of each reading, in seconds.
-        """
+        """Return the variance of a residual if the simulator is right; 0 if it is unknown; arguments as of `terms`."""
         return 0.0
 
     def floor(self, error: float) -> float:

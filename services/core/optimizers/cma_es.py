@@ -73,7 +73,8 @@ class CmaEs(Optimizer):
             return state.space.draw(self._size(state.space), rng)
         distribution = deepcopy(state.distribution)
         distribution.opts["randn"].rng = rng
-        return state.space.contain(_genomes(state.space, np.array(distribution.ask())))
+        scaled = np.array(distribution.ask())
+        return state.space.contain(state.space.lower + state.space.extent * scaled)
 
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> CmaEsState:
         """Return the state with the newcomers among the members, and the updated distribution."""
@@ -126,10 +127,6 @@ class Draws:
     def __call__(self, *shape: int) -> FloatArray:
         """Return standard normal numbers of a shape."""
         return self.rng.standard_normal(shape)
-
-
-def _genomes(space: Space, scaled: FloatArray) -> Genomes:
-    return space.lower + space.extent * scaled
 
 
 def _near(space: Space, genomes: Genomes, mean: FloatArray) -> FloatArray:

@@ -130,10 +130,7 @@ class Strategy(Plugin):
     def transfer(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the genome `(g,)` to transfer to reality, by default the fittest found in the best simulator.
 
-        Args:
-            belief: samples so far, and simulators tuned on them.
-            search: finds the controller that maximises a score; optional.
-            rng: random generator of the strategy; the search has its own.
+        Arguments are as of `select`.
         """
         return search(lambda _, fitnesses: fitnesses[:, 0], parameters=belief.parameters[:1])
 
@@ -175,6 +172,7 @@ class Untuned(Strategy):
 
 
 EnsembleSize = Annotated[int, Field(strict=True, ge=2, le=1_000)]
+Weight = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 
 
 class DiverseOptions(Frozen):

@@ -1,17 +1,15 @@
 """Try a controller that is expected to be fit and on which simulators disagree."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 from numpy.random import Generator
 from pydantic import Field
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
 from gaplab.services.core.scoring import weighted_deviation, weighted_mean, weights_of
-from gaplab.services.core.strategies.base import Diverse, DiverseOptions, Search
+from gaplab.services.core.strategies.base import Diverse, DiverseOptions, Search, Weight
 from gaplab.services.core.types import Belief
-
-Weight = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 
 
 class SimulatedFitAndInformativeOptions(DiverseOptions):

@@ -11,10 +11,8 @@ from pydantic import Field
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Outcomes, Parameters
 from gaplab.services.core.information import beside, fisher_information, log_determinant, moved, trace
 from gaplab.services.core.scoring import scaled_uniqueness_penalty, weighted_deviation, weighted_mean, weights_of
-from gaplab.services.core.strategies.base import Diverse, DiverseOptions, Search
+from gaplab.services.core.strategies.base import Diverse, DiverseOptions, Search, Weight
 from gaplab.services.core.types import Belief
-
-Weight = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 
 
 class WeightedOptions(DiverseOptions):
