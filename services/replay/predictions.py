@@ -11,9 +11,8 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.replay.sent_specs import SentSpec, received, sent
-from gaplab.services.specs.assembly import edits_of, engine_of, refuse_missing
+from gaplab.services.specs.assembly import refuse_missing, simulation_of
 from gaplab.services.specs.robots import robot_of, unit
-from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.queries.replays import TunedSample
 from gaplab.services.store.session import Store
@@ -95,7 +94,7 @@ def predict(spec: SentSpec, samples: Sequence[TunedSample], seconds: float) -> l
     """
     read = received(spec)
     robot = robot_of(read)
-    simulate = Simulation(robot, engine_of(read.engine), edits_of(ref.name for ref in read.tunables))
+    simulate = simulation_of(read, robot)
     found: list[Pair] = []
     until = monotonic() + seconds
     for sample in samples:

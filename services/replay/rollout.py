@@ -13,9 +13,8 @@ from gaplab.services.core.sensors import nearest
 from gaplab.services.core.world import World
 from gaplab.services.replay.sent_specs import SentSpec, received
 from gaplab.services.replay.shapes import extent_of, feet_of, framing_of, labels, observed_of, shapes_of
-from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
+from gaplab.services.specs.assembly import reality_of, simulation_of
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.specs.simulation import Simulation
 
 FRAMES_PER_S = 50
 LONGEST_S = 20.0
@@ -91,7 +90,7 @@ def compute_replay(request: ReplayRequest) -> bytes:
     times = np.arange(int(min(LONGEST_S, observed[-1]) * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S
     simulation = reality = readings = None
     if request.parameters is not None:
-        simulate = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
+        simulate = simulation_of(spec, robot)
         world, recording = simulate.record(genome, np.array(request.parameters), times)
         simulation = _shown(robot, spec.engine.name, world, recording, request.simulated)
         readings = simulate.sense(genome[None, :], np.array([request.parameters]))[0, 0, 1:]

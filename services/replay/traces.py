@@ -20,7 +20,7 @@ from gaplab.services.core.traces import Alignment, TooShort, Trace, align, place
 from gaplab.services.core.world import World
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.sent_specs import SentSpec, received, sent
-from gaplab.services.specs.assembly import edits_of, engine_of
+from gaplab.services.specs.assembly import simulation_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.models import AttachmentRow, ExperimentRow
@@ -85,7 +85,7 @@ def expected_motion(
     """Return what `expected_in` does, in a simulator of a spec."""
     spec = received(sent_spec)
     robot = robot_of(spec)
-    simulation = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
+    simulation = simulation_of(spec, robot)
     return expected_in(simulation, robot, np.array(genes), np.array(parameters))
 
 

@@ -9,9 +9,8 @@ from gaplab.services.core.world import World
 from gaplab.services.engines import engines
 from gaplab.services.engines.mujoco.plain import LOST, mjcf_of, plain_positions
 from gaplab.services.replay.sent_specs import SentSpec, received
-from gaplab.services.specs.assembly import edits_of, engine_of
+from gaplab.services.specs.assembly import simulation_of
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.specs.simulation import Simulation
 
 
 def tuned_mjcf(sent_spec: SentSpec, parameters: Sequence[float], headline: str) -> str:
@@ -33,5 +32,5 @@ def plain_motion(
 
 def _tuned(sent_spec: SentSpec, parameters: Sequence[float]) -> tuple[Robot, World]:
     spec = received(sent_spec)
-    robot, edits = robot_of(spec), edits_of(ref.name for ref in spec.tunables)
-    return robot, Simulation(robot, engine_of(spec.engine), edits).world(frozen(parameters))
+    robot = robot_of(spec)
+    return robot, simulation_of(spec, robot).world(frozen(parameters))
