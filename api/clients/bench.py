@@ -150,9 +150,19 @@ class Bench:
         body = {"counts": counts, "reason": reason, "operator": operator}
         return self._after(answer, "decision", body, dry_run=dry_run)
 
-    def reopen(self, id: str) -> RequestRead:
-        """Offer a request again that was taken too often without an answer."""
-        return self._connection.change(RequestRead, "POST", f"/requests/{segment(id)}/reopen")
+    def reopen(self, id: str, *, reason: str | None = None, operator: str | None = None) -> RequestRead:
+        """Offer a request again that was taken too often without an answer.
+
+        Args:
+            id: id of the request.
+            reason: why a take that goes on ends, like "her phone is dead"; left out: none is ended.
+            operator: who ends it.
+        """
+        path = f"/requests/{segment(id)}"
+        if reason is None:
+            return self._connection.change(RequestRead, "POST", f"{path}/reopen")
+        body = {"take": self.request(id).takes, "reason": reason, "operator": operator}
+        return self._connection.change(RequestRead, "POST", f"{path}/release", json=body)
 
     def attach(self, file: str | Path, media_type: str = "application/octet-stream") -> AttachmentRead:
         """Store a file, and return its hash, by which answers name it."""

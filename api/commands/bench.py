@@ -179,10 +179,18 @@ def decide(  # noqa: PLR0913, PLR0917 - each is an option of the command
 
 
 @app.command("reopen", rich_help_panel=BENCH)
-def reopen(id: RequestId, as_json: AsJson = False, url: Url = None) -> None:
-    """Offer a request again that was taken too often without an answer."""
+def reopen(
+    id: RequestId,
+    reason: Annotated[
+        str | None, typer.Option(help="why a take that goes on ends, like a dead phone", show_default=False)
+    ] = None,
+    operator: By = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Offer a request again that was taken too often without an answer; with a reason, one that somebody has taken."""
     with connect(url) as client:
-        found = client.bench.reopen(id)
+        found = client.bench.reopen(id, reason=reason, operator=operator)
     print_result(found, f"Request {found.id} is {found.state.value}.", as_json=as_json)
 
 

@@ -14,6 +14,9 @@ from gaplab import Client
 from gaplab.api.clients.progress import log
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
 from gaplab.api.commands.exit_codes import Exit
+from gaplab.schemas.measurements import TakeSpec
+from gaplab.services.bench import taking
+from gaplab.services.experiments.limits import FREELY
 from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.models import EventRow
 from gaplab.services.store.session import Store
@@ -187,6 +190,18 @@ def test_a_request_that_is_not_stuck_cannot_be_offered_again(sqlite_store: Store
 
     assert said.code != 0
     assert "open" in said.err
+
+
+def test_the_take_of_a_dead_phone_is_ended_with_a_reason(sqlite_store: Store, gaplab: Gaplab) -> None:
+    request = asked(sqlite_store, iterations=1)
+    taking.take(sqlite_store, request.id, TakeSpec(operator="Eve"), FREELY)
+
+    refused = gaplab("reopen", request.id)
+    said = gaplab("reopen", request.id, "--reason", "her phone is dead", "--operator", "Ada")
+
+    assert "taken, not stuck" in refused.err
+    assert "is open" in said.out
+    assert persons(sqlite_store) == {"released": "Ada"}
 
 
 @pytest.mark.release
