@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.kinematics import clearances_m
+from gaplab.services.core.kinematics import chain, clearances_m
 from gaplab.services.core.world import World
 
 CHECKED_S = 0.1
@@ -59,15 +59,12 @@ def _levers_m(world: World) -> FloatArray:
 
     It is 0 from a joint that does not carry the body, and 1 from one that slides.
     """
-    carriers = {joint.child: number for number, joint in enumerate(world.joints)}
     levers_m = np.zeros((len(world.bodies), 1 + len(world.joints)))
     for row, body in zip(levers_m, world.bodies, strict=True):
-        name, length_m = body.name, 0.0
-        if body.parts:
-            length_m = -float(clearances_m(body, np.zeros((len(_TURNS), 3)), _TURNS).min())
-        while name in carriers:
-            joint = world.joints[carriers[name]]
-            row[1 + carriers[name]] = 1.0 if joint.slides else length_m
-            name, length_m = joint.parent, length_m + float(np.linalg.norm(joint.origin_m))
+        length_m = -float(clearances_m(body, np.zeros((len(_TURNS), 3)), _TURNS).min()) if body.parts else 0.0
+        for number in chain(world, body.name):
+            joint = world.joints[number]
+            row[1 + number] = 1.0 if joint.slides else length_m
+            length_m += float(np.linalg.norm(joint.origin_m))
         row[0] = length_m
     return frozen(levers_m)

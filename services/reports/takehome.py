@@ -1,6 +1,5 @@
 """The files that a person takes home from an experiment; the same results give the same bytes."""
 
-import csv
 import io
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +23,7 @@ from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
 from gaplab.services.reports.outcome_page import MOST_SHOWN, outcome_report, verdict_sentences
 from gaplab.services.reports.plain_mujoco import plain_motion, tuned_mjcf
 from gaplab.services.reports.reproduction import spec_text, submitted
-from gaplab.services.results.files import entry_of
+from gaplab.services.results.files import csv_text, entry_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Store
@@ -168,20 +167,15 @@ def samples_csv(outcome: ExperimentOutcome, readings: Readings) -> str:
         key = sample.genome, sample.repeats or (sample.fitness,)
         found[key] = _cells(readings.get(key)) or (_readings(sample, outcome) if len(key[1]) == 1 else [])
     repeats = max(len(values) for _, values in found)
-    ends = (
-        ["", *(f"#{number}" for number in range(2, repeats + 1))]
-        if any(set(told) - {None} for told in found.values())
-        else []
-    )
-    names = [f"{name}{end}" for end in ends for name in outcome.robot.sensors.columns]
+    ends = ["", *(f"#{number}" for number in range(2, repeats + 1))]
+    read = any(set(told) - {None} for told in found.values())
+    names = [f"{name}{end}" for end in ends for name in outcome.robot.sensors.columns] if read else []
     values = ["value"] if repeats == 1 else [f"value_{number}" for number in range(1, repeats + 1)]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*(f"gene_{place}" for place in range(outcome.robot.space.size)), *values, *names])
-    for (genome, measured), told in found.items():
-        blanks = [""] * (repeats - len(measured))
-        writer.writerow([*genome, *measured, *blanks, *(told + [None] * len(names))[: len(names)]])
-    return text.getvalue()
+    rows = (
+        [*genome, *measured, *[None] * (repeats - len(measured)), *(told + [None] * len(names))[: len(names)]]
+        for (genome, measured), told in found.items()
+    )
+    return csv_text([*(f"gene_{place}" for place in range(outcome.robot.space.size)), *values, *names], rows)
 
 
 def _cells(readings: Sequence[Any] | None) -> list[float | None]:
