@@ -5,12 +5,12 @@ from random import SystemRandom
 
 
 def free_port() -> int:
-    """A port that nobody serves, outside the range from which the system gives one to each connection.
+    """A port that nobody serves, outside the ranges from which the system and Ray's workers take theirs.
 
-    A port of that range may be taken before the server starts, and again while it restarts.
+    A port of those may be taken before the server starts, and again while it restarts.
     """
     while True:
-        port = SystemRandom().randrange(15_000, 32_000)
+        port = SystemRandom().randrange(20_000, 32_000)
         with socket.socket() as probe:
             try:
                 probe.bind(("127.0.0.1", port))

@@ -29,6 +29,7 @@ from gaplab.services.core import robot_library
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.robots.robot_file import Imported
 from gaplab.services.core.types import Measured
+from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import ExperimentRow
@@ -43,8 +44,9 @@ BOTH = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "
 class InProcess(httpx2.BaseTransport):
     """The app in this process in place of the network; `lost` answers are served and then lost on the way."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, rollouts: RolloutProcess | None = None) -> None:
         app = create_app(store)
+        app.state.rollout_process = rollouts or app.state.rollout_process
         self._client = TestClient(app, raise_server_exceptions=False)
         self._process = app.state.rollout_process
         self.asked: list[str] = []

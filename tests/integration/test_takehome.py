@@ -22,6 +22,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.engines.mujoco.engine import MuJoCo
 from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.running import execution
 from gaplab.services.store.models import AnswerRow
 from gaplab.services.store.session import Store
@@ -33,11 +34,17 @@ from tests.integration.test_client import InProcess
 WALKING = {"robot": "quadruped", "engine": "mujoco", "repetitions": 1, "iterations": 1}
 
 
+@pytest.fixture(scope="module")
+def rollouts() -> Iterator[RolloutProcess]:
+    """One for all: each compiles MuJoCo's law."""
+    found = RolloutProcess()
+    yield found
+    found.close()
+
+
 @pytest.fixture
-def client(store: Store) -> Iterator[Client]:
-    network = InProcess(store)
-    yield Client("http://test", transport=network, pauses_s=(0.0, 0.0, 0.0))
-    network.close()
+def client(store: Store, rollouts: RolloutProcess) -> Client:
+    return Client("http://test", transport=InProcess(store, rollouts), pauses_s=(0.0, 0.0, 0.0))
 
 
 def walk(seed: int) -> Any:
