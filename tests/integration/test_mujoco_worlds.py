@@ -134,13 +134,9 @@ def test_twenty_simulators_share_a_call_and_none_is_compiled_again(
     assert len(compiled) == 1
 
 
-def test_more_simulators_than_models_are_kept_give_the_same_numbers(
-    engine: MuJoCo, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    worlds = simulators(7)
+def test_more_simulators_than_models_are_kept_give_the_same_numbers(engine: MuJoCo) -> None:
+    worlds = simulators(max(of_worlds.KEPT, of_scenes.ROWS) + 4)
     expected = paths(engine, worlds, MOTIONS)
-    monkeypatch.setattr(of_worlds, "KEPT", 3)
-    monkeypatch.setattr(of_scenes, "ROWS", 4)
     few = MuJoCo()
 
     for order in (slice(None), slice(None, None, -1), slice(None, None, 2), slice(None)):
