@@ -424,7 +424,9 @@ def test_a_stream_that_fell_behind_catches_up_from_the_database(sqlite_store: St
         id = submission.submit_experiment(sqlite_store, toy()).id
         stream = client.events()
         first = take(stream, 1)
-        sqlite_store.write(lambda session: [note(session, EventKind.EDITED, id) for _ in range(many)])
+        with sqlite_store.transaction() as session:
+            for _ in range(many):
+                note(session, EventKind.EDITED, id)
         found = first + take(stream, many)
 
     assert [each.number for each in found] == list(range(1, many + 2))
