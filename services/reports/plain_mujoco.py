@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.world import World
-from gaplab.services.engines import engines
 from gaplab.services.engines.mujoco.plain import LOST, mjcf_of, plain_positions
 from gaplab.services.replay.sent_specs import SentSpec, received
 from gaplab.services.specs.assembly import simulation_of
@@ -14,11 +14,12 @@ from gaplab.services.specs.robots import robot_of
 
 
 def tuned_mjcf(sent_spec: SentSpec, parameters: Sequence[float], headline: str) -> str:
-    """Return a simulator as MJCF, with a line at its start; "" without MuJoCo."""
-    if not engines["mujoco"].available():
-        return ""
+    """Return a simulator as MJCF, with a line at its start; "" without MuJoCo, or if it refuses it."""
     _, world = _tuned(sent_spec, parameters)
-    return mjcf_of(world, [headline, f"Not in this file: {', '.join(LOST)}"])
+    try:
+        return mjcf_of(world, [headline, f"Not in this file: {', '.join(LOST)}"])
+    except InvalidRobot:
+        return ""
 
 
 def plain_motion(

@@ -65,13 +65,18 @@ def check_rollouts(first: World, second: World, engine: Engine, controller: Plug
 def plain_distance_m(world: World, engine: Engine, controller: PluginRef, task: PluginRef) -> float | None:
     """Return the largest distance of the same rollouts from those in MuJoCo alone, m.
 
-    None if the physics fails in either, if the controller observes while it acts, or without MuJoCo.
+    None if the physics fails in either, if the controller observes while it acts, without MuJoCo, or if
+    it refuses the world.
     """
     motions = _motions(world, controller, task)
     if not engines["mujoco"].available() or not isinstance(motions[0], Motion):
         return None
     here = engine.rollouts([world], motions).positions_m[:, 0]
-    return known(np.linalg.norm([plain_positions(world, motion) for motion in motions] - here, axis=-1).max())
+    try:
+        plain = [plain_positions(world, motion) for motion in motions]
+    except InvalidRobot:
+        return None
+    return known(np.linalg.norm(plain - here, axis=-1).max())
 
 
 def _motions(world: World, controller: PluginRef, task: PluginRef) -> Any:  # noqa: ANN401 - all of one kind

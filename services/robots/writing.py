@@ -113,7 +113,7 @@ def write_plain(tuning: Tuning, output: Path) -> WrittenFile:
     """Write the tuned world as an MJCF for MuJoCo alone.
 
     Raises:
-        InvalidRobot: a tuned value has no place in it, and `partial` is false.
+        InvalidRobot: a tuned value has no place in it, and `partial` is false; or MuJoCo is missing, or refuses it.
     """
     found = changes(tuning.robot.world, tuning.world)
     lost = tuple(each for each in found if each.place[2].startswith(LOST))

@@ -7,9 +7,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Material, PDMotor
+from gaplab.services.core.shapes import Box
+from gaplab.services.core.world import Body, Material, PDMotor, World
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco.plain import mjcf_of, plain_positions
 from tests.real_robots import imported
@@ -46,6 +48,15 @@ def test_the_file_has_the_masses_the_friction_and_the_slope_of_the_world() -> No
         assert isinstance(joint.motor, PDMotor)
         assert model.actuator(joint.name).gainprm[0] == pytest.approx(joint.motor.kp, rel=1e-4)
         assert model.actuator(joint.name).forcerange[1] == pytest.approx(joint.motor.max_torque_nm, rel=1e-4)
+
+
+def test_a_body_called_world_without_joints_and_one_that_mujoco_refuses() -> None:
+    block = World((Body("world", 1.0, Box((0.2, 0.2, 0.2))),), start_height_m=20.0)
+    thrown = Motion(np.zeros(1), np.zeros((1, 0)), np.array([0.0, 1.0]))
+
+    assert plain_positions(block, thrown)[:, 2] == pytest.approx([20.0, 20.0 - 9.81 / 2], abs=0.05)
+    with pytest.raises(InvalidRobot, match="MuJoCo alone refuses this world"):
+        mjcf_of(replace(block, bodies=(replace(block.bodies[0], mass_kg=1e-30),)))
 
 
 def test_the_hand_of_an_arm_moves_in_mujoco_alone_as_in_the_engine() -> None:

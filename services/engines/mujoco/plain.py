@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.world import Joint, Motor, PDMotor, World
+from gaplab.services.engines.mujoco.engine import MuJoCo
 from gaplab.services.engines.mujoco.logs import unlogged
-from gaplab.services.engines.mujoco.model import GROUND, add_geom, outwards, scalar_first
+from gaplab.services.engines.mujoco.model import GROUND, add_geom, named, outwards, scalar_first
 from gaplab.services.engines.mujoco.values import ROTOR, inertial
 
 LOST = ("material.static_friction", "material.restitution", "motor.delay_s", "noise.")
@@ -32,7 +34,12 @@ def mjcf_of(world: World, comments: Sequence[str] = ()) -> str:
     Args:
         world: the world.
         comments: lines for the start of the file.
+
+    Raises:
+        InvalidRobot: MuJoCo is not installed, or refuses the world.
     """
+    if not MuJoCo.available():
+        raise InvalidRobot([f"MuJoCo writes this file: {MuJoCo.install}"])
     mujoco = import_module("mujoco")
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.gravity = world.time_step_s, gravity_m_s2(world)
@@ -41,11 +48,15 @@ def mjcf_of(world: World, comments: Sequence[str] = ()) -> str:
     spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
     order = list(outwards(world, world.bodies[0].name))
     _add_bodies(mujoco, spec, world, order)
-    inertias = dict(zip((joint.name for joint in order), spec.compile().dof_M0[-len(order) :], strict=True))
-    for joint in world.actuators:
-        if joint.motor is not None:
-            _add_motor(mujoco, spec, spec.joint(joint.name), joint.motor, inertias[joint.name], world.time_step_s)
-    spec.compile()
+    try:
+        model = spec.compile()
+        inertias = dict(zip((joint.name for joint in order), model.dof_M0[model.nv - len(order) :], strict=True))
+        for joint in world.actuators:
+            if joint.motor is not None:
+                _add_motor(mujoco, spec, spec.joint(joint.name), joint.motor, inertias[joint.name], world.time_step_s)
+        spec.compile()
+    except ValueError as error:
+        raise InvalidRobot([f"MuJoCo alone refuses this world: {error}"]) from error
     told = "\n".join(f"  {line.replace('--', '- -')}" for line in comments)
     return f"<!--\n{told}\n-->\n{spec.to_xml()}" if told else str(spec.to_xml())
 
@@ -57,7 +68,7 @@ def plain_positions(world: World, motion: Motion) -> FloatArray:
     data = mujoco.MjData(model)
     for joint in world.joints:
         data.joint(joint.name).qpos = joint.start
-    observed, step_s = world.observed or world.bodies[0].name, world.time_step_s
+    observed, step_s = _called(world.observed or world.bodies[0].name), world.time_step_s
     steps, commands = (np.rint(each / step_s).astype(int) for each in (motion.observe_s, motion.times_s))
     found = np.empty((len(steps), 3))
     with unlogged(mujoco):
@@ -70,15 +81,20 @@ def plain_positions(world: World, motion: Motion) -> FloatArray:
     return found
 
 
+def _called(body: str) -> str:
+    """Return the name of a body in the file, where MuJoCo's ground is the body "world"."""
+    return named(body) if body == "world" else body
+
+
 def _add_bodies(mujoco: ModuleType, spec: Any, world: World, order: Sequence[Joint]) -> None:
     base, made, kinds = world.bodies[0].name, {}, mujoco.mjtJoint
     start = {"pos": [0.0, 0.0, world.start_height_m], "quat": scalar_first(world.start_turn)}
-    made[base] = spec.worldbody.add_body(name=base, **start)
+    made[base] = spec.worldbody.add_body(name=_called(base), **start)
     if not world.fixed:
         made[base].add_freejoint()
     for joint in order:
         made[joint.child] = body = made[joint.parent].add_body(
-            name=joint.child, pos=joint.origin_m, quat=scalar_first(joint.turn)
+            name=_called(joint.child), pos=joint.origin_m, quat=scalar_first(joint.turn)
         )
         body.add_joint(
             name=joint.name,
