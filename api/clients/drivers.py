@@ -9,15 +9,20 @@
 """
 
 import importlib.util
+import time
 from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 from typing import Any, Protocol
 
-from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
-from gaplab.api.clients.driving import TakenRequest
 from gaplab.api.clients.motions import DriverMotion
-from gaplab.schemas.records import SensorsRead
+from gaplab.api.clients.takes import Take, TakeLost
+
+POLL_S = 0.1
+"""Seconds between two looks whether a run may go on."""
+
+STOP_S = 10.0
+"""Longest time of a stop."""
 
 
 class MeasurementFailed(Exception):
@@ -42,7 +47,7 @@ class Driver(Protocol):
         """
 
     def stop(self) -> None:
-        """Stop the robot at once; called from another thread if a run takes too long."""
+        """Stop the robot at once; called from another thread if a run must not go on."""
 
 
 def load(file: Path) -> Driver:
@@ -69,111 +74,84 @@ def load(file: Path) -> Driver:
     return driver
 
 
-def measure(task: TakenRequest, driver: Driver, limit_s: float | None, tell: Callable[[str], None]) -> None:
-    """Run a taken request to its end: all repeats that an earlier run did not measure, then the answer.
+class Robot:
+    """A driver, each call of which has a thread of its own, so that one that hangs holds up nothing.
 
     Args:
-        task: the taken request.
-        driver: what runs its motion.
-        limit_s: longest time of one run; None: a minute more than ten times the motion.
-        tell: is told what happens.
-
-    Raises:
-        DriverBroken: the driver hangs or answers nonsense; the request is released.
+        driver: what runs motions.
+        stop_s: longest time of a stop.
     """
-    limit_s, sensors = limit_s or 60.0 + 10.0 * task.motion.observe_s[-1], task.sensors
-    found = [(value, readings) for value, readings in task.known if not _mistake_of(readings, sensors)]
-    if found:
-        tell(f"{len(found)} of {task.repeats} repeats are in the journal already")
-    try:
-        while len(found) < task.repeats:
-            value, readings = _checked(_limited(driver, task.motion, limit_s))
-            if mistake := _mistake_of(readings, sensors):
-                raise DriverBroken(f"the driver's run returned {mistake}")
-            task.note(value, readings)
-            found.append((value, readings))
-            tell(f"repeat {len(found)} of {task.repeats}: {value:.6g} {task.request.unit}")
-    except MeasurementFailed as failure:
-        task.fail(str(failure) or "the driver could not measure it")
-        tell(f"failed: {failure}")
-        return
-    tables = [readings for _, readings in found]
-    answer = task.tell([value for value, _ in found], None if None in tables else tables)
-    for doubt in answer.doubts:
-        tell(f"doubtful: {doubt}; correct {answer.id}, or confirm it")
+
+    def __init__(self, driver: Driver, stop_s: float = STOP_S) -> None:
+        self.connect = driver.connect
+        self._driver, self._stop_s = driver, stop_s
+        self._run: _Call | None = None
+        self._stop: _Call | None = None
+
+    def run(self, motion: DriverMotion, take: Take, limit_s: float) -> Any:  # noqa: ANN401 - whatever a driver returns
+        """Return what a run returns.
+
+        Raises:
+            TakeLost: others may drive the robot now or soon, so it must be stopped.
+            MeasurementFailed: the driver says so.
+            DriverBroken: the run took too long, or raised another error.
+        """
+        self._run = run = _Call(self._driver.run, motion)
+        until = time.monotonic() + limit_s
+        while run.is_alive() and not take.lost and time.monotonic() < until:
+            run.join(POLL_S)
+        if take.lost:
+            raise TakeLost(take.lost)
+        if run.is_alive():
+            msg = f"the driver's run took more than {limit_s:g} s, so the robot was stopped; `--limit-s` permits more"
+            raise DriverBroken(msg)
+        if isinstance(run.error, MeasurementFailed):
+            raise run.error
+        if run.error:
+            raise DriverBroken(f"the driver's run raised {type(run.error).__name__}: {run.error}") from run.error
+        return run.answer
+
+    def stop(self) -> None:
+        """Stop the robot; a stop that hangs is not called again.
+
+        Raises:
+            DriverBroken: the stop hangs or raises an error, so the robot may still move.
+        """
+        if self._stop and self._stop.is_alive():
+            return
+        self._stop = stop = _Call(self._driver.stop)
+        stop.join(self._stop_s)
+        if stop.is_alive():
+            raise DriverBroken(f"the driver's stop takes more than {self._stop_s:g} s: the robot may still move")
+        if stop.error:
+            raise DriverBroken(f"the driver's stop raised {type(stop.error).__name__}: {stop.error}") from stop.error
+
+    def end_run(self) -> None:
+        """Stop the robot, and wait for the end of its run.
+
+        Raises:
+            DriverBroken: the robot may still move.
+        """
+        self.stop()
+        if self._run:
+            self._run.join(self._stop_s)
+            if self._run.is_alive():
+                raise DriverBroken("the driver's run goes on after its stop: the robot may still move")
 
 
-def _limited(driver: Driver, motion: DriverMotion, limit_s: float) -> Any:  # noqa: ANN401 - whatever a driver returns
-    """Return what a run returns, or stop the robot if it takes too long.
+class _Call(Thread):
+    """A call in a thread, with what it returned or raised."""
 
-    Raises:
-        DriverBroken: it took too long, or raised an error that is no MeasurementFailed.
-    """
-    answers: list[Any] = []
-    errors: list[BaseException] = []
+    def __init__(self, function: Callable[..., Any], *arguments: object) -> None:
+        super().__init__(name="driver", daemon=True)
+        self.answer: Any = None
+        self.error: BaseException | None = None
+        self._function, self._arguments = function, arguments
+        self.start()
 
-    def work() -> None:
+    def run(self) -> None:
+        """Call the function."""
         try:
-            answers.append(driver.run(motion))
-        except BaseException as error:  # noqa: BLE001 - it is raised again in the caller
-            errors.append(error)
-
-    thread = Thread(target=work, name="driver", daemon=True)
-    thread.start()
-    thread.join(limit_s)
-    if thread.is_alive():
-        driver.stop()
-        msg = f"the driver's run took more than {limit_s:g} s, so the robot was stopped; `--limit-s` permits more"
-        raise DriverBroken(msg)
-    if errors:
-        if isinstance(errors[0], MeasurementFailed):
-            raise errors[0]
-        driver.stop()
-        raise DriverBroken(f"the driver's run raised {type(errors[0]).__name__}: {errors[0]}") from errors[0]
-    return answers[0]
-
-
-def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a driver returns
-    """Return fitness and readings.
-
-    Raises:
-        DriverBroken: the fitness is not a finite number, or readings are no numbers.
-    """
-    readings: Any
-    fitness, readings = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
-    try:
-        (value,) = numbers_of([fitness], "/fitness")
-    except TypeError as error:
-        msg = f"the driver's run returned {answer!r:.100}; it must return the fitness, a number"
-        raise DriverBroken(msg) from error
-    except ValueError as error:
-        msg = f"the driver's run returned {fitness}; raise MeasurementFailed if nothing was measured"
-        raise DriverBroken(msg) from error
-    try:
-        return value, json_of(readings_of(readings), "/readings")
-    except (TypeError, ValueError) as error:
-        raise DriverBroken(f"the driver's run returned readings that cannot be sent: {error}") from error
-
-
-def _mistake_of(readings: Any, sensors: SensorsRead | None) -> str | None:  # noqa: ANN401 - whatever a driver returns
-    """Return why the service would refuse readings, after the last repeat; None if it would not."""
-    if sensors is None or (readings is None and not sensors.needed):
-        return None
-    times_s, names = sensors.times_s, sensors.names
-    if not names:
-        return "readings, but the robot has no sensors: return the fitness alone"
-    rows = f"{len(times_s)} rows of {len(names)} numbers"
-    shape = f"{rows}: {', '.join(names)}, at {len(times_s)} times from {times_s[0]:g} to {times_s[-1]:g} s"
-    if readings is None:
-        msg = f"return (fitness, readings), {shape}; or answer with `gaplab traces REQUEST FILE --answer`"
-        return f"no readings, but the experiment tunes on them: {msg}"
-    if not _has_shape(readings, len(times_s), len(names)):
-        return f"readings of another shape than the sensors'; return {shape}"
-    return None
-
-
-def _has_shape(readings: Any, rows: int, columns: int) -> bool:  # noqa: ANN401 - whatever a driver returns
-    try:
-        return len(readings) == rows and all(len(row) == columns for row in readings)
-    except TypeError:
-        return False
+            self.answer = self._function(*self._arguments)
+        except BaseException as error:  # noqa: BLE001 - whoever waits for the call raises it again
+            self.error = error
