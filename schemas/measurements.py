@@ -72,7 +72,8 @@ class TakeSpec(Frozen):
 
     operator: Label = Field(description="person or driver", examples=["Ada"])
     lease_s: Annotated[Real, Field(ge=1, le=86_400)] = Field(
-        default=600.0, description="seconds without a heartbeat after which the request is open again"
+        default=600.0,
+        description="seconds without a heartbeat, by the clock of a supervisor, after which it is open again",
     )
 
 
@@ -191,7 +192,7 @@ class RequestRead(Frozen):
     takes: int = Field(description="number of times that it was taken; the number of the latest take")
     unanswered: int = Field(description="takes in a row that ended without an answer")
     taken_by: str | None = Field(default=None, examples=["Ada"])
-    taken_until: Moment | None = Field(default=None, description="when the take ends without a heartbeat")
+    taken_until: Moment | None = Field(default=None, description="about when the take ends without a heartbeat")
     busy: bool = Field(default=False, description="whether another request of the same bench is taken")
     safety: Safety | None = None
     expected: tuple[str, ...] = Field(

@@ -70,8 +70,6 @@ def _answer(
     experiment = session.get_one(ExperimentRow, repetition.experiment_id)
     check_values(spec_of(experiment.spec), spec.values, spec.readings, spec.unit)
     check_attachments(session, spec.attachments)
-    requests.expire(session, RequestRow.id == row.id)
-    session.refresh(row)
     answered = row.state in requests.ANSWERED
     counted = requests.counted_answer(session, row) if answered else None
     if row.state is RequestState.WITHDRAWN or (answered and counted is None):

@@ -1,7 +1,6 @@
 """Rows of requests for physical measurements, and of their answers."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from datetime import datetime, timedelta
 
 from sqlalchemy import ColumnElement, select, union_all
 from sqlalchemy.orm import Session
@@ -125,28 +124,6 @@ def get_answer(session: Session, id_: str) -> AnswerRow:
     if (row := session.get(AnswerRow, storable(id_))) is None:
         raise NotFound(f"there is no measurement {id_!r}")
     return row
-
-
-def is_expired(row: RequestRow, at: datetime) -> bool:
-    """Return whether a take has ended without an answer.
-
-    A take that ends later than a heartbeat could have set was set before the clock was set back, and says nothing.
-    """
-    if row.state is not RequestState.TAKEN or row.taken_until is None:
-        return False
-    return not at < row.taken_until <= at + timedelta(seconds=row.lease_s or 0.0) + timedelta(seconds=1)
-
-
-def expire(session: Session, which: ColumnElement[bool] | None = None) -> int:
-    """Open the requests again whose take has ended, and return their number."""
-    row, at = RequestRow, moment(session)
-    taken = select(row).where(row.state == RequestState.TAKEN)
-    taken = taken if which is None else taken.where(which)
-    expired = [each for each in session.scalars(taken.with_for_update()) if is_expired(each, at)]
-    for each in expired:
-        give_up(session, each, EventKind.TAKE_EXPIRED)
-    session.flush()
-    return len(expired)
 
 
 def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
