@@ -85,8 +85,7 @@ class Robot:
     def __init__(self, driver: Driver, stop_s: float = STOP_S) -> None:
         self.connect = driver.connect
         self._driver, self._stop_s = driver, stop_s
-        self._run: _Call | None = None
-        self._stop: _Call | None = None
+        self._run, self._hangs = _Call(lambda: None), False
 
     def run(self, motion: DriverMotion, take: Take, limit_s: float) -> Any:  # noqa: ANN401 - whatever a driver returns
         """Return what a run returns.
@@ -112,31 +111,22 @@ class Robot:
         return run.answer
 
     def stop(self) -> None:
-        """Stop the robot; a stop that hangs is not called again.
+        """Stop the robot, and wait for the end of its run; a call that hangs is told once.
 
         Raises:
-            DriverBroken: the stop hangs or raises an error, so the robot may still move.
+            DriverBroken: the stop hangs or raises an error, or the run goes on, so the robot may still move.
         """
-        if self._stop and self._stop.is_alive():
+        if self._hangs:
             return
-        self._stop = stop = _Call(self._driver.stop)
-        stop.join(self._stop_s)
-        if stop.is_alive():
-            raise DriverBroken(f"the driver's stop takes more than {self._stop_s:g} s: the robot may still move")
+        stop = _Call(self._driver.stop)
+        for call, name in ((stop, "stop"), (self._run, "run")):
+            call.join(self._stop_s)
+            if call.is_alive():
+                self._hangs = True
+                msg = f"the driver's {name} has not returned {self._stop_s:g} s after a stop: the robot may still move"
+                raise DriverBroken(msg)
         if stop.error:
             raise DriverBroken(f"the driver's stop raised {type(stop.error).__name__}: {stop.error}") from stop.error
-
-    def end_run(self) -> None:
-        """Stop the robot, and wait for the end of its run.
-
-        Raises:
-            DriverBroken: the robot may still move.
-        """
-        self.stop()
-        if self._run:
-            self._run.join(self._stop_s)
-            if self._run.is_alive():
-                raise DriverBroken("the driver's run goes on after its stop: the robot may still move")
 
 
 class _Call(Thread):

@@ -12,7 +12,7 @@ from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
 from gaplab.api.clients.journal import PAUSE_S, Deliveries, Journal, log
 from gaplab.api.clients.motions import DriverMotion, motion_of
 from gaplab.api.clients.records import Records
-from gaplab.api.clients.takes import Take, take
+from gaplab.api.clients.takes import Take
 from gaplab.schemas.measurements import AnswerRead, RequestRead, RequestState
 from gaplab.schemas.records import Page, SensorsRead
 
@@ -166,7 +166,7 @@ class Driving:
     def _take(self, request: RequestRead) -> TakenRequest | None:
         """Take a request; None if somebody else was faster, or it is wanted no more."""
         try:
-            return TakenRequest(self, take(self.connection, request.id, self._operator, self._lease_s))
+            return TakenRequest(self, Take(self.connection, request.id, self._operator, self._lease_s))
         except ServiceError as error:
             if error.problem.status not in _NOT_THIS_ONE:
                 raise

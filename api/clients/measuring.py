@@ -8,7 +8,6 @@ from gaplab.api.clients.drivers import DriverBroken, MeasurementFailed, Robot
 from gaplab.api.clients.driving import TakenRequest
 from gaplab.api.clients.errors import ServiceError
 from gaplab.api.clients.takes import TakeLost
-from gaplab.schemas.measurements import AnswerRead
 from gaplab.schemas.records import SensorsRead
 
 Tell = Callable[[str], None]
@@ -32,24 +31,25 @@ def measure(task: TakenRequest, robot: Robot, limit_s: float | None, tell: Tell)
     motion, sensors = task.motion, task.sensors
     limit_s = limit_s or 60.0 + 10.0 * motion.observe_s[-1]
     try:
-        answer = _answer(task, lambda: robot.run(motion, task.take, limit_s), sensors, tell)
+        _answer(task, lambda: robot.run(motion, task.take, limit_s), sensors, tell)
     except ServiceError as error:
         if error.problem.status not in {404, 409}:
             raise
         tell(f"not taken: {error}")
     except BaseException as error:
-        _end_run(task, robot, error)
+        try:
+            robot.stop()
+        except DriverBroken as unstopped:
+            task.take.over.set()
+            raise DriverBroken(f"{unstopped}; {error}".removesuffix("; ")) from error
         if not isinstance(error, TakeLost):
             raise
         if task.take.refused:
             task.forget()
         tell(f"stopped: {error}")
-    else:
-        for doubt in answer.doubts:
-            tell(f"doubtful: {doubt}; correct {answer.id}, or confirm it")
 
 
-def _answer(task: TakenRequest, run: Callable[[], Any], sensors: SensorsRead | None, tell: Tell) -> AnswerRead:
+def _answer(task: TakenRequest, run: Callable[[], Any], sensors: SensorsRead | None, tell: Tell) -> None:
     """Measure the repeats that are missing, and answer."""
     found = [(value, readings) for value, readings in task.known if not _mistake_of(readings, sensors)]
     if found:
@@ -64,23 +64,13 @@ def _answer(task: TakenRequest, run: Callable[[], Any], sensors: SensorsRead | N
             found.append((value, readings))
             tell(f"repeat {len(found)} of {task.repeats}: {value:.6g} {task.request.unit}")
     except MeasurementFailed as failure:
+        task.fail(str(failure) or "the driver could not measure it")
         tell(f"failed: {failure}")
-        return task.fail(str(failure) or "the driver could not measure it")
+        return
     tables = [readings for _, readings in found]
-    return task.tell([value for value, _ in found], None if None in tables else tables)
-
-
-def _end_run(task: TakenRequest, robot: Robot, why: BaseException) -> None:
-    """Stop the robot; if it may still move, nobody is invited to have it.
-
-    Raises:
-        DriverBroken: it may still move.
-    """
-    try:
-        robot.end_run()
-    except DriverBroken as unstopped:
-        task.take.over.set()
-        raise DriverBroken("; ".join(filter(None, (str(why), str(unstopped))))) from why
+    answer = task.tell([value for value, _ in found], None if None in tables else tables)
+    for doubt in answer.doubts:
+        tell(f"doubtful: {doubt}; correct {answer.id}, or confirm it")
 
 
 def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a driver returns

@@ -1,4 +1,4 @@
-"""The take of a request: kept by signs of life, and known to be lost before others may drive the robot."""
+"""The take of a request: kept by signs of life, and known to be lost before others may move the robot."""
 
 import time
 from collections.abc import Iterator
@@ -15,49 +15,39 @@ LEASE_SHARE = 0.8
 
 
 class TakeLost(Exception):
-    """Others may drive the robot, now or soon: it must stand still, and nothing is measured."""
-
-
-def take(connection: Connection, request: str, operator: str, lease_s: float) -> "Take":
-    """Take a request.
-
-    Raises:
-        ServiceError: it does not exist, somebody else was faster, or it is wanted no more.
-    """
-    body, since = {"operator": operator, "lease_s": lease_s}, time.monotonic()
-    taken = connection.post(RequestRead, f"/requests/{segment(request)}/take", body)
-    return Take(connection, taken, lease_s, since)
+    """Others may move the robot, now or soon: it must stand still, and nothing is measured."""
 
 
 class Take:
-    """A take of a request.
+    """A take of a request, which its constructor takes.
 
     Attributes:
         request: what was taken.
+        refused: why the service has ended the take; None if it has not.
         over: is set once it is answered, released, or left to its lease, so that no sign of life is due.
-        refused: why the service has ended it; None if it has not.
+
+    Raises:
+        ServiceError: somebody else was faster, or the request is wanted no more.
     """
 
-    def __init__(self, connection: Connection, request: RequestRead, lease_s: float, since: float) -> None:
-        self.request, self.over = request, Event()
+    def __init__(self, connection: Connection, request: str, operator: str, lease_s: float) -> None:
+        self._connection, self._path = connection, f"/requests/{segment(request)}"
+        self._operator, self._lease_s, self._shown = operator, lease_s, time.monotonic()
+        body = {"operator": operator, "lease_s": lease_s}
+        self.request = connection.post(RequestRead, f"{self._path}/take", body)
         self.refused: str | None = None
-        self._connection, self._lease_s, self._shown = connection, lease_s, since
-        self._path, self._body = f"/requests/{segment(request.id)}", {"take": request.takes}
+        self.over = Event()
 
     @property
     def lost(self) -> str | None:
-        """Why others may drive the robot, now or soon; None if they may not."""
+        """Why others may move the robot, now or soon; None if they may not."""
         silence_s = LEASE_SHARE * self._lease_s
         if self.refused is None and time.monotonic() - self._shown > silence_s:
             return f"no sign of life has reached the service for {silence_s:g} s"
         return self.refused
 
     def ask(self) -> None:
-        """Show a sign of life, before the robot moves.
-
-        Raises:
-            TakeLost: others may drive the robot, now or soon.
-        """
+        """Show a sign of life, before the robot moves; raise TakeLost if others may move it, now or soon."""
         if not self.lost:
             self._show()
         if self.lost:
@@ -75,15 +65,14 @@ class Take:
             thread.join()
 
     def release(self) -> None:
-        """End the take. If others may have had the robot before this, the service is told until it has heard."""
+        """End the take. If others may have had the robot already, the service is told until it has heard."""
         self.over.set()
         while True:
             silence_s = time.monotonic() - self._shown
-            moved = {"moved_s": silence_s} if self.refused or silence_s > self._lease_s else {}
             try:
-                self._send("release", self._body | moved)
+                self._send("release", moved_s=silence_s, operator=self._operator)
             except (ServiceError, ServiceUnreachable) as error:
-                if not moved or is_final(error):
+                if is_final(error) or (silence_s < self._lease_s and not self.refused):
                     return
                 log.warning("not told yet that others may have had the robot: %s", error)
                 time.sleep(PAUSE_S)
@@ -97,7 +86,7 @@ class Take:
     def _show(self) -> None:
         now = time.monotonic()
         try:
-            self._send("heartbeat", self._body)
+            self._send("heartbeat")
         except (ServiceError, ServiceUnreachable) as error:
             log.warning("no heartbeat: %s", error)
             if is_of_gaplab(error) and is_final(error):
@@ -105,6 +94,6 @@ class Take:
         else:
             self._shown = now
 
-    def _send(self, verb: str, body: dict[str, float]) -> None:
-        path, timeout_s = f"{self._path}/{verb}", max(1.0, self._lease_s / 3)
-        self._connection.change(RequestRead, "POST", path, json=body, timeout=timeout_s)
+    def _send(self, verb: str, **told: object) -> None:
+        body, timeout_s = {"take": self.request.takes, **told}, max(1.0, self._lease_s / 3)
+        self._connection.change(RequestRead, "POST", f"{self._path}/{verb}", json=body, timeout=timeout_s)

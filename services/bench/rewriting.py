@@ -89,8 +89,7 @@ def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) 
     if repetition.state in (State.FAILED, State.CANCELLED):
         become(session, request, RequestState.WITHDRAWN)
     else:
-        fresh = dict.fromkeys(("branch", "ended_at", "held", "taken_until"))
-        become(session, request, RequestState.OPEN, unanswered=0, **fresh)
+        become(session, request, RequestState.OPEN, unanswered=0, branch=None, ended_at=None)
         of_it = RepetitionRow.id == repetition.id
         move(session, RepetitionRow, of_it, State.QUEUED, losses=0)
         move(session, RepetitionRow, of_it, State.WAITING)

@@ -18,6 +18,7 @@ from gaplab.schemas.measurements import (
     TakeSpec,
 )
 from gaplab.schemas.records import Page
+from gaplab.services.bench.doubts import doubt_others
 from gaplab.services.bench.views import view_requests
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.idempotency import Once, once
@@ -161,23 +162,25 @@ def heartbeat(session: Session, id_: str, holder: HolderSpec) -> RequestRead:
     row, _ = locked(session, id_)
     _refuse_unless_held(row, holder)
     row.taken_until = moment(session) + timedelta(seconds=row.lease_s or 0.0)
-    session.flush()
     return view_requests(session, [row])[0]
 
 
 @transaction
 def release(session: Session, id_: str, spec: ReleaseSpec) -> RequestRead:
-    """End a take without an answer: the request is open again. Its event says who ended it, and why.
+    """End a take without an answer: a request that is wanted is open again. Its event says who ended it, and why.
 
     Raises:
         NotFound: the request does not exist.
-        Conflict: the take has ended already.
+        Conflict: the take has ended already, and its holder does not say that the robot moved since.
     """
     row, _ = locked(session, id_)
-    _refuse_unless_held(row, spec)
-    told = {"by": spec.operator, "reason": spec.reason}
-    requests.give_up(session, row, EventKind.RELEASED, **{name: storable(each) for name, each in told.items() if each})
-    session.flush()
+    if row.held is not None and row.takes == spec.take:
+        told = {"by": spec.operator, "reason": spec.reason}
+        requests.give_up(session, row, EventKind.RELEASED, **{at: storable(each) for at, each in told.items() if each})
+    elif spec.moved_s is not None:
+        doubt_others(session, row, spec.take, spec.moved_s, spec.operator or "somebody else")
+    else:
+        _refuse_unless_held(row, spec)
     return view_requests(session, [row])[0]
 
 
@@ -203,19 +206,16 @@ def open_again(store: Store, silences: Silences[str]) -> int:
     """
     row = RequestRow
     with store.reading() as session:
-        taken = session.execute(select(row.id, row.taken_until, row.lease_s).where(row.state == RequestState.TAKEN))
-        held = [(id_, until, lease_s or 0.0) for id_, until, lease_s in taken if until]
-    silent = silences.longer_than_leases(held)
+        taken = session.execute(select(row.id, row.taken_until, row.lease_s).where(row.held.is_not(None)))
+        silent = silences.longer_than_leases([(id_, until, lease or 0.0) for id_, until, lease in taken if until])
     return store.write(_expire, silent) if silent else 0
 
 
 def _expire(session: Session, silent: Sequence[tuple[str, datetime]]) -> int:
-    row = RequestRow
-    still = (row.state == RequestState.TAKEN) & tuple_(row.id, row.taken_until).in_(silent)
-    expired = session.scalars(select(row).where(still).with_for_update()).all()
+    still = RequestRow.held.is_not(None) & tuple_(RequestRow.id, RequestRow.taken_until).in_(silent)
+    expired = session.scalars(select(RequestRow).where(still).with_for_update()).all()
     for each in expired:
         requests.give_up(session, each, EventKind.TAKE_EXPIRED)
-    session.flush()
     return len(expired)
 
 

@@ -127,14 +127,21 @@ def get_answer(session: Session, id_: str) -> AnswerRow:
 
 
 def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
-    """End the take of a request that got no answer; `more` is told in its event."""
+    """End the take of a request that got no answer; `more` is told in its event, if it is still wanted."""
+    if row.state is not RequestState.TAKEN:
+        row.held = None
+        return
     unanswered = row.unanswered + (kind is EventKind.TAKE_EXPIRED)
     to = RequestState.STUCK if unanswered >= MOST_UNANSWERED else RequestState.OPEN
     request_states.become(session, row, to, held=None, unanswered=unanswered)
-    repetition = session.get(RepetitionRow, row.repetition_id)
-    if repetition is not None:
-        body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by, **more}
-        note(session, kind, repetition.experiment_id, repetition.number, **body)
+    note_end(session, row, kind, **more)
+
+
+def note_end(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
+    """Add the event of the end of a take; `more` is told in it."""
+    repetition = session.get_one(RepetitionRow, row.repetition_id)
+    body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by, **more}
+    note(session, kind, repetition.experiment_id, repetition.number, **body)
 
 
 def answers_of(session: Session, requests: Iterable[str]) -> dict[str, list[AnswerRow]]:
