@@ -9,6 +9,7 @@ from typing import TypeVar
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.experiments.bench_names import check_benches
 from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.estimates import check_cost
 from gaplab.services.experiments.idempotency import Once, once
@@ -38,7 +39,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
-        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
+        CostUnconfirmed: the cost is above the limit, or a bench nearly known, and the request does not confirm it.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's experiment was deleted.
@@ -47,6 +48,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
     check_extent([resolved], admitted.limits)
 
     def create(session: Session) -> ExperimentRead:
+        check_benches(session, [resolved], admitted)
         check_cost(session, [resolved], admitted)
         check_load(session, [resolved], admitted)
         row = _insert(session, resolved, admitted)
@@ -70,7 +72,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
-        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
+        CostUnconfirmed: the cost is above the limit, or a bench nearly known, and the request does not confirm it.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's study was deleted.
@@ -79,6 +81,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
     check_extent(resolved, admitted.limits)
 
     def create(session: Session) -> StudyRead:
+        check_benches(session, resolved, admitted)
         check_cost(session, resolved, admitted)
         check_load(session, resolved, admitted)
         study = insert_study(session, spec.name or "study")
