@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
-from sqlalchemy import ColumnElement, exists, select, tuple_
+from sqlalchemy import ColumnElement, exists, select, tuple_, update
 from sqlalchemy.exc import IntegrityError
 
 from gaplab.schemas.events import EventKind
@@ -147,6 +147,7 @@ def _take(session: Session, id_: str, spec: TakeSpec) -> RequestRead:
         lease_s=spec.lease_s,
         taken_until=moment(session) + timedelta(seconds=spec.lease_s),
     )
+    _fence_silent(session, bench)
     requests.note_take(session, row, EventKind.TAKEN)
     return view_requests(session, [row])[0]
 
@@ -217,6 +218,13 @@ def _expire(session: Session, silent: Sequence[tuple[str, datetime]]) -> int:
     for each in expired:
         requests.give_up(session, each, EventKind.TAKE_EXPIRED)
     return len(expired)
+
+
+def _fence_silent(session: Session, bench: str) -> None:
+    """Let answers of takes that ended by silence not count by themselves: their holders may drive the robot on."""
+    row = RequestRow
+    silent = (row.unanswered > 0) & row.state.in_((RequestState.OPEN, RequestState.STUCK))
+    session.execute(update(row).where(row.bench.in_(spellings(session, bench)), silent).values(takes=row.takes + 1))
 
 
 def _refuse_unless_open(row: RequestRow) -> None:

@@ -227,6 +227,28 @@ def test_a_take_ends_by_silence_and_a_clock_that_was_set_ends_none(store: Store,
 
 
 @pytest.mark.dialects
+@pytest.mark.parametrize("taken_since", [False, True])
+def test_an_answer_of_a_take_that_ended_by_silence_counts_unless_another_took_the_bench_since(
+    store: Store, taken_since: bool
+) -> None:
+    submit_experiment(store, bench(repetitions=2))
+    compute(store)
+    hers, his = pending(store)
+    taking.take(store, hers.id, TakeSpec(operator="Ada"), FREELY)
+    assert fall_silent(store) == 1
+    if taken_since:
+        taking.take(store, his.id, TakeSpec(operator="Bo"), FREELY)
+        taking.release(store, his.id, ReleaseSpec(take=1))
+
+    late = measure(store, hers, 0.3, take=1)
+
+    assert late.state == ("conflict" if taken_since else "counted")
+    if taken_since:
+        again = taking.take(store, hers.id, TakeSpec(operator="Bo"), FREELY).answer
+        assert measure(store, hers, 0.5, take=again.takes).state == "counted"
+
+
+@pytest.mark.dialects
 def test_a_bench_is_one_however_its_name_is_spaced_and_capitalised(store: Store) -> None:
     for name in ("The table", " the  TABLE "):
         submit_experiment(store, bench(reality={"bench": name}))
