@@ -2,6 +2,7 @@
 
 import logging
 import re
+from contextlib import suppress
 from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
@@ -14,6 +15,7 @@ from gaplab.schemas.access import Role
 from gaplab.schemas.base import Frozen
 from gaplab.services.access import Caller, demand
 from gaplab.services.core.errors import InvalidSpec, NotFound
+from gaplab.services.core.nesting import refuse_too_deep
 from gaplab.services.experiments.idempotency import Once
 from gaplab.services.experiments.limits import Admission
 from gaplab.services.plugins import watching
@@ -92,6 +94,17 @@ async def refuse_wrong_parameters(request: Request) -> None:
     """
     if wrong := wrong_parameters(request):
         raise InvalidSpec(wrong)
+
+
+async def refuse_deep_bodies(request: Request) -> None:
+    """Refuse a body whose JSON nests too deep, before anything else reads it.
+
+    Raises:
+        InvalidSpec: the pointer is that of the first value that is too deep.
+    """
+    if request.scope["route"].body_field is not None:
+        with suppress(ValueError, RecursionError):  # it is refused as not being JSON
+            refuse_too_deep(await request.json())
 
 
 def reload_plugins() -> None:

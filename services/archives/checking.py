@@ -21,7 +21,8 @@ from pydantic import (
 
 from gaplab.schemas.mistakes import sentence
 from gaplab.services.archives.columns import ADDED, EXPERIMENT, Row, columns_of
-from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.core.errors import InvalidArchive, InvalidSpec
+from gaplab.services.core.nesting import refuse_too_deep
 from gaplab.services.store.tables import Column, Kind
 
 LONGEST_LINE = 8 * 2**20
@@ -96,6 +97,9 @@ def _row(line: str, place: str) -> Row:
         row = json.loads(line)
         text = json.dumps(row, ensure_ascii=False, allow_nan=False)  # fails for nan and infinity
         text.encode()  # fails for half of a surrogate pair
+        refuse_too_deep(row)
+    except InvalidSpec as error:
+        _refuse(f"{place},", str(error)[:300])
     except (ValueError, RecursionError):
         _refuse(place, "is not JSON in ASCII, or has a number or a text that cannot be stored")
     if not isinstance(row, dict) or "\\u0000" in text:

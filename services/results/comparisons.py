@@ -80,7 +80,7 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
         raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
     compared = [_compared(row, values[row.id]) for row in rows]
     if to_evaluations is not None:
-        _check_the_end(compared, to_evaluations)
+        _check_the_end(rows, compared, to_evaluations)
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
     pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
     by_id = {row.id: row for row in rows}
@@ -90,13 +90,13 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
     )
 
 
-def _check_the_end(compared: Sequence[Compared], last: int) -> None:
+def _check_the_end(rows: Sequence[ExperimentRow], compared: Sequence[Compared], last: int) -> None:
     """Refuse a last number of evaluations that no experiment with samples has: nothing would be compared.
 
     Raises:
         InvalidSpec: it is beyond all of them.
     """
-    counts = [each.recorded.shape[1] for each in compared if not each.level]
+    counts = [row.iterations for row, each in zip(rows, compared, strict=True) if not each.level]
     most = max(1, *counts) - 1 if counts else last
     if last > most:
         message = f"no experiment has {last} real-world evaluations; permitted: 0 to {most}"

@@ -89,7 +89,7 @@ def curves_csv(curves: Sequence[Curve]) -> str:
 def values_of(
     session: Session, ids: Sequence[str], fitness: Fitness = Fitness.RECORDED
 ) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
-    """Return experiments, and the fitness of each: `(repetitions, iterations + 1)`, nan if missing.
+    """Return experiments, and the fitness of each: `(repetitions, k)`, nan if missing, up to the last iteration done.
 
     A failed controller is never the best. Where one was not measured, there is no best from there on: others had more
     chances.
@@ -102,7 +102,8 @@ def values_of(
     found = (
         results.recorded(session, ids) if recorded else results.measured_fitness(session, ids, MeasurementKind.PROBE)
     )
-    values = {row.id: np.full((row.spec["repetitions"], row.iterations), np.nan) for row in rows}
+    done = results.most_done(session, ids)  # not those of the spec, which may be a stranger's
+    values = {row.id: np.full((row.spec["repetitions"], max(1, done[row.id])), np.nan) for row in rows}
     for experiment, repetition, iteration, value in found:
         values[experiment][repetition, iteration] = -np.inf if value is None else value
     if fitness is Fitness.EQUAL_CHANCES:

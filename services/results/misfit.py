@@ -54,8 +54,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, by_iteration[iteration], names, parameters_of(spec.tunables))
-        for iteration in range(row.iterations if takes_samples(spec) else 0)
-        if by_iteration[iteration]
+        for iteration in sorted(by_iteration if takes_samples(spec) else ())
     )
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
