@@ -11,7 +11,7 @@ from rich.markup import escape
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import KEEPING, AsJson, Id, Url, app, connect
 from gaplab.api.commands.exit_codes import Exit
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.api.commands.submission import submit_confirmed
 from gaplab.schemas.archives import MOST_BYTES_OF_IMPORT, RepetitionRerun, RerunRead
 from gaplab.services.core.errors import InvalidArchive
@@ -35,7 +35,7 @@ def export(
     print_result({"file": str(file), "bytes": size}, f"Wrote {file}.", as_json=as_json)
     if size > MOST_BYTES_OF_IMPORT:
         most = f"{size:,} bytes; gaplab import takes {MOST_BYTES_OF_IMPORT:,}. gaplab backup copies any size"
-        typer.echo(f"{file} has {most}", err=True)
+        echo(f"{file} has {most}", err=True)
 
 
 @app.command("import", rich_help_panel=KEEPING)
@@ -46,11 +46,11 @@ def import_(file: Annotated[Path, typer.Argument(help="an archive")], as_json: A
     if as_json:
         print_json(stored)
         return
-    typer.echo(stored.study or stored.experiments[0])
+    echo(stored.study or stored.experiments[0])
     for old, new in stored.renamed.items():
-        typer.echo(f"{old} is taken here; its new id is {new}", err=True)
+        echo(f"{old} is taken here; its new id is {new}", err=True)
     for cancelled in stored.called_off:
-        typer.echo(f"{cancelled} had not ended; it is cancelled here", err=True)
+        echo(f"{cancelled} had not ended; it is cancelled here", err=True)
 
 
 @app.command(rich_help_panel=KEEPING)

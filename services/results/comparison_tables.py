@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from gaplab.schemas.comparison_columns import COLUMNS, UNPAIRED, row, shown_tests
 from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
-from gaplab.services.results.files import csv_text
+from gaplab.services.core.csv_tables import csv_text
 
 NAMES = {
     "student": "Student",

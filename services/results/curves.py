@@ -7,9 +7,9 @@ import numpy as np
 from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.curves import best_of_searches, curve_points
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.results.files import csv_text
 from gaplab.services.specs.resolution import is_direct
 from gaplab.services.specs.robots import unit
 from gaplab.services.store.models import ExperimentRow

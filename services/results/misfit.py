@@ -11,6 +11,7 @@ import numpy as np
 from gaplab.schemas.misfit import Distribution, MisfitRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.identification import Means, overfitting, verdicts
@@ -20,7 +21,6 @@ from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.unreproduced import unreproduced
-from gaplab.services.results.files import csv_text
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import installed_robot, unit
