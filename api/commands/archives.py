@@ -18,6 +18,8 @@ from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.settings import Settings
 from gaplab.services.store.atomic_files import PRIVATE, appearing
 
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")]
+
 
 @app.command(rich_help_panel=KEEPING)
 def export(
@@ -39,10 +41,12 @@ def export(
 
 
 @app.command("import", rich_help_panel=KEEPING)
-def import_(file: Annotated[Path, typer.Argument(help="an archive")], as_json: AsJson = False, url: Url = None) -> None:
+def import_(
+    file: Annotated[Path, typer.Argument(help="an archive")], yes: Yes = False, as_json: AsJson = False, url: Url = None
+) -> None:
     """Store the content of an archive; nothing in it is run."""
     with connect(url) as client, file.open("rb") as source:
-        stored = client.import_(source)
+        stored = client.import_(source, yes=yes)
     if as_json:
         print_json(stored)
         return
@@ -96,7 +100,7 @@ def rerun(  # noqa: PLR0913, PLR0917 - each is an option of the command
     minutes: Annotated[
         float | None, typer.Option(min=0.01, help="verify the first steps, until this time is over", show_default=False)
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")] = False,
+    yes: Yes = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:

@@ -86,22 +86,14 @@ AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
 
 
-async def refuse_wrong_parameters(request: Request) -> None:
-    """Refuse a query that repeats a parameter of one value, or gives one to an operation that has none.
+async def refuse_malformed(request: Request) -> None:
+    """Refuse parameters that are repeated, or that the operation has not, and JSON that nests too deep.
 
     Raises:
-        InvalidSpec: a parameter is repeated or unknown.
+        InvalidSpec: with every such parameter, or the first place that is too deep.
     """
     if wrong := wrong_parameters(request):
         raise InvalidSpec(wrong)
-
-
-async def refuse_deep_bodies(request: Request) -> None:
-    """Refuse a body whose JSON nests too deep, before anything else reads it.
-
-    Raises:
-        InvalidSpec: the pointer is that of the first value that is too deep.
-    """
     if request.scope["route"].body_field is not None:
         with suppress(ValueError, RecursionError):  # it is refused as not being JSON
             refuse_too_deep(await request.json())

@@ -17,7 +17,6 @@ from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import MOST_LOSSES, RobotSource
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.core.nesting import refuse_too_deep
 from gaplab.services.core.world import World
 from gaplab.services.core.world_checks import world_violations
 
@@ -119,7 +118,6 @@ def stored_robot_file(text: str | bytes) -> RobotFile:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InvalidSpec([Violation("", None, f"the robot file is no JSON: {error}", "JSON in UTF-8")]) from error
-    refuse_too_deep(content)
     _refuse_edits(content)
     try:
         return RobotFile.model_validate_json(text)
