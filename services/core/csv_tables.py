@@ -4,7 +4,6 @@ What is read may have any usual separator, and a byte order mark.
 """
 
 import csv
-import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -23,10 +22,14 @@ def csv_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     A text that a spreadsheet would take for a formula begins with an apostrophe. Line breaks in texts are single line
     feeds, since `csv` does not quote others.
     """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([_cell(each) if isinstance(each, str) else each for each in row] for row in (header, *rows))
-    return text.getvalue()
+    lines = _Lines()
+    cells = ([_cell(each) if isinstance(each, str) else each for each in row] for row in (header, *rows))
+    csv.writer(lines, lineterminator="\n").writerows(cells)
+    return "".join(lines)
+
+
+class _Lines(list[str]):
+    write = list.append
 
 
 def _cell(text: str) -> str:

@@ -13,7 +13,7 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.specs.resolution import is_direct
 from gaplab.services.specs.robots import unit
 from gaplab.services.store.models import ExperimentRow
-from gaplab.services.store.queries import experiments, results
+from gaplab.services.store.queries import experiments, progress, results
 from gaplab.services.store.session import Session, Store
 
 COLUMNS = ("experiment", "name", "strategy", "repetition", "evaluations", "fitness")
@@ -102,7 +102,7 @@ def values_of(
     found = (
         results.recorded(session, ids) if recorded else results.measured_fitness(session, ids, MeasurementKind.PROBE)
     )
-    done = results.most_done(session, ids)  # not those of the spec, which may be a stranger's
+    done = progress.most_done(session, ids)  # not those of the spec, which may be a stranger's
     values = {row.id: np.full((row.spec["repetitions"], max(1, done[row.id])), np.nan) for row in rows}
     for experiment, repetition, iteration, value in found:
         values[experiment][repetition, iteration] = -np.inf if value is None else value

@@ -84,6 +84,13 @@ def _all_tallies() -> Select[*tuple[Any, ...]]:
     )
 
 
+def most_done(session: Session, experiments: Sequence[str]) -> dict[str, int]:
+    """Return the iterations, number 0 included, that the farthest repetition of each experiment has completed."""
+    row = RepetitionRow
+    query = select(row.experiment_id, func.max(row.iterations_done)).where(row.experiment_id.in_(experiments))
+    return dict(session.execute(query.group_by(row.experiment_id)).all())
+
+
 def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """Return the distinct errors of failed repetitions, by experiment, in the order of repetitions."""
     row = RepetitionRow

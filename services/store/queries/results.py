@@ -140,13 +140,6 @@ def measured_fitness(
     return session.execute(of_experiments(row, experiments, *columns).where(row.kind == kind, ~row.left_out)).all()
 
 
-def most_done(session: Session, experiments: Sequence[str]) -> dict[str, int]:
-    """Return the iterations, number 0 included, that the farthest repetition of each experiment has completed."""
-    row = RepetitionRow
-    query = select(row.experiment_id, func.max(row.iterations_done)).where(row.experiment_id.in_(experiments))
-    return dict(session.execute(query.group_by(row.experiment_id)).all())
-
-
 def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, list[float]]:
     """Return the best recorded fitness of each repetition so far, by experiment."""
     found: dict[str, list[float]] = {}
