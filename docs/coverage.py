@@ -78,12 +78,12 @@ def row(kind: str, samples: int, realities: Sequence[int]) -> str:
     for seed in realities:
         truth, found = tuned(kind, samples, seed)
         assert found.interval is not None
-        unreproduced = found.fit is not None and found.fit.surprise <= SURPRISING
+        surprise = None if found.fit is None else found.fit.surprise
         point = misfit_point(samples, [found], NAMES, SPACE)
-        told = verdicts([point], [samples], Means(), unreproduced=unreproduced)
+        told = verdicts([point], [samples], Means(), surprise)
         inside.append((found.interval[:, 0] <= truth) & (truth <= found.interval[:, 1]))
         identified.append([each.verdict is Identification.IDENTIFIED for each in told])
-        surprised += unreproduced
+        surprised += surprise is not None and surprise <= SURPRISING
     within, called = np.array(inside), np.array(identified)
     shares = "  ".join(f"{share:4.0%}" for share in within.mean(axis=0))
     said = f"{(within & called).sum():3} of {called.sum():3} identified are right; {surprised} unreproduced"

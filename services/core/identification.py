@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from gaplab.schemas.misfit import Identification, MisfitPoint, TunableDistribution, TunableVerdict
 from gaplab.services.core.misfit import OFTEN
+from gaplab.services.core.misspecification import CREDIBLE, SURPRISING
 
 FEWEST = 5
 """Fewest repetitions whose spread says something. Of five uniform draws, 1 % look identified; of three, 7 %."""
@@ -43,7 +44,7 @@ class Means:
 
 
 def verdicts(
-    points: Sequence[MisfitPoint], samples: Sequence[float], means: Means, *, unreproduced: bool = False
+    points: Sequence[MisfitPoint], samples: Sequence[float], means: Means, surprise: float | None = None
 ) -> tuple[TunableVerdict, ...]:
     """Return the verdict on each tunable at the latest iteration; none before the first sample.
 
@@ -52,7 +53,7 @@ def verdicts(
         samples: number of samples that each was tuned on, with those from before the experiment; a mean over
             repetitions.
         means: what the experiment has not used.
-        unreproduced: whether no simulator reproduces the samples.
+        surprise: share of right simulators that leave as much error; None if it is not known.
     """
     tuned = [(point.tunables, count) for point, count in zip(points, samples, strict=True) if point.error.n]
     if not tuned:
@@ -61,7 +62,9 @@ def verdicts(
     earlier = [tunables for tunables, count in tuned if 2 * count <= most]
     halves = earlier[-1] if earlier else [None] * len(latest)
     told = tuple(_verdict(now, then, most, means) for now, then in zip(latest, halves, strict=True))
-    return tuple(map(_doubted, told)) if unreproduced else told
+    if surprise is None or surprise > CREDIBLE:
+        return told
+    return tuple(_doubted(each) if surprise <= SURPRISING else _less_sure(each) for each in told)
 
 
 def overfitting(point: MisfitPoint, unit: str) -> str:
@@ -100,9 +103,19 @@ def _verdict(
 def _doubted(found: TunableVerdict) -> TunableVerdict:
     if found.verdict not in {Identification.IDENTIFIED, Identification.PARTLY}:
         return found
-    sentence = found.sentence.replace(found.verdict.value, "doubtful, for no simulator reproduces the samples", 1)
+    return _said(found, Identification.DOUBTFUL, "doubtful, for no simulator reproduces the samples")
+
+
+def _less_sure(found: TunableVerdict) -> TunableVerdict:
+    if found.verdict is not Identification.IDENTIFIED:
+        return found
+    return _said(found, Identification.PARTLY, "partly identified, for the samples raise some doubt about the model")
+
+
+def _said(found: TunableVerdict, verdict: Identification, words: str) -> TunableVerdict:
+    sentence = found.sentence.replace(found.verdict.value, words, 1)
     helps = ("a tunable for what the model lacks",)
-    return found.model_copy(update={"verdict": Identification.DOUBTFUL, "sentence": sentence, "helps": helps})
+    return found.model_copy(update={"verdict": verdict, "sentence": sentence, "helps": helps})
 
 
 def _judged(left: float | None) -> Identification:

@@ -19,7 +19,7 @@ from gaplab.services.core.repeats import pooled_variance
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
-from gaplab.services.core.unreproduced import unreproduced
+from gaplab.services.core.unreproduced import surprise, unreproduced
 from gaplab.services.results.files import csv_text
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples
@@ -60,7 +60,8 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
     unseen = overfitting(points[-1], error_unit) if points else ""
-    wrong = _unreproduced(row.id, robot, by_iteration[points[-1].iteration], error_unit) if points else ""
+    latest = by_iteration[points[-1].iteration] if points else []
+    wrong = _unreproduced(row.id, robot, latest, error_unit)
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
@@ -70,7 +71,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
-        verdicts=verdicts(points, samples, _means(spec, robot), unreproduced=bool(wrong)),
+        verdicts=verdicts(points, samples, _means(spec, robot), surprise(latest)),
     )
 
 
