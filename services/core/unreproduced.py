@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.identification import Doubt
 from gaplab.services.core.misfit import Tuning
-from gaplab.services.core.misspecification import SURPRISING
+from gaplab.services.core.misspecification import CREDIBLE, SURPRISING
 from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.types import Fit
 
@@ -25,6 +26,16 @@ def surprise(tunings: Sequence[Tuning]) -> float | None:
     """Return the surprise that at least half of the repetitions that know theirs reach; None if none knows."""
     known = sorted(each.fit.surprise for each in tunings if each.fit is not None)
     return known[(len(known) - 1) // 2] if known else None
+
+
+def doubt(tunings: Sequence[Tuning], *, simulated: bool) -> Doubt | None:
+    """Return the doubt about the model; None without any, and for a simulated reality that has no noise."""
+    found = surprise(tunings)
+    if found is None:
+        return None if simulated else Doubt.UNTESTED
+    if found <= SURPRISING:
+        return Doubt.WRONG
+    return Doubt.SOME if found <= CREDIBLE else None
 
 
 def unreproduced(tunings: Sequence[Tuning], sensors: Sensors | None, unit: str) -> str:
