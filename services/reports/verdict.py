@@ -29,7 +29,8 @@ RULES = (
     f"rising or falling if the interval of the gain over the last {FEWEST_EVALUATIONS} evaluations is above or below "
     "0. Otherwise more repetitions would tell.",
     "No simulator is said to reproduce the samples if at least half of the repetitions are surprised: of 40 plausible "
-    "simulators that play reality with the noise of the measurements, fewer than two leave as much error after tuning.",
+    "simulators that play reality with the noise of the measurements, fewer than two leave as much error after tuning. "
+    "Up to a fifth, no tunable is called identified.",
     f"Nothing is said of a curve with fewer than {FEWEST_REPETITIONS} repetitions or {FEWEST_EVALUATIONS} evaluations.",
 )
 

@@ -20,7 +20,7 @@ from gaplab.services.core.repeats import pooled_variance
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
-from gaplab.services.core.unreproduced import unreproduced
+from gaplab.services.core.unreproduced import doubt, unreproduced
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import installed_robot, unit
@@ -49,8 +49,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     posteriors = {place: _deviations(*found) for place, found in members.items()}
     by_iteration: dict[int, list[Tuning]] = defaultdict(list)
     for best in simulators:
-        posterior = posteriors.get((best.repetition, best.iteration))
-        by_iteration[best.iteration].append(_tuning(best, measured, posterior, row.spec["tunables"], discrepancy))
+        by_iteration[best.iteration].append(_tuning(best, measured, posteriors, row.spec["tunables"], discrepancy))
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, by_iteration[iteration], names, parameters_of(spec.tunables))
@@ -59,7 +58,9 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
     unseen = overfitting(points[-1], error_unit) if points else ""
-    wrong = _unreproduced(row.id, robot, by_iteration[points[-1].iteration], error_unit) if points else ""
+    latest = by_iteration[points[-1].iteration] if points else []
+    wrong = _unreproduced(row.id, robot, latest, error_unit)
+    doubted = doubt(latest, simulated=spec.reality.kind == "simulated")
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
@@ -69,7 +70,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
-        verdicts=verdicts(points, samples, _means(spec, robot), unreproduced=bool(wrong)),
+        verdicts=verdicts(points, samples, _means(spec, robot), doubted),
     )
 
 
@@ -101,7 +102,7 @@ def misfit_csv(found: MisfitRead) -> str:
 def _tuning(
     best: BestSimulator,
     measured: MeasuredIterations,
-    posterior: FloatArray | None,
+    posteriors: Mapping[tuple[int, int], FloatArray | None],
     tunables: Sequence[Mapping[str, Any]],
     discrepancy: Discrepancy,
 ) -> Tuning:
@@ -115,7 +116,7 @@ def _tuning(
         held_out_error=nan if best.held_out_error is None else best.held_out_error,
         held_out=measured.tested_until(*place),
         interval=tunings.intervals(best.parameters, best.lower, best.upper, best.fit, tunables),
-        posterior=posterior,
+        posterior=posteriors.get(place),
         discrepancy=discrepancy,
         fit=best.fit,
     )
