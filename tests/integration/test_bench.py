@@ -225,31 +225,6 @@ def test_a_take_ends_by_silence_and_a_clock_that_was_set_ends_none(store: Store,
     assert taking.reopen(store, request.id).state == "open"
 
 
-@pytest.mark.dialects
-def test_a_bench_stays_taken_until_its_holder_has_let_go_or_is_silent(store: Store) -> None:
-    """Also if the request is wanted no more, or somebody else's answer counts: a driver may still move the robot."""
-    first, second, third = (submit_experiment(store, bench(reality={"bench": "table"})) for _ in range(3))
-    compute(store)
-    one, two, three = pending(store)
-    for request, experiment in ((one, first), (two, second)):
-        taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
-        if request is one:
-            lifecycle.ask_experiment(store, experiment.id, Verb.CANCEL)
-        else:
-            other = measure(store, request, 0.3)
-            corrections.decide(store, other.id, ConflictSpec(counts="this", reason="Ada's phone is dead"), FREELY)
-        with pytest.raises(Conflict, match="take 1 of request"):
-            taking.heartbeat(store, request.id, HolderSpec(take=1))
-        with pytest.raises(Conflict, match="one is taken at a time"):
-            taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY)
-        if request is one:
-            assert taking.release(store, request.id, ReleaseSpec(take=1)).state == "withdrawn"
-        else:
-            assert fall_silent(store) == 1
-
-    assert taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY).answer.experiment == third.id
-
-
 def test_no_take_ends_while_its_request_is_answered(postgres_store: Store) -> None:
     """As it would if a supervisor ended takes between the moment a request is read and the moment it is written."""
     submit_experiment(postgres_store, bench())
@@ -540,6 +515,31 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
         measure(store, requests[three.id], 0.4)
     waiting_for = [RequestFilter(experiment=id_) for id_ in (one.id, three.id)]
     assert [taking.none_will_follow(store, each) for each in (*waiting_for, RequestFilter())] == [False, True, False]
+
+
+@pytest.mark.dialects
+def test_a_bench_stays_taken_until_its_holder_has_let_go_or_is_silent(store: Store) -> None:
+    """Also if the request is wanted no more, or somebody else's answer counts: a driver may still move the robot."""
+    first, second, third = (submit_experiment(store, bench(reality={"bench": "table"})) for _ in range(3))
+    compute(store)
+    one, two, three = pending(store)
+    for request, experiment in ((one, first), (two, second)):
+        taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
+        if request is one:
+            lifecycle.ask_experiment(store, experiment.id, Verb.CANCEL)
+        else:
+            other = measure(store, request, 0.3)
+            corrections.decide(store, other.id, ConflictSpec(counts="this", reason="Ada's phone is dead"), FREELY)
+        with pytest.raises(Conflict, match="take 1 of request"):
+            taking.heartbeat(store, request.id, HolderSpec(take=1))
+        with pytest.raises(Conflict, match="one is taken at a time"):
+            taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY)
+        if request is one:
+            assert taking.release(store, request.id, ReleaseSpec(take=1)).state == "withdrawn"
+        else:
+            assert fall_silent(store) == 1
+
+    assert taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY).answer.experiment == third.id
 
 
 def test_known_samples_tune_the_first_simulators(store: Store) -> None:
