@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from gaplab.api.clients.drivers import DriverBroken, Robot, load
-from gaplab.api.clients.measuring import measure
+from gaplab.api.clients.drivers import DriverBroken, Robot, load, measure
 from gaplab.api.commands.app import BENCH, ExperimentId, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.request_words import print_safety

@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from gaplab.api.clients.drivers import DriverBroken, Robot
-from gaplab.api.clients.measuring import measure
+from gaplab.api.clients.drivers import DriverBroken, Robot, measure
 
 
 class Driver:
@@ -41,7 +40,11 @@ class Driver:
     ],
 )
 def test_no_sign_of_life_is_given_for_a_robot_that_cannot_be_stopped(driver: Driver, said: str) -> None:
-    take, motion = SimpleNamespace(lost=None, ask=lambda: None, over=Event()), SimpleNamespace(observe_s=(3.0,))
+    left: list[int] = []
+    take, motion = (
+        SimpleNamespace(lost=None, ask=lambda: None, leave=lambda: left.append(1)),
+        SimpleNamespace(observe_s=(3.0,)),
+    )
     task: Any = SimpleNamespace(take=take, motion=motion, sensors=None, known=[], repeats=1)
     robot = Robot(driver, stop_s=0.2)
 
@@ -55,4 +58,4 @@ def test_no_sign_of_life_is_given_for_a_robot_that_cannot_be_stopped(driver: Dri
         str(told.value)
         == f"{said}; the driver's run took more than 0.1 s, so the robot was stopped; `--limit-s` permits more"
     )
-    assert (take.over.is_set(), driver.stops) == (True, 1)
+    assert (left, driver.stops) == ([1], 1)
