@@ -147,7 +147,7 @@ def test_a_driver_whose_token_is_revoked_stops_its_robot(sqlite_store: Store, ga
     id_ = submit(sqlite_store, "warn")
     ask(sqlite_store)
     token = access.create_token(sqlite_store, Role.RUNNER, "driver")
-    RUNS.append(until_stopped(lambda: access.revoke_token(sqlite_store, token.id)))
+    RUNS.append(until_stopped(lambda: access.revoke_token(sqlite_store, token.token.id)))
 
     driven = gaplab("drive", id_, "--driver", driver, "--limit-s", "60", "--lease-s", "1", GAPLAB_TOKEN=token.secret)
 
