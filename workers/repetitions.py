@@ -67,7 +67,7 @@ class Repetitions:
         self._unsure = False
         self._permits: Handle | None = None
         self._renewed = -lease_s
-        self._silences = Silences()
+        self._silences = Silences[int]()
 
     def launch(self, claim: Claim) -> Run:
         """Give a claimed repetition to a Ray task."""

@@ -17,6 +17,7 @@ from time import monotonic
 from gaplab.services.bench.taking import open_again
 from gaplab.services.core.errors import RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.running import execution, supervisors
+from gaplab.services.running.leases import Silences
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S
@@ -65,6 +66,7 @@ class Supervisor:
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._repetitions = Repetitions(store, self._owner, versions or {}, checkpoint_s, patience, lease_s)
         self._checks = Checks(store, self._owner, lease_s, versions, patience)
+        self._takes = Silences[str]()
         self._lease_s = lease_s
         self._beat = -lease_s
         self._noted: datetime | None = None
@@ -97,6 +99,7 @@ class Supervisor:
                     raise
                 except StoreUnavailable as error:
                     log.warning("waiting: %s", error)
+                    self._takes.forget()
                     stop.wait(RETRY_S)
             self._wind_down()
         except RayGone as error:
@@ -145,7 +148,7 @@ class Supervisor:
         self._repetitions.heartbeat()
         self._checks.heartbeat()
         self._repetitions.requeue_lost()
-        if opened := open_again(self._store):
+        if opened := open_again(self._store, self._takes):
             log.warning("%d requests whose take ran out are open again", opened)
         self._beat = monotonic()
 

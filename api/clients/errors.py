@@ -80,6 +80,11 @@ def if_found() -> Iterator[None]:
             raise
 
 
+def is_of_gaplab(error: Exception) -> bool:
+    """Return whether gaplab itself refused a request, and not a proxy or another service at its address."""
+    return isinstance(error, ServiceError) and error.problem.type.startswith("urn:gaplab:")
+
+
 def refuses_sender(error: ServiceError) -> bool:
     """Return whether the service refused the token, and not what was sent with it."""
     return error.problem.status in {401, 403}

@@ -1,13 +1,12 @@
 """The command that drives a robot on a bench."""
 
 import signal
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gaplab.api.clients.drivers import DriverBroken, load, measure
+from gaplab.api.clients.drivers import DriverBroken, Robot, load, measure
 from gaplab.api.commands.app import BENCH, ExperimentId, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import echo
@@ -33,10 +32,10 @@ def drive(  # noqa: PLR0913, PLR0917 - each is an option of the command
     url: Url = None,
 ) -> None:
     """Measure what an experiment asks for with a driver, until the experiment has ended."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _stop_at_signals()
     kept = journal or driver.with_name(f"{driver.stem}-{id}.journal")
     try:
-        robot = load(driver)
+        robot = Robot(load(driver))
         with connect(url) as client:
             client.experiment(id)
             robot.connect()
@@ -45,11 +44,17 @@ def drive(  # noqa: PLR0913, PLR0917 - each is an option of the command
                     _announce(task.request, within_limits=within_limits)
                     measure(task, robot, limit_s, lambda sentence: echo(f"  {sentence}"))
             finally:
-                with suppress(Exception):
-                    robot.stop()
+                robot.stop()
     except DriverBroken as error:
         raise CommandError(str(error), Exit.FAILED) from error
     echo("The experiment has ended.")
+
+
+def _stop_at_signals() -> None:
+    """Stop in order also if the terminal closes or the machine shuts down; a signal that a shell ignores stays so."""
+    for each in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        if signal.getsignal(each) is not signal.SIG_IGN:
+            signal.signal(each, signal.default_int_handler)
 
 
 def _announce(request: RequestRead, *, within_limits: bool) -> None:

@@ -70,8 +70,6 @@ def _answer(
     experiment = session.get_one(ExperimentRow, repetition.experiment_id)
     check_values(spec_of(experiment.spec), spec.values, spec.readings, spec.unit)
     check_attachments(session, spec.attachments)
-    requests.expire(session, RequestRow.id == row.id)
-    session.refresh(row)
     answered = row.state in requests.ANSWERED
     counted = requests.counted_answer(session, row) if answered else None
     if row.state is RequestState.WITHDRAWN or (answered and counted is None):
@@ -80,7 +78,8 @@ def _answer(
     if counted is not None and _says_nothing_new(counted, spec):
         counted.doubts = None if spec.confirmed else counted.doubts
         return view_answer(counted)
-    counts = counted is None and (row.state is not RequestState.TAKEN or spec.take == row.takes)
+    latest = (spec.take or row.takes) >= row.takes if row.state is not RequestState.TAKEN else spec.take == row.takes
+    counts = counted is None and latest
     given = insert_answer(session, row, spec, AnswerState.COUNTED if counts else AnswerState.CONFLICT, token)
     if traces is not None:
         kept = set(TraceRead.model_fields)
@@ -122,9 +121,10 @@ def insert_answer(
 
 
 def settle_request(session: Session, row: RequestRow, given: AnswerRow) -> None:
-    """End a request with the answer that counts."""
+    """End a request with the answer that counts. If it is of another, the holder has the bench until he lets go."""
     to = RequestState.MEASURED if given.values is not None else RequestState.FAILED
-    become(session, row, to, held=None, unanswered=0, taken_until=None, ended_at=moment(session))
+    held = None if given.take == row.takes else row.held
+    become(session, row, to, held=held, unanswered=0, ended_at=moment(session))
 
 
 def note_answer(

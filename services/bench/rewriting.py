@@ -94,8 +94,7 @@ def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) 
         become(session, request, RequestState.WITHDRAWN)
         move(session, RepetitionRow, RepetitionRow.id == repetition.id, State.QUEUED, losses=0)
     else:
-        fresh = dict.fromkeys(("branch", "ended_at", "held", "taken_until"))
-        become(session, request, RequestState.OPEN, unanswered=0, **fresh)
+        become(session, request, RequestState.OPEN, unanswered=0, branch=None, ended_at=None)
         of_it = RepetitionRow.id == repetition.id
         move(session, RepetitionRow, of_it, State.QUEUED, losses=0)
         move(session, RepetitionRow, of_it, State.WAITING)

@@ -2,14 +2,12 @@
 
 import re
 from contextlib import suppress
-from datetime import timedelta
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Error, expect
-from sqlalchemy import update
 
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
@@ -18,11 +16,9 @@ from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.experiments.submission import submit_experiment
-from gaplab.services.store.clock import moment as moment_of
-from gaplab.services.store.models import RequestRow
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
-from tests.integration.test_bench import bench, compute, finish
+from tests.integration.test_bench import bench, compute, fall_silent, finish
 from tests.integration.test_bench_http import traces_of
 
 PHONE = {"width": 390, "height": 844}
@@ -295,7 +291,7 @@ def test_conflicts_are_decided_stuck_requests_opened_and_refusals_shown(visit: A
     (stuck,) = waiting(written, experiment)
     for _ in range(5):
         taking.take(written, stuck.id, TakeSpec(operator="robot 7", lease_s=1.0), FREELY)
-        expire(written)
+        fall_silent(written)
 
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
     page.get_by_role("heading", name="Conflicts to decide").wait_for()
@@ -318,14 +314,6 @@ def test_conflicts_are_decided_stuck_requests_opened_and_refusals_shown(visit: A
     page.get_by_role("button", name="Open it again").click()
     page.get_by_role("button", name="Take it").wait_for()
     assert waiting(written, experiment)[0].state == "open"
-
-
-def expire(store: Store) -> None:
-    """Let the takes run out that are held now."""
-    with store.transaction() as session:
-        before = moment_of(session) - timedelta(hours=1)
-        session.execute(update(RequestRow).where(RequestRow.held.is_not(None)).values(taken_until=before))
-    taking.open_again(store)
 
 
 @pytest.mark.release

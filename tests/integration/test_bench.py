@@ -37,6 +37,7 @@ from gaplab.services.reports.outcome import outcome_of
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
+from gaplab.services.running.leases import Silences
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.lease import Pulse
@@ -94,6 +95,12 @@ def truth(spec: ExperimentSpec) -> Callable[[Any], float]:
 def measure(store: Store, request: Any, *values: float, **changes: Any) -> Any:
     spec = MeasurementSpec(values=values, operator="Ada", **changes)
     return answering.answer(store, request.id, spec, FREELY).answer
+
+
+def fall_silent(store: Store) -> int:
+    """End the takes that are held, as a supervisor does that hears nothing for their whole lease."""
+    silences = Silences[str](iter([0.0, 1e9]).__next__)
+    return [taking.open_again(store, silences) for _ in range(2)][-1]
 
 
 def finish(store: Store, fitness: Callable[[Any], float]) -> list[Any]:
@@ -189,18 +196,31 @@ def test_a_take_has_one_holder_and_a_bench_one_take(store: Store) -> None:
 
 @pytest.mark.dialects
 @pytest.mark.parametrize("by_s", [-3600, 3600])
-def test_a_take_ends_with_its_lease_also_if_the_clock_was_set(store: Store, by_s: float) -> None:
-    """`taken_until` in the past is over; so is one that no heartbeat could have set."""
-    submit_experiment(store, bench())
+def test_a_take_ends_by_silence_and_a_clock_that_was_set_ends_none(store: Store, by_s: float) -> None:
+    submit_experiment(store, bench(repetitions=2))
     compute(store)
-    (request,) = pending(store)
-    for count in range(1, 6):
-        taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
-        with store.transaction() as session:
+    request, other = pending(store)
+    time = [0.0]
+    silences = Silences[str](lambda: time[0])
+    for state in ("open", "open", "open", "open", "stuck"):
+        take = taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY).answer.takes
+        assert taking.open_again(store, silences) == 0
+        with store.transaction() as session:  # the heartbeat was given by the clock before it was set
             until = session.get_one(RequestRow, request.id).taken_until
             assert until is not None
             session.execute(update(RequestRow).values(taken_until=until + timedelta(seconds=by_s)))
-        assert pending(store)[0].state == ("open" if count < 5 else "stuck")
+        with pytest.raises(Conflict, match="one is taken at a time"):
+            taking.take(store, other.id, TakeSpec(operator="Bo"), FREELY)
+        for _ in range(2):
+            assert taking.open_again(store, silences) == 0
+            time[0] += 599.0
+            assert taking.open_again(store, silences) == 0
+            assert taking.heartbeat(store, request.id, HolderSpec(take=take)).state == "taken"
+        assert taking.open_again(store, silences) == 0
+        time[0] += 601.0
+        restarted = Silences[str](lambda: time[0])
+        assert (taking.open_again(store, restarted), taking.open_again(store, silences)) == (0, 1)
+        assert pending(store)[0].state == state
     with pytest.raises(Conflict, match="5 times in a row"):
         taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
     assert taking.reopen(store, request.id).state == "open"
@@ -496,6 +516,31 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
         measure(store, requests[three.id], 0.4)
     waiting_for = [RequestFilter(experiment=id_) for id_ in (one.id, three.id)]
     assert [taking.none_will_follow(store, each) for each in (*waiting_for, RequestFilter())] == [False, True, False]
+
+
+@pytest.mark.dialects
+def test_a_bench_stays_taken_until_its_holder_has_let_go_or_is_silent(store: Store) -> None:
+    """Also if the request is wanted no more, or somebody else's answer counts: a driver may still move the robot."""
+    first, second, third = (submit_experiment(store, bench(reality={"bench": "table"})) for _ in range(3))
+    compute(store)
+    one, two, three = pending(store)
+    for request, experiment in ((one, first), (two, second)):
+        taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
+        if request is one:
+            lifecycle.ask_experiment(store, experiment.id, Verb.CANCEL)
+        else:
+            other = measure(store, request, 0.3)
+            corrections.decide(store, other.id, ConflictSpec(counts="this", reason="Ada's phone is dead"), FREELY)
+        with pytest.raises(Conflict, match="take 1 of request"):
+            taking.heartbeat(store, request.id, HolderSpec(take=1))
+        with pytest.raises(Conflict, match="one is taken at a time"):
+            taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY)
+        if request is one:
+            assert taking.release(store, request.id, ReleaseSpec(take=1)).state == "withdrawn"
+        else:
+            assert fall_silent(store) == 1
+
+    assert taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY).answer.experiment == third.id
 
 
 def test_known_samples_tune_the_first_simulators(store: Store) -> None:

@@ -9,7 +9,6 @@ from collections.abc import AsyncIterator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from datetime import timedelta
 from itertools import count
 from typing import Any
 
@@ -48,15 +47,14 @@ from gaplab.services.running import execution, provenance, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.running.versions import provenance as own
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.store.clock import moment
 from gaplab.services.store.lease import Failure
-from gaplab.services.store.models import EventCounterRow, EventRow, RequestRow
+from gaplab.services.store.models import EventCounterRow, EventRow
 from gaplab.services.store.queries.events import note, write
 from gaplab.services.store.queries.experiments import insert_experiment
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, some_log, toy
 from tests.integration import test_bench_safety
-from tests.integration.test_bench import compute, measure
+from tests.integration.test_bench import compute, fall_silent, measure
 from tests.waiting import wait_until
 
 DEADLINE_S = 180
@@ -132,9 +130,7 @@ def on_a_bench(store: Store) -> None:
         taken = taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY).answer
         if taken.takes == 1:
             taking.release(store, request.id, ReleaseSpec(take=1))
-    with store.transaction() as session:
-        session.execute(update(RequestRow).values(taken_until=moment(session) - timedelta(seconds=1)))
-    assert taking.open_again(store) == 1
+    assert fall_silent(store) == 1
     measure(store, request, 0.4)
     other = measure(store, request, 0.3)
     corrections.decide(store, other.id, ConflictSpec(counts="this", reason="the first was another"), FREELY)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event
@@ -18,15 +19,20 @@ import pytest
 from sqlalchemy import select
 
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
+from gaplab.schemas.measurements import TakeSpec
+from gaplab.services.bench import taking
 from gaplab.services.core.errors import RayGone, StoreChanged
 from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments.limits import FREELY
 from gaplab.services.running import execution
+from gaplab.services.running.leases import Silences
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
 from gaplab.workers import watch
 from gaplab.workers.ray_folder import PREFIX, ray_folder
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import toy
+from tests.integration.test_bench import bench, compute, pending
 from tests.waiting import wait_until
 from tests.without_ray import Here
 
@@ -197,6 +203,35 @@ def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_
 
     assert still_held == (claim,)
     assert execution.heartbeat(store, [claim]) == ()
+
+
+def test_a_time_in_which_nobody_could_show_a_sign_of_life_ends_no_take(
+    sqlite_store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    submission.submit_experiment(sqlite_store, bench())
+    compute(sqlite_store)
+    (request,) = pending(sqlite_store)
+    taking.take(sqlite_store, request.id, TakeSpec(operator="Ada"), FREELY)
+    clock, stop = [0.0], Event()
+    supervisor = Supervisor(sqlite_store, lambda: 0, lease_s=0.0)
+    supervisor._takes = Silences(lambda: clock[0])
+    supervisor.step()
+    assert sqlite_store.file is not None
+    aside = sqlite_store.file.rename(sqlite_store.file.with_suffix(".aside"))
+    with ThreadPoolExecutor() as pool:
+        served = pool.submit(supervisor.serve, stop)
+        wait_until(lambda: "waiting: " in caplog.text)
+        stop.set()
+        served.result()
+    aside.rename(sqlite_store.file)
+
+    clock[0] = 3600.0
+    supervisor.step()
+    after = pending(sqlite_store)[0].state
+    clock[0] += 601.0
+    supervisor.step()
+
+    assert (after, pending(sqlite_store)[0].state) == ("taken", "open")
 
 
 def test_what_has_begun_is_never_handed_back_for_what_is_more_urgent(sqlite_store: Store) -> None:

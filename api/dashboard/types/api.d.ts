@@ -530,6 +530,7 @@ declare namespace Api {
     take: number;
     operator: string | null;
     reason: string | null;
+    moved_s: number | null;
   }
   interface RepetitionRead {
     number: number;

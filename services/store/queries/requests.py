@@ -1,7 +1,6 @@
 """Rows of requests for physical measurements, and of their answers."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from datetime import datetime, timedelta
 
 from sqlalchemy import ColumnElement, select, union_all
 from sqlalchemy.orm import Session
@@ -127,37 +126,22 @@ def get_answer(session: Session, id_: str) -> AnswerRow:
     return row
 
 
-def is_expired(row: RequestRow, at: datetime) -> bool:
-    """Return whether a take has ended without an answer.
-
-    A take that ends later than a heartbeat could have set was set before the clock was set back, and says nothing.
-    """
-    if row.state is not RequestState.TAKEN or row.taken_until is None:
-        return False
-    return not at < row.taken_until <= at + timedelta(seconds=row.lease_s or 0.0) + timedelta(seconds=1)
-
-
-def expire(session: Session, which: ColumnElement[bool] | None = None) -> int:
-    """Open the requests again whose take has ended, and return their number."""
-    row, at = RequestRow, moment(session)
-    taken = select(row).where(row.state == RequestState.TAKEN)
-    taken = taken if which is None else taken.where(which)
-    expired = [each for each in session.scalars(taken.with_for_update()) if is_expired(each, at)]
-    for each in expired:
-        give_up(session, each, EventKind.TAKE_EXPIRED)
-    session.flush()
-    return len(expired)
-
-
 def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
-    """End the take of a request that got no answer; `more` is told in its event."""
+    """End the take of a request that got no answer; `more` is told in its event, if it is still wanted."""
+    if row.state is not RequestState.TAKEN:
+        row.held = None
+        return
     unanswered = row.unanswered + (kind is EventKind.TAKE_EXPIRED)
     to = RequestState.STUCK if unanswered >= MOST_UNANSWERED else RequestState.OPEN
     request_states.become(session, row, to, held=None, unanswered=unanswered)
-    repetition = session.get(RepetitionRow, row.repetition_id)
-    if repetition is not None:
-        body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by, **more}
-        note(session, kind, repetition.experiment_id, repetition.number, **body)
+    note_end(session, row, kind, **more)
+
+
+def note_end(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
+    """Add the event of the end of a take; `more` is told in it."""
+    repetition = session.get_one(RepetitionRow, row.repetition_id)
+    body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by, **more}
+    note(session, kind, repetition.experiment_id, repetition.number, **body)
 
 
 def answers_of(session: Session, requests: Iterable[str]) -> dict[str, list[AnswerRow]]:
