@@ -1,4 +1,4 @@
-"""Figures as self-contained HTML files, with the JavaScript of the Python package plotly inside."""
+"""Figures as self-contained HTML files, with Plotly inside."""
 
 import json
 from functools import cache
@@ -39,7 +39,7 @@ def render_html(figure: FigureDefinition) -> str:
         alt=escape(figure.alt),
         caption=escape(figure.caption),
         numbers=_numbers(figure.table) if figure.table else "",
-        plotly=_resource("plotly", "package_data", "plotly.min.js"),
+        plotly=_resource("gaplab.services.figures.plotly", "library", "plotly-basic.min.js"),
         data=_script(drawn["data"]),
         layout=_script(_on_white(drawn["layout"])),
         config=_script(CONFIG | {"toImageButtonOptions": {"format": "svg", "filename": f"gaplab-{figure.name}"}}),
