@@ -90,12 +90,14 @@ def percent(progress: Progress) -> str:
 
 
 def counts(progress: Progress) -> str:
-    """Return the finished repetitions, iterations and rollouts as a sentence."""
+    """Return the finished repetitions, iterations and rollouts as a sentence, with some of the steps under way."""
     failed = f", {progress.failed} failed" if progress.failed else ""
     physics = f", {progress.rollouts_failed:,} of them nan" if progress.rollouts_failed else ""
     iterations = f"{progress.counted_iterations_done} of {progress.counted_iterations} iterations; "
+    now = [f"; {each.kind} {each.iteration}: {100 * each.rollouts // each.budget} %" for each in progress.steps]
     return (
         f"{progress.completed} of {progress.repetitions} repetitions{failed}; "
         f"{iterations if progress.counted_iterations else ''}"
         f"{progress.rollouts_done:,} rollouts{physics}, {progress.rollouts_saved:,} saved, of {progress.rollouts:,}"
+        f"{''.join(now[:3])}"
     )
