@@ -67,9 +67,6 @@ class Answers:
         recorder: records what `simulate` and `sense` return.
         sense: the simulation with readings; None if there is none.
         periods: `(q,)`: period of each reading, over its noise; 0 if it has none.
-
-    Attributes:
-        budget: rollouts that the step was given.
     """
 
     def __init__(
@@ -82,7 +79,7 @@ class Answers:
         periods: FloatArray = NO_READINGS,
     ) -> None:
         self.periods = periods
-        self.budget = 0
+        self.budget = 0  # rollouts that the step was given
         self._simulate = simulate
         self._with_readings = sense
         self._batch_size = batch_size

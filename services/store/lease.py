@@ -19,8 +19,7 @@ class Checkpoint:
         part: number of the checkpoint within the step, from 0.
         answers: answers, packed by `gaplab.services.core.answers`.
         seconds: seconds of work that they took.
-        rollouts: rollouts of the step so far, at most `budget`.
-        budget: rollouts that the step was given.
+        rollouts, budget: rollouts of the step so far, and those that it was given.
     """
 
     step: int

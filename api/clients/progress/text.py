@@ -35,9 +35,7 @@ def colored(state: State) -> str:
 
 def standing(record: Record) -> str:
     """Return the state of a study or an experiment in its colour, with what the state alone does not say."""
-    if not record.caveat:
-        return colored(record.state)
-    return f"[yellow]{record.state}, {escape(record.caveat)}[/]"
+    return f"[yellow]{escape(state_text(record))}[/]" if record.caveat else colored(record.state)
 
 
 def state_text(record: Record) -> str:

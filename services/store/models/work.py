@@ -66,7 +66,7 @@ class CheckpointRow(Base):
         part: number of the part within the step.
         answers: digests and fitnesses, packed by `gaplab.services.core.answers`; no other module reads them.
         seconds: seconds of work that they took.
-        rollouts, budget: of the step so far, and in all.
+        rollouts, budget: rollouts of the step so far, and those that it was given.
     """
 
     __tablename__ = "checkpoint"

@@ -81,7 +81,5 @@ def begun(session: Session, experiments: Sequence[str]) -> Iterator[tuple[str, S
     joined = query.join(of, of.id == row.repetition_id).where(last).order_by(of.number)
     for experiment, number, place, rollouts, budget in session.execute(joined):
         iteration, kind = divmod(place + _KINDS.index("tuning"), len(_KINDS))
-        yield (
-            experiment,
-            StepRead(repetition=number, iteration=iteration, kind=_KINDS[kind], rollouts=rollouts, budget=budget),
-        )
+        step = StepRead(repetition=number, iteration=iteration, kind=_KINDS[kind], rollouts=rollouts, budget=budget)
+        yield experiment, step
