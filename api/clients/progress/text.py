@@ -54,9 +54,7 @@ def colored(state: State) -> str:
 
 def standing(record: Record) -> str:
     """Return the state of a study or an experiment in its colour, with what the state alone does not say."""
-    if not record.caveat:
-        return colored(record.state)
-    return f"[yellow]{record.state}, {escape(record.caveat)}[/]"
+    return f"[yellow]{escape(state_text(record))}[/]" if record.caveat else colored(record.state)
 
 
 def state_text(record: Record) -> str:
@@ -109,12 +107,14 @@ def percent(progress: Progress) -> str:
 
 
 def counts(progress: Progress) -> str:
-    """Return the finished repetitions, iterations and rollouts as a sentence."""
+    """Return the finished repetitions, iterations and rollouts as a sentence, with some of the steps under way."""
     failed = f", {progress.failed} failed" if progress.failed else ""
     physics = f", {progress.rollouts_failed:,} of them nan" if progress.rollouts_failed else ""
     iterations = f"{progress.counted_iterations_done} of {progress.counted_iterations} iterations; "
+    now = [f"; {each.kind} {each.iteration}: {100 * each.rollouts // each.budget} %" for each in progress.steps]
     return (
         f"{progress.completed} of {progress.repetitions} repetitions{failed}; "
         f"{iterations if progress.counted_iterations else ''}"
         f"{progress.rollouts_done:,} rollouts{physics}, {progress.rollouts_saved:,} saved, of {progress.rollouts:,}"
+        f"{''.join(now[:3])}"
     )

@@ -488,6 +488,7 @@ declare namespace Api {
     rollouts_saved: number;
     seconds_left: number | null;
     time_left: TimeLeft | null;
+    steps: Array<StepRead>;
   }
   interface Provenance {
     gaplab: string;
@@ -753,6 +754,13 @@ declare namespace Api {
     remarks: Array<string>;
   }
   type State = "QUEUED" | "RUNNING" | "PAUSING" | "PAUSED" | "STOPPING" | "COMPLETED" | "FAILED" | "CANCELLED" | "WAITING";
+  interface StepRead {
+    repetition: number;
+    iteration: number;
+    kind: string;
+    rollouts: number;
+    budget: number;
+  }
   interface StudyRead {
     id: string;
     name: string;
