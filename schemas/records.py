@@ -83,6 +83,7 @@ class FitnessRead(Frozen):
     """
 
     evaluations: int = Field(examples=[10])
+    known: int = Field(default=0, description="samples from before the experiment, which `evaluations` does not count")
     n: int = Field(description="repetitions in the mean", examples=[40])
     mean: float = Field(examples=[0.585])
     sd: Statistic = Field(description="sample standard deviation")

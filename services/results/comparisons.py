@@ -15,6 +15,7 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.fitness import fitness_of
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments
+from gaplab.services.figures.words import evaluations
 from gaplab.services.results.curves import values_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
@@ -84,9 +85,12 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
     pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
     by_id = {row.id: row for row in rows}
+    last = evaluations(final, *(row.known for row in rows if row.tunes))
+    where = f"after {last}" if first == final else f"mean of each repetition over {first} to {last}"
     warned = (tuple(warnings(by_id[pair.first], by_id[pair.second], concealed)) for pair in pairs)
     return tuple(
-        pair.model_copy(update={"warnings": each, "fitness": fitness}) for pair, each in zip(pairs, warned, strict=True)
+        pair.model_copy(update={"warnings": each, "fitness": fitness, "where": where})
+        for pair, each in zip(pairs, warned, strict=True)
     )
 
 
@@ -121,7 +125,7 @@ def _in_units(session: Session, rows: Sequence[ExperimentRow], margin: Margin) -
         return margin.value
     studies = {row.study_id for row in rows if row.study_id is not None}
     baselines = _direct(rows) or _direct(experiments.experiments_of(session, sorted(studies)))
-    means = [point.mean for point in fitness_of(session, [row.id for row in baselines]).values()]
+    means = [point.mean for point in fitness_of(session, baselines).values()]
     if len(baselines) != 1 or len(means) != 1 or means[0] <= 0:
         message = (
             "a margin as a share of direct needs one direct baseline with a fitness above 0 among the experiments or "

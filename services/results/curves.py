@@ -123,6 +123,7 @@ def _curve(row: ExperimentRow, values: FloatArray, fitness: Fitness) -> Curve:
         fitness=fitness,
         direct=direct,
         level=not row.tunes,
+        known=row.known,
         points=curve_points(values),
         best_of=best_of_searches(values[:, 0]) if direct else (),
     )

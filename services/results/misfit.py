@@ -57,6 +57,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     )
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
+    told = remarks(points, unit(spec), error_unit, row.known)
     unseen = overfitting(points[-1], error_unit) if points else ""
     latest = by_iteration[points[-1].iteration] if points else []
     wrong = _unreproduced(row.id, robot, latest, error_unit)
@@ -66,7 +67,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         unit=unit(spec),
         error_unit=error_unit,
         points=points,
-        remarks=tuple(filter(None, [wrong, _known(measured), *remarks(points, unit(spec), error_unit), unseen])),
+        remarks=tuple(filter(None, [wrong, _known(measured), *told, unseen])),
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),

@@ -9,8 +9,10 @@ from rich.markup import escape
 from rich.segment import Segment
 
 from gaplab.api.clients.records import Record
+from gaplab.schemas.curves import from_before
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Progress, StudyRead, TimeLeft
+from gaplab.services.figures.words import evaluations
 
 COLORS = {
     State.QUEUED: "dim",
@@ -83,7 +85,7 @@ def left(record: Record) -> str:
 def fitness(record: Record) -> str:
     """Return the fitness of an experiment, or of a study's best, with its number of evaluations: "0.585 at 10"."""
     found = record.best if isinstance(record, StudyRead) else record.fitness
-    return f"{found.mean:.3f} at {found.evaluations}" if found else "-"
+    return f"{found.mean:.3f} at {found.evaluations}{from_before(found.known)}" if found else "-"
 
 
 def best(study: StudyRead) -> list[str]:
@@ -91,8 +93,8 @@ def best(study: StudyRead) -> list[str]:
     found = study.best
     if not found:
         return []
-    evaluations = f"{found.evaluations} real-world evaluation{'' if found.evaluations == 1 else 's'}"
-    return [f"best: {found.name.replace('_', ' ')}, mean {found.mean:.3f} after {evaluations} (n = {found.n})"]
+    after = evaluations(found.evaluations, found.known)
+    return [f"best: {found.name.replace('_', ' ')}, mean {found.mean:.3f} after {after} (n = {found.n})"]
 
 
 def fraction(progress: Progress) -> float:

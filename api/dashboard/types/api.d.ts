@@ -49,6 +49,7 @@ declare namespace Api {
   }
   interface BestRead {
     evaluations: number;
+    known: number;
     n: number;
     mean: number;
     sd: number | null;
@@ -130,6 +131,7 @@ declare namespace Api {
     welch: Test;
     mann_whitney: Test;
     fitness: Fitness;
+    where: string;
     caution: string | null;
     lower: number | null;
     upper: number | null;
@@ -180,6 +182,7 @@ declare namespace Api {
     fitness: Fitness;
     direct: boolean;
     level: boolean;
+    known: number;
     points: Array<CurvePoint>;
     best_of: Array<number | null>;
   }
@@ -339,6 +342,7 @@ declare namespace Api {
   type Fitness = "recorded" | "transferred" | "equal_chances";
   interface FitnessRead {
     evaluations: number;
+    known: number;
     n: number;
     mean: number;
     sd: number | null;

@@ -100,7 +100,7 @@ function factsOf({ experiment, unit }) {
 }
 
 /** @type {(fitness: Api.FitnessRead, unit: string) => string} */
-const fitnessText = ({ mean, evaluations, n }, unit) => `${fixed(mean)} ${unit} after ${evaluationsText(evaluations)} (mean of ${n})`;
+const fitnessText = (fitness, unit) => `${fixed(fitness.mean)} ${unit} after ${evaluationsText(fitness)} (mean of ${fitness.n})`;
 
 /**
  * @param {Api.ExperimentRead} experiment

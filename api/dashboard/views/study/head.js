@@ -81,7 +81,7 @@ function factsOf({ study, unit }) {
  */
 function bestFact({ best }, unit) {
   if (!best) return [];
-  return [["Best fitness", `${fixed(best.mean)} ${unit} by ${titleOf(best)}, after ${evaluationsText(best.evaluations)} (mean of ${best.n})`]];
+  return [["Best fitness", `${fixed(best.mean)} ${unit} by ${titleOf(best)}, after ${evaluationsText(best)} (mean of ${best.n})`]];
 }
 
 /**
