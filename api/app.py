@@ -8,7 +8,7 @@ from fastapi.middleware.gzip import GZipMiddleware
 
 from gaplab.api.http import documentation, problems
 from gaplab.api.http.access import Access
-from gaplab.api.http.dependencies import refuse_wrong_parameters, reload_plugins
+from gaplab.api.http.dependencies import refuse_malformed, reload_plugins
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import SPARE, BodyLimit, RequestLimit, Streams, most_requests
 from gaplab.api.http.metrics import Metrics, RequestCounter
@@ -143,7 +143,7 @@ def create_app(
     problems.install(app)
     for module in MODULES:
         reloading = [] if module in WITHOUT_PLUGINS else [Depends(reload_plugins)]
-        app.include_router(module.router, dependencies=[Depends(refuse_wrong_parameters), *reloading])
+        app.include_router(module.router, dependencies=[Depends(refuse_malformed), *reloading])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import Event, Thread
 
 from gaplab.api.clients.connection import Connection, segment
@@ -68,16 +68,29 @@ class Take:
         """End the take. If others may have had the robot already, the service is told until it has heard."""
         self.over.set()
         while True:
-            silence_s = time.monotonic() - self._shown
             try:
-                self._send("release", moved_s=silence_s, operator=self._operator)
+                self._let_go()
             except (ServiceError, ServiceUnreachable) as error:
-                if is_final(error) or (silence_s < self._lease_s and not self.refused):
+                if is_final(error) or not self._may_overlap:
                     return
                 log.warning("not told yet that others may have had the robot: %s", error)
                 time.sleep(PAUSE_S)
             else:
                 return
+
+    def leave(self) -> None:
+        """Leave the take of a robot that may still move to its lease; if others may have it already, tell so."""
+        self.over.set()
+        if self._may_overlap:
+            with suppress(ServiceError, ServiceUnreachable):
+                self._let_go()
+
+    @property
+    def _may_overlap(self) -> bool:
+        return self.refused is not None or time.monotonic() - self._shown > self._lease_s
+
+    def _let_go(self) -> None:
+        self._send("release", moved_s=time.monotonic() - self._shown, operator=self._operator)
 
     def _beat(self) -> None:
         while not self.over.wait(self._lease_s / 3) and not self.lost:

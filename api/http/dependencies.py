@@ -2,6 +2,7 @@
 
 import logging
 import re
+from contextlib import suppress
 from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
@@ -14,6 +15,7 @@ from gaplab.schemas.access import Role
 from gaplab.schemas.base import Frozen
 from gaplab.services.access import Caller, demand
 from gaplab.services.core.errors import InvalidSpec, NotFound
+from gaplab.services.core.nesting import refuse_too_deep
 from gaplab.services.experiments.idempotency import Once
 from gaplab.services.experiments.limits import Admission
 from gaplab.services.plugins import watching
@@ -84,14 +86,17 @@ AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
 
 
-async def refuse_wrong_parameters(request: Request) -> None:
-    """Refuse a query that repeats a parameter of one value, or gives one to an operation that has none.
+async def refuse_malformed(request: Request) -> None:
+    """Refuse parameters that are repeated, or that the operation has not, and JSON that nests too deep.
 
     Raises:
-        InvalidSpec: a parameter is repeated or unknown.
+        InvalidSpec: with every such parameter, or the first place that is too deep.
     """
     if wrong := wrong_parameters(request):
         raise InvalidSpec(wrong)
+    if request.scope["route"].body_field is not None:
+        with suppress(ValueError, RecursionError):  # it is refused as not being JSON
+            refuse_too_deep(await request.json())
 
 
 def reload_plugins() -> None:

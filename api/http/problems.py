@@ -38,6 +38,7 @@ from gaplab.services.core.errors import (
     Unauthenticated,
     Violation,
 )
+from gaplab.services.core.nesting import MOST_LEVELS
 from gaplab.services.specs.blame import is_external, raised
 from gaplab.services.store.texts import brief
 
@@ -76,7 +77,7 @@ FRAMEWORK: dict[int, tuple[int, str, str]] = {
 }
 
 DETAILS: dict[int, str] = {
-    400: "The body cannot be parsed as JSON in UTF-8.",
+    400: f"The body cannot be parsed as JSON in UTF-8, nested at most {MOST_LEVELS} levels deep.",
     404: "There is nothing at {path}; /docs lists all addresses.",
     405: "{method} is not allowed at {path}.",
 }

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 from tempfile import TemporaryFile
+from typing import Annotated
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
-from gaplab.api.http.dependencies import Id, LimitsDep, StoreDep
+from gaplab.api.http.dependencies import Confirmation, Id, LimitedDep, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.archives import ImportRead
 from gaplab.services import archives
@@ -52,16 +53,21 @@ def export_study(id: Id, store: StoreDep) -> Response:
     status_code=201,
     summary="Import an archive",
     response_description="Stored; its address is in `Location`",
-    responses=documented(409, 413, 422),
+    responses=documented(409, 413, 422, 429),
     openapi_extra={"requestBody": {"required": True, "content": {MEDIA_TYPE: _BINARY}}},
 )
-async def import_archive(store: StoreDep, limits: LimitsDep, request: Request, response: Response) -> ImportRead:
-    """Store all of an exported archive, or nothing; experiments that had not ended become CANCELLED."""
+async def import_archive(
+    store: StoreDep, admitted: LimitedDep, query: Annotated[Confirmation, Query()], request: Request, response: Response
+) -> ImportRead:
+    """Store all of an exported archive, or nothing.
+
+    Experiments that had not ended become CANCELLED; those on a bench obey the limits of a submission, and are PAUSED.
+    """
     with TemporaryFile() as file:
         async for chunk in request.stream():
             file.write(chunk)
         file.seek(0)
-        stored = await run_in_threadpool(archives.import_archive, store, file, most_rows=limits.imported_rows)
+        stored = await run_in_threadpool(archives.import_archive, store, file, query.given(admitted))
     route, id = ("read_study", stored.study) if stored.study else ("read_experiment", stored.experiments[0])
     response.headers["Location"] = str(request.app.url_path_for(route, id=id))
     return stored

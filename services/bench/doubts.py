@@ -62,10 +62,8 @@ def doubt_others(session: Session, request: RequestRow, take: int, moved_s: floa
     Answers that count are doubtful. Takes end: answers of theirs are in conflict, and the bench is free once the holder
     is silent.
     """
-    why, since = (
-        storable(f"{by} had the robot too, and may have moved it"),
-        moment(session) - timedelta(seconds=moved_s),
-    )
+    why = storable(f"{by} had the robot too, and may have moved it")
+    since = moment(session) - timedelta(seconds=moved_s)
     row, answer, of_bench = RequestRow, AnswerRow, RequestRow.bench.in_(spellings(session, request.bench))
     taken = session.scalars(select(row).where(of_bench, row.state == RequestState.TAKEN).with_for_update()).all()
     given = select(answer).join(row, row.id == answer.request_id).where(of_bench, answer.at >= since)

@@ -13,6 +13,7 @@ from gaplab.schemas.records import SampleRead
 from gaplab.services.bench import motions
 from gaplab.services.core import robot_library, trace_tables
 from gaplab.services.core.arrays import frozen, known
+from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.replay.process import RolloutProcess
@@ -23,7 +24,7 @@ from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
 from gaplab.services.reports.outcome_page import MOST_SHOWN, outcome_report, verdict_sentences
 from gaplab.services.reports.plain_mujoco import plain_motion, tuned_mjcf
 from gaplab.services.reports.reproduction import spec_text, submitted
-from gaplab.services.results.files import csv_text, entry_of
+from gaplab.services.results.files import entry_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Store

@@ -338,11 +338,16 @@ def test_the_bench_and_its_experiment_are_accessible(visit: Any, api: Any, writt
 
 @pytest.mark.release
 def test_an_experiment_shows_repeats_history_and_closed_branches(visit: Any, api: Any, written: Store) -> None:
-    experiment = submit_experiment(written, bench(name="told", reality={"bench": "told", "repeats": 2}))
+    known = [{"genome": [0.3], "values": [0.31, 0.33]}]
+    reality = {"bench": "told", "repeats": 2, "samples": known}
+    experiment = submit_experiment(written, bench(name="told", reality=reality))
     finish(written, lambda genome: genome[0])
     page = visit(f"{api.url}/#/experiments/{experiment.id}?tab=samples")
     page.locator(".state-now .completed").wait_for()
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
+    expect(page.locator("dl.facts")).to_contain_text("after 2 real-world evaluations (and 1 from before)")
+    earlier = page.get_by_role("tabpanel").locator("tbody tr").first
+    expect(earlier).to_have_text("all–sample from before0.31, 0.330.32✓ measured––")
     page.get_by_role("button", name="Correct… sample of iteration 1, repetition 0").click()
     dialog = page.get_by_role("dialog")
     expect(dialog).to_contain_text("will be computed again")

@@ -30,6 +30,7 @@ from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.deletion import Deleter, delete_experiment
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.reading import list_samples, read_experiment
+from gaplab.services.experiments.states import settle
 from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.reports.content import verdict_on
 from gaplab.services.reports.outcome import outcome_of
@@ -555,6 +556,31 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
     assert [taking.none_will_follow(store, each) for each in (*waiting_for, RequestFilter())] == [False, True, False]
 
 
+@pytest.mark.dialects
+def test_a_bench_stays_taken_until_its_holder_has_let_go_or_is_silent(store: Store) -> None:
+    """Also if the request is wanted no more, or somebody else's answer counts: a driver may still move the robot."""
+    first, second, third = (submit_experiment(store, bench(reality={"bench": "table"})) for _ in range(3))
+    compute(store)
+    one, two, three = pending(store)
+    for request, experiment in ((one, first), (two, second)):
+        taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
+        if request is one:
+            lifecycle.ask_experiment(store, experiment.id, Verb.CANCEL)
+        else:
+            other = measure(store, request, 0.3)
+            corrections.decide(store, other.id, ConflictSpec(counts="this", reason="Ada's phone is dead"), FREELY)
+        with pytest.raises(Conflict, match="take 1 of request"):
+            taking.heartbeat(store, request.id, HolderSpec(take=1))
+        with pytest.raises(Conflict, match="one is taken at a time"):
+            taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY)
+        if request is one:
+            assert taking.release(store, request.id, ReleaseSpec(take=1)).state == "withdrawn"
+        else:
+            assert fall_silent(store) == 1
+
+    assert taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY).answer.experiment == third.id
+
+
 def test_known_samples_tune_the_first_simulators(store: Store) -> None:
     spec = bench()
     real = truth(spec)
@@ -675,9 +701,14 @@ def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) 
         there = imported(other, archive)
     assert there.called_off == ()
     first, second = (read_experiment(other, id_) for id_ in (experiment.id, there.experiments[0]))
-    assert (first.state, second.state) == (State.QUEUED, State.QUEUED)
     for each in (first, second):
+        assert (each.state, each.reasons) == (State.PAUSED, ("it was imported",))
         assert len(list_branches(other, each.id)) == 1
+        asked = taking.list_requests(other, RequestFilter(experiment=each.id, pending=False)).items
+        assert [request.state for request in asked] == ["measured", "measured", "withdrawn", "withdrawn"]
+    assert compute(other) == 0
+    for each in (first, second):
+        lifecycle.ask_experiment(other, each.id, Verb.RESUME)
     finish(other, real)
     finish(store, real)
     (expected,) = log_of(store, experiment)
@@ -781,16 +812,16 @@ def test_fifty_operators_at_once_get_one_request_each_or_none(store: Store) -> N
 
 @pytest.mark.dialects
 @pytest.mark.parametrize("claimed", [False, True])
-def test_an_answer_counts_also_while_a_repetition_is_on_its_way_to_the_request(
-    store: Store, other: Store, claimed: bool
-) -> None:
+def test_an_answer_counts_also_while_a_repetition_is_on_its_way_to_the_request(store: Store, claimed: bool) -> None:
     experiment = submit_experiment(store, bench())
     compute(store)
-    imported(other, exported(export_experiment(store, experiment.id)))
-    claims = execution.claim(other, "slow", 1) if claimed else ()
-    assert measure(other, pending(other)[0], 0.5).state == "counted"
+    with store.transaction() as session:  # as earlier versions imported it
+        session.execute(update(RepetitionRow).values(state=State.QUEUED))
+        settle(session, [experiment.id], State.QUEUED)
+    claims = execution.claim(store, "slow", 1) if claimed else ()
+    assert measure(store, pending(store)[0], 0.5).state == "counted"
     for claim in claims:
         items = [each for each in recorded(setting(claim.spec, 0), claim.log, ()) if not isinstance(each, Pulse)]
-        assert execution.record_all(other, [(claim, items)]) == ()
-    compute(other)
-    assert [each.iteration for each in pending(other)] == [1]
+        assert execution.record_all(store, [(claim, items)]) == ()
+    compute(store)
+    assert [each.iteration for each in pending(store)] == [1]

@@ -677,6 +677,26 @@ def test_a_download_is_broken_off_when_its_token_is_revoked(sqlite_store: Store)
             list(parts)
 
 
+@pytest.mark.usefixtures("rechecked")
+def test_a_write_under_way_is_answered_by_its_result_also_when_its_token_is_revoked(sqlite_store: Store) -> None:
+    token = access.create_token(sqlite_store, Role.RUNNER)
+    app, begun = create_app(sqlite_store), threading.Event()
+
+    @app.post("/long")
+    def long() -> str:
+        begun.set()
+        time.sleep(10 * http_access.RECHECK_S)
+        return "written"
+
+    headers = {"Authorization": f"Bearer {token.secret}"}
+    with serving(app) as url, ThreadPoolExecutor(1) as pool:
+        answer = pool.submit(httpx2.post, f"{url}/long", headers=headers, timeout=DEADLINE_S)
+        assert begun.wait(DEADLINE_S)
+        access.revoke_token(sqlite_store, token.token.id)
+
+    assert (answer.result().status_code, answer.result().json()) == (200, "written")
+
+
 def test_a_number_beyond_the_latest_event_is_refused_with_both(store: Store) -> None:
     submission.submit_experiment(store, toy())
     with TestClient(create_app(store)) as api:

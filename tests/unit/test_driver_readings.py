@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.api.clients.drivers import DriverBroken, Robot
-from gaplab.api.clients.measuring import measure
+from gaplab.api.clients.drivers import DriverBroken, Robot, measure
 from gaplab.schemas.records import SensorsRead
 
 SENSORS = SensorsRead(names=("roll", "height"), units=("rad", "m"), noises=(0.02, 0.005), times_s=(0.5, 1.0, 1.5))

@@ -46,7 +46,7 @@ def test_a_fitness_that_is_not_finite_is_physics_that_failed_in_simulation_and_i
     assert failed.any()
     assert not failed.all()
     np.testing.assert_array_equal(fitnesses, np.where(failed, np.nan, expected))
-    assert answers.cost_of(50).failures == failed.sum()
+    assert answers.cost.failures == failed.sum()
     assert np.isnan(MeasuredReality(broken, np.empty(0))(genomes[failed[:, 0]][0]).fitness)
 
 
