@@ -69,8 +69,8 @@ def doubt_others(session: Session, request: RequestRow, take: int, moved_s: floa
     given = select(answer).join(row, row.id == answer.request_id).where(of_bench, answer.at >= since)
     counted = session.scalars(given.where(answer.state == AnswerState.COUNTED, answer.failed.is_(None))).all()
     others = [each for each in counted if (each.request_id, each.take) != (request.id, take)]
-    for each in others:
-        each.doubts = [*(each.doubts or ()), why]
+    for measured in others:
+        measured.doubts = [*(measured.doubts or ()), why]
     for each in taken:
         note_take(session, each, EventKind.RELEASED, by=storable(by), reason=why)
     for each in {request, *taken} if others or taken else ():
