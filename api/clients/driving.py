@@ -13,7 +13,7 @@ from gaplab.api.clients.journal import PAUSE_S, Deliveries, Journal, log
 from gaplab.api.clients.motions import DriverMotion, motion_of
 from gaplab.api.clients.records import Records
 from gaplab.api.clients.takes import Take
-from gaplab.schemas.measurements import AnswerRead, RequestRead, RequestState
+from gaplab.schemas.measurements import AnswerRead, AnswerState, RequestRead, RequestState
 from gaplab.schemas.records import Page, SensorsRead
 
 WAIT_S = 20.0
@@ -71,12 +71,18 @@ class TakenRequest:
     @property
     def known(self) -> list[tuple[float, Any]]:
         """Repeats that an earlier run of the driver measured and journalled, with their readings."""
-        return self._driving.deliveries.journal.repeats(self.id)[: self.repeats]
+        return self._driving.deliveries.journal.repeats(self.id, self._void)[: self.repeats]
 
     def note(self, value: float, readings: Any = None) -> None:  # noqa: ANN401 - JSON
         """Journal one repeat, so that a power cut before the last one loses nothing; its errors are those of `tell`."""
         (number,) = numbers_of([value], "/values")
-        self._driving.deliveries.journal.repeat(self.id, number, json_of(readings_of(readings), "/readings"))
+        noted = json_of(readings_of(readings), "/readings")
+        self._driving.deliveries.journal.repeat(self.id, number, noted, self._void)
+
+    @property
+    def _void(self) -> list[str]:
+        """Answers that counted once: what was measured before their correction or void is worth nothing."""
+        return [each.id for each in self.request.answers if each.state in {AnswerState.REPLACED, AnswerState.VOID}]
 
     def forget(self) -> None:
         """Forget the repeats that were noted: others may have had the robot meanwhile."""

@@ -4,7 +4,7 @@ import json
 import logging
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any, Self
@@ -45,23 +45,26 @@ class Journal:
         if self._file is not None:
             self._file.close()
 
-    def repeat(self, request: str, value: float, readings: Any = None) -> None:  # noqa: ANN401 - JSON
-        """Keep the value of one repeat."""
-        self._write({"request": request, "repeat": value, "readings": readings})
+    def repeat(self, request: str, value: float, readings: Any = None, void: Sequence[str] = ()) -> None:  # noqa: ANN401 - JSON
+        """Keep the value of one repeat, with the answers to its request that counted once and were void by then."""
+        self._write({"request": request, "repeat": value, "readings": readings, "void": list(void)})
 
     def forget(self, request: str) -> None:
         """Note that the repeats of a request are worth nothing."""
         self._write({"request": request, "forgotten": True})
 
-    def repeats(self, request: str) -> list[tuple[float, Any]]:
-        """Return the repeats of a request that no answer has used; an answer that was refused has used none."""
+    def repeats(self, request: str, void: Sequence[str] = ()) -> list[tuple[float, Any]]:
+        """Return the repeats of a request that no answer has used; an answer that was refused has used none.
+
+        Repeats from before one of the answers became void are left out.
+        """
         refused = {line["sent"] for line in self._lines if line.get("refused")}
         found: list[tuple[float, Any]] = []
         for line in self._lines:
             if line.get("request") != request:
                 continue
             if line.get("repeat") is not None:
-                found.append((line["repeat"], line.get("readings")))
+                found += [(line["repeat"], line.get("readings"))] if line.get("void", []) == list(void) else []
             elif line.get("key") not in refused:
                 found = []
         return found

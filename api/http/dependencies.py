@@ -118,11 +118,12 @@ class Paging(Parameters):
 
 
 class Confirmation(Parameters):
-    """Confirmation of a high cost."""
+    """Confirmation of a high cost, or of an unlikely name."""
 
     confirm_cost: bool = Field(
         default=False,
-        description="confirm a cost above `GAPLAB_MAX_UNCONFIRMED_CORE_HOURS`; without it, such a request is refused",
+        description="confirm a cost above `GAPLAB_MAX_UNCONFIRMED_CORE_HOURS`, or a bench whose name is nearly that of "
+        "another; without it, such a request is refused",
     )
 
     def given(self, admitted: Admission) -> Admission:

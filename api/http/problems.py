@@ -49,7 +49,7 @@ MEDIA_TYPE = "application/problem+json"
 
 KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     InvalidSpec: (422, "invalid-spec", "The spec is invalid"),
-    CostUnconfirmed: (422, "cost-unconfirmed", "The cost needs a confirmation"),
+    CostUnconfirmed: (422, "cost-unconfirmed", "This needs a confirmation"),
     InvalidRobotFile: (422, "invalid-robot-file", "The robot file is invalid"),
     NotFound: (404, "not-found", "Not found"),
     Conflict: (409, "conflict", "The present state forbids this"),

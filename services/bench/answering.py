@@ -12,7 +12,6 @@ from gaplab.schemas.measurements import (
 from gaplab.schemas.traces import TraceRead, TracesRead
 from gaplab.services.bench.checking import check_attachments, check_values
 from gaplab.services.bench.doubts import doubts
-from gaplab.services.bench.taking import locked
 from gaplab.services.bench.views import view_answer
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.stored_specs import spec_of
@@ -66,7 +65,7 @@ def _answer(
     if traces is not None and traces.doubts and not spec.confirmed:
         raise Conflict(f"{'; '.join(traces.doubts)}. Look at the traces; if they are right, send `confirmed` with them")
     spec = spec if traces is None else _with_values(spec, traces)
-    row, repetition = locked(session, id_)
+    row, repetition = requests.locked(session, id_)
     experiment = session.get_one(ExperimentRow, repetition.experiment_id)
     check_values(spec_of(experiment.spec), spec.values, spec.readings, spec.unit)
     check_attachments(session, spec.attachments)

@@ -16,8 +16,9 @@ from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import AnswerState, DoubtsRead, MeasurementSpec, RequestState
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import AnswerRow, IterationRow, MeasurementRow, RepetitionRow, RequestRow
+from gaplab.services.store.queries.benches import spellings
 from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.queries.requests import get, note_end
+from gaplab.services.store.queries.requests import get, note_take
 from gaplab.services.store.session import Session, snapshot
 from gaplab.services.store.statements import storable
 
@@ -63,7 +64,7 @@ def doubt_others(session: Session, request: RequestRow, take: int, moved_s: floa
     """
     why = storable(f"{by} had the robot too, and may have moved it")
     since = moment(session) - timedelta(seconds=moved_s)
-    row, answer, of_bench = RequestRow, AnswerRow, RequestRow.bench == request.bench
+    row, answer, of_bench = RequestRow, AnswerRow, RequestRow.bench.in_(spellings(session, request.bench))
     taken = session.scalars(select(row).where(of_bench, row.state == RequestState.TAKEN).with_for_update()).all()
     given = select(answer).join(row, row.id == answer.request_id).where(of_bench, answer.at >= since)
     counted = session.scalars(given.where(answer.state == AnswerState.COUNTED, answer.failed.is_(None))).all()
@@ -71,7 +72,7 @@ def doubt_others(session: Session, request: RequestRow, take: int, moved_s: floa
     for each in others:
         each.doubts = [*(each.doubts or ()), why]
     for each in taken:
-        note_end(session, each, EventKind.RELEASED, by=storable(by), reason=why)
+        note_take(session, each, EventKind.RELEASED, by=storable(by), reason=why)
     for each in {request, *taken} if others or taken else ():
         each.takes += 1  # fences the answers of earlier ones
 

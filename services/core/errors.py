@@ -2,7 +2,7 @@
 
     GaplabError
     ├── InvalidSpec          a spec or request is invalid; has every violation with its place
-    │   ├── CostUnconfirmed      the cost is above the limit, and not confirmed
+    │   ├── CostUnconfirmed      the cost is above the limit, or a name unlikely, and not confirmed
     │   └── InvalidRobotFile     a robot file cannot be stored
     ├── NotFound             no such study, experiment or plug-in
     ├── Conflict             the current state forbids the request
@@ -84,7 +84,7 @@ class InvalidRobotFile(InvalidSpec):
 
 
 class CostUnconfirmed(InvalidSpec):
-    """The cost is above the limit, and the request does not confirm it."""
+    """The cost is above the limit, or a name is unlikely, and the request does not confirm it."""
 
 
 class NotFound(GaplabError):

@@ -9,6 +9,7 @@ from typing import TypeVar
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.experiments.bench_names import check_benches
 from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.estimates import check_cost
 from gaplab.services.experiments.idempotency import Once, once
@@ -38,7 +39,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
-        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
+        CostUnconfirmed: the cost is above the limit, or a bench nearly known, and the request does not confirm it.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's experiment was deleted.
@@ -46,6 +47,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
     resolved = resolved_here(store, spec, resolve_experiment)
 
     def create(session: Session) -> ExperimentRead:
+        check_benches(session, [resolved], admitted)
         admit(session, [resolved], admitted)
         row = _insert(session, resolved, admitted)
         queue_for(session, [row])
@@ -68,7 +70,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
-        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
+        CostUnconfirmed: the cost is above the limit, or a bench nearly known, and the request does not confirm it.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's study was deleted.
@@ -76,6 +78,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
     resolved = resolved_here(store, spec, resolve_study)
 
     def create(session: Session) -> StudyRead:
+        check_benches(session, resolved, admitted)
         admit(session, resolved, admitted)
         study = insert_study(session, spec.name or "study")
         rows = [_insert(session, each, admitted, study, position) for position, each in enumerate(resolved)]

@@ -87,12 +87,13 @@ class RolloutProcess:
         """Process id; None if no process is running."""
         return self._process.pid if self._process else None
 
-    def call(self, function: Callable[..., T], *arguments: Any) -> T:  # noqa: ANN401 - what the function takes
+    def call(self, function: Callable[..., T], *arguments: Any, load: Callable[[], Any] | None = None) -> T:  # noqa: ANN401 - what the function takes
         """Return `function(*arguments)`, computed in the subprocess.
 
         Args:
             function: defined at the top of a module, so that it can be pickled.
             arguments: values that can be pickled.
+            load: returns the last argument once it is the caller's turn, as those who wait shall hold nothing large.
 
         Raises:
             EngineInterrupted: the process died or took too long, or `close` was called.
@@ -101,7 +102,7 @@ class RolloutProcess:
             RuntimeError: the function raised another error; the message quotes it.
         """
         with self._line.turn():
-            return self._call(function, arguments)
+            return self._call(function, (*arguments, load()) if load else arguments)
 
     def close(self) -> None:
         """Kill the process, even in the middle of a call; later calls are refused."""

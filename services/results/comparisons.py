@@ -20,6 +20,7 @@ from gaplab.services.results.curves import values_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments
+from gaplab.services.store.queries.benches import key_of
 from gaplab.services.store.session import Session, Store
 
 MOST_WITH_INTERVALS = 20
@@ -165,7 +166,8 @@ def _both(first: str, second: str) -> str:
 
 
 def _setup(spec: ResolvedSpec) -> tuple[object, ...]:
-    return spec.reality.kind, spec.reality.engine, spec.reality.bench, sorted(spec.reality.parameters)
+    bench = key_of(spec.reality.bench or "")
+    return spec.reality.kind, spec.reality.engine, bench, sorted(spec.reality.parameters)
 
 
 def _reality(spec: ResolvedSpec) -> tuple[object, ...]:

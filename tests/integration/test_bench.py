@@ -42,6 +42,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.lease import Pulse
 from gaplab.services.store.models import AttachmentRow, IterationRow, RepetitionRow, RequestRow
+from gaplab.services.store.queries import requests
 from gaplab.services.store.queries.costs import work_of
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
@@ -226,6 +227,43 @@ def test_a_take_ends_by_silence_and_a_clock_that_was_set_ends_none(store: Store,
     assert taking.reopen(store, request.id).state == "open"
 
 
+@pytest.mark.dialects
+@pytest.mark.parametrize("taken_since", [False, True])
+def test_an_answer_of_a_take_that_ended_by_silence_counts_unless_another_took_the_bench_since(
+    store: Store, taken_since: bool
+) -> None:
+    submit_experiment(store, bench(repetitions=2))
+    compute(store)
+    hers, his = pending(store)
+    taking.take(store, hers.id, TakeSpec(operator="Ada"), FREELY)
+    assert fall_silent(store) == 1
+    if taken_since:
+        taking.take(store, his.id, TakeSpec(operator="Bo"), FREELY)
+        taking.release(store, his.id, ReleaseSpec(take=1))
+
+    late = measure(store, hers, 0.3, take=1)
+
+    assert late.state == ("conflict" if taken_since else "counted")
+    if taken_since:
+        again = taking.take(store, hers.id, TakeSpec(operator="Bo"), FREELY).answer
+        assert measure(store, hers, 0.5, take=again.takes).state == "counted"
+
+
+@pytest.mark.dialects
+def test_a_bench_is_one_however_its_name_is_spaced_and_capitalised(store: Store) -> None:
+    for name in ("The table", " the  TABLE "):
+        submit_experiment(store, bench(reality={"bench": name}))
+        compute(store)
+    first, second = pending(store)
+    taking.take(store, first.id, TakeSpec(operator="Ada"), FREELY)
+
+    with pytest.raises(Conflict, match="one is taken at a time"):
+        taking.take(store, second.id, TakeSpec(operator="Bo"), FREELY)
+
+    found = taking.list_requests(store, RequestFilter(bench="THE TABLE")).items
+    assert [(each.bench, each.busy) for each in found] == [("The table", False), ("The table", True)]
+
+
 def test_no_take_ends_while_its_request_is_answered(postgres_store: Store) -> None:
     """As it would if a supervisor ended takes between the moment a request is read and the moment it is written."""
     submit_experiment(postgres_store, bench())
@@ -233,7 +271,7 @@ def test_no_take_ends_while_its_request_is_answered(postgres_store: Store) -> No
     (request,) = pending(postgres_store)
     seen = select(RequestRow.id).with_for_update(skip_locked=True)
     with postgres_store.transaction() as session, postgres_store.transaction() as another:
-        taking.locked(session, request.id)
+        requests.locked(session, request.id)
         assert another.scalars(seen).all() == []
     with postgres_store.transaction() as session:
         assert session.scalars(seen).all() == [request.id]

@@ -125,6 +125,23 @@ def test_a_driver_that_died_after_a_repeat_goes_on_with_the_next(client: Client,
 
 
 @pytest.mark.usefixtures("computing")
+def test_repeats_from_before_a_void_do_not_count(client: Client, tmp_path: Path) -> None:
+    experiment, known = submitted(client, repeats=3), []
+    for value in (0.25, 0.5):
+        for request in client.requests(experiment.id, journal=tmp_path / "journal"):
+            request.note(value)
+            break  # the driver ends
+        if value == 0.25:
+            answer = client.bench.answer(request.id, [0.1, 0.1, 0.1], operator="Ada")
+            client.bench.void(answer.id, reason="the floor was wet")
+    for request in client.requests(experiment.id, journal=tmp_path / "journal"):
+        known = request.known
+        break
+
+    assert known == [(0.5, None)]
+
+
+@pytest.mark.usefixtures("computing")
 def test_an_answer_in_the_journal_is_sent_when_the_driver_starts_again(client: Client, tmp_path: Path) -> None:
     submitted(client)
     (request,) = client.bench.pending(wait_s=60)

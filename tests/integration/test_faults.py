@@ -392,7 +392,7 @@ def test_a_clock_that_was_set_does_not_give_hardware_to_a_second_holder(store: S
     submission.submit_experiment(store, on_the_bench(repetitions=2))
     (held,) = execution.claim(store, "me", 9)
     time = [0.0]
-    silences = Silences(lambda: time[0])
+    silences = Silences[int](lambda: time[0])
     look = partial(execution.requeue_lost, store, stale_after_s=30.0, silences=silences)
 
     assert look() == 0
@@ -416,7 +416,7 @@ def test_an_ended_lease_frees_its_hardware_once_its_holder_is_silent(store: Stor
     execution.claim(store, "me", 9)
     lifecycle.ask_experiment(store, first, Verb.CANCEL)
     time = [0.0]
-    silences = Silences(lambda: time[0])
+    silences = Silences[int](lambda: time[0])
 
     for time[0], claimed in ((0.0, 0), (20.0, 0), (31.0, 1)):
         execution.requeue_lost(store, stale_after_s=30.0, silences=silences)

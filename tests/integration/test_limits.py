@@ -3,6 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -20,6 +21,7 @@ from gaplab.services.store.models import AttachmentRow, RepetitionRow
 from gaplab.services.store.queries.attachments import UNNAMED_LIVE
 from gaplab.services.store.session import Store
 from tests.experiments import run
+from tests.integration.test_bench import compute
 
 TOY = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 3}
 STUDY = {
@@ -246,6 +248,23 @@ def test_what_takes_thousands_of_core_hours_needs_a_confirmation(
     assert f"about {hours:,.0f} core-hours" in error["message"]
     assert "1,000 (GAPLAB_MAX_UNCONFIRMED_CORE_HOURS)" in error["message"]
     assert let_in.status_code == 202
+
+
+def test_a_bench_that_nearly_has_the_name_of_another_is_asked_about_once(sqlite_store: Store) -> None:
+    api = served(sqlite_store)
+
+    def submit(bench: str, query: str = "") -> Any:
+        answer = api.post(f"/experiments{query}", json=TOY | {"reality": {"kind": "physical", "bench": bench}})
+        compute(sqlite_store)
+        return answer
+
+    known = [submit(name).status_code for name in ("table 1", "table 2", "TABLE 1", "yard")]
+    refused, let_in, again = submit("tabel 1"), submit("tabel 1", "?confirm_cost=true"), submit("tabel 1")
+
+    assert known == [202] * 4
+    (error,) = refused.json()["errors"]
+    assert error["message"].startswith("the bench 'tabel 1' is new, and 'table 1' is known; if they are two robots, ")
+    assert (error["pointer"], let_in.status_code, again.status_code) == ("confirm_cost", 202, 202)
 
 
 @pytest.mark.parametrize("body", [{"engine": "mujoco"}, {"budget": "desk", "direct_repetitions": 100}])

@@ -12,8 +12,9 @@ from gaplab.services.store.clock import moment
 from gaplab.services.store.lease import Claim, Requested
 from gaplab.services.store.models import AnswerRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import request_states
+from gaplab.services.store.queries.benches import spellings
 from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.experiments import new_id
+from gaplab.services.store.queries.experiments import lock, new_id
 from gaplab.services.store.queries.repetition_rows import of_experiments
 from gaplab.services.store.queries.request_states import ANSWERED as ANSWERED
 from gaplab.services.store.queries.request_states import PENDING as PENDING
@@ -41,6 +42,7 @@ def insert(session: Session, asked: Mapping[Claim, Requested]) -> dict[Claim, Re
 
 
 def _new(session: Session, claim: Claim, wanted: Requested, same: RequestRow | None) -> RequestRow:
+    bench = claim.spec.reality.bench or ""
     row = RequestRow(
         id=new_id(),
         repetition_id=claim.id,
@@ -48,7 +50,7 @@ def _new(session: Session, claim: Claim, wanted: Requested, same: RequestRow | N
         iteration=wanted.iteration,
         kind=wanted.kind,
         genome=vector(wanted.genome),
-        bench=storable(claim.spec.reality.bench or ""),
+        bench=next(iter(spellings(session, bench)), storable(bench).strip()),
         state=RequestState.OPEN if same is None else same.state,
         safety=wanted.safety,
         same_as=None if same is None else same.same_as or same.id,
@@ -115,6 +117,19 @@ def get(session: Session, id_: str) -> tuple[RequestRow, RepetitionRow]:
     return row, repetition
 
 
+def locked(session: Session, id_: str) -> tuple[RequestRow, RepetitionRow]:
+    """Return a request and its repetition, both as they are; their experiment is locked first.
+
+    Raises:
+        NotFound: the request does not exist.
+    """
+    row, repetition = get(session, id_)
+    lock(session, [repetition.experiment_id])
+    session.refresh(row, with_for_update=True)
+    session.refresh(repetition)
+    return row, repetition
+
+
 def get_answer(session: Session, id_: str) -> AnswerRow:
     """Return an answer.
 
@@ -134,11 +149,11 @@ def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> 
     unanswered = row.unanswered + (kind is EventKind.TAKE_EXPIRED)
     to = RequestState.STUCK if unanswered >= MOST_UNANSWERED else RequestState.OPEN
     request_states.become(session, row, to, held=None, unanswered=unanswered)
-    note_end(session, row, kind, **more)
+    note_take(session, row, kind, **more)
 
 
-def note_end(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
-    """Add the event of the end of a take; `more` is told in it."""
+def note_take(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
+    """Add the event of a take; `more` is told in it."""
     repetition = session.get_one(RepetitionRow, row.repetition_id)
     body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by, **more}
     note(session, kind, repetition.experiment_id, repetition.number, **body)
