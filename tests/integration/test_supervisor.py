@@ -18,7 +18,7 @@ import pytest
 from sqlalchemy import select
 
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
-from gaplab.services.core.errors import RayGone, StoreChanged
+from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged
 from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution
 from gaplab.services.store.models import SupervisorRow
@@ -109,6 +109,11 @@ def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start()
 
     assert left not in found
     assert {held, starting} <= set(found)
+
+
+def test_a_folder_that_ray_cannot_have_is_told_with_the_remedy() -> None:
+    with pytest.raises(ClusterUnusable, match="let RAY_TMPDIR name one .*: .*No such file"), ray_folder(Path("/no/such")):
+        pass
 
 
 def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path) -> None:
