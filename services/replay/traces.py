@@ -67,7 +67,8 @@ def evaluate_traces(
     if not simulators:
         raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
     traces = [read_trace(*table) for table in tables]
-    times_s, poses, _ = process.call(expected_motion, sent(resolved), genome, tuple(simulators[0]))
+    sent_spec, parameters = sent(resolved), tuple(simulators[0])
+    times_s, poses, _ = process.call(expected_motion, sent_spec, genome, parameters, plugins=sent_spec.plugins)
     expected = Trace(times_s, poses[:, :3], poses[:, 3:])
     return evaluated(robot, frozen(genome), traces, expected, spec)
 

@@ -22,7 +22,6 @@ from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.session import Store
 from tests.experiments import same, some_log, toy
 
-
 OPEN_FILES = Path("/proc/self/fd")
 
 
