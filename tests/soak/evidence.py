@@ -13,12 +13,12 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed, Step, Tuned
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, SensitivityRow, StudyRow
+from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow, SensitivityRow, StudyRow
 from gaplab.services.store.queries import step_rows as mapping
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from tests.soak import witness
-from tests.soak.hardware_faults import commands
+from tests.soak.hardware_faults import Command, commands
 from tests.soak.operators import as_simulated
 
 
@@ -55,6 +55,9 @@ class Answer:
 
     request: str
     state: str
+    operator: str = ""
+    bench: str = ""
+    values: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ class Evidence:
         moves: of all repetitions, as the witness saw them.
         complaints: of the database about itself.
         answers: of operators, by id.
-        commands: that the robot got, in their order: seconds, and the drive that gave it.
+        commands: that robots got, in their order.
     """
 
     experiments: tuple[Experiment, ...] = ()
@@ -75,7 +78,7 @@ class Evidence:
     checks: dict[str, str] = field(default_factory=dict)
     moves: tuple[witness.Move, ...] = ()
     complaints: tuple[str, ...] = ()
-    commands: tuple[tuple[float, str], ...] = ()
+    commands: tuple[Command, ...] = ()
     answers: dict[str, Answer] = field(default_factory=dict)
 
 
@@ -85,7 +88,7 @@ def gather(store: Store, database: Any, journal: Path) -> Evidence:
         studies = dict(session.execute(select(StudyRow.id, StudyRow.name)).all())
         checks = dict(session.execute(select(SensitivityRow.id, SensitivityRow.state)).all())
         experiments = tuple(_experiment(session, row) for row in session.scalars(select(ExperimentRow)).all())
-        answers = {row.id: Answer(row.request_id, str(row.state)) for row in session.scalars(select(AnswerRow))}
+        answers = {row.id: _answer(session, row) for row in session.scalars(select(AnswerRow))}
     return Evidence(
         experiments,
         studies,  # type: ignore[arg-type]
@@ -95,6 +98,11 @@ def gather(store: Store, database: Any, journal: Path) -> Evidence:
         tuple(commands(journal)),
         answers,
     )
+
+
+def _answer(session: Any, row: Any) -> Answer:
+    bench = session.get_one(RequestRow, row.request_id).bench
+    return Answer(row.request_id, str(row.state), row.operator, bench, tuple(row.values or ()))
 
 
 def checks_under_way(store: Store) -> bool:
@@ -131,7 +139,8 @@ def undisturbed(spec: dict, number: int) -> tuple[str, ...]:
     A robot on a bench of the soak has no noise, so a simulated reality gives its steps.
     """
     if on_a_bench(spec):
-        spec = spec | {"reality": as_simulated().model_dump(mode="json") | {"probes": spec["reality"]["probes"]}}
+        reality = as_simulated(spec["robot"]["name"]).model_dump(mode="json")
+        spec = spec | {"reality": reality | {"probes": spec["reality"]["probes"]}}
     settings = {name: value for name, value in spec.items() if name not in {"name", "repetitions"}}
     return _undisturbed(json.dumps(settings, sort_keys=True), number)
 

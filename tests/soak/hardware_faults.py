@@ -3,7 +3,7 @@
 import signal
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tests.soak.plugin_faults import submitted
 from tests.soak.stage import PAST_THE_LEASE, send, until
@@ -11,9 +11,18 @@ from tests.soak.stage import PAST_THE_LEASE, send, until
 SPEC = {"strategy": "simulated_fit", "reality": {"engine": "rig"}}
 
 
+class Command(NamedTuple):
+    """A line of the journal: seconds, robot, drive, and what happened: it moves, it stops, or the fitness of a run."""
+
+    at: float
+    robot: str
+    drive: str
+    what: str = "moves"
+
+
 def two_drivers(stage: Any) -> bool:
     """Submit an experiment whose reality is the robot, wait until it moves, and stop the supervisor that lets it."""
-    before = len(commands(stage.journal))
+    before = len(_of_rig(stage.journal))
     if submitted(stage, SPEC, "on the robot") is None:
         return False
     driving: list[int] = []
@@ -28,15 +37,19 @@ def two_drivers(stage: Any) -> bool:
 
 
 def commands(journal: Path) -> Any:
-    """The motor commands of a journal in the order in which they were given: seconds, and which drive gave it."""
+    """The motor commands of a journal, in the order in which they were given, and what else is in it."""
     lines = journal.read_text().splitlines() if journal.exists() else []
-    return sorted((float(at), drive) for at, drive in (line.split() for line in lines))
+    return sorted(Command(float(at), *others) for at, *others in map(str.split, lines))
+
+
+def _of_rig(journal: Path) -> Any:
+    return [each for each in commands(journal) if each.robot == "rig"]
 
 
 def _driving(stage: Any, before: Any) -> Any:
     """The supervisor whose worker gave the latest command, in a list; an empty one if nothing has moved."""
-    given = commands(stage.journal)[before:]
-    pid = int(given[-1][1].partition(".")[0]) if given else 0
+    given = _of_rig(stage.journal)[before:]
+    pid = int(given[-1].drive.partition(".")[0]) if given else 0
     supervisors = set(stage.of("supervisor"))
     while pid > 1 and pid not in supervisors:
         pid = _parent(pid)
