@@ -88,12 +88,6 @@ def show(console: Any, outcome: Any) -> None:
     for name, seconds in [*sorted(outcome.recoveries.items()), *([("all", every)] if every else [])]:
         table.add_row(name, str(len(seconds)), f"{median(seconds):.1f} s", f"{max(seconds):.1f} s")
     console.print(table)
-    console.print("Resident memory of the service and its workers, MB:\n")
-    console.print("| minute | faults | processes | sum | largest |\n|---|---|---|---|---|")
-    for at, faults, sizes in outcome.memory:
-        largest, role = sizes[0]
-        total = sum(size for size, _ in sizes)
-        console.print(f"| {at / 60:.0f} | {faults} | {len(sizes)} | {total:.0f} | {largest:.0f} ({role}) |")
     console.print(
         f"{outcome.acknowledged} acknowledged writes and {outcome.unanswered} without an answer, "
         f"{outcome.experiments} experiments, {outcome.at_fault} of them at fault, "

@@ -4,8 +4,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from gaplab.services import access
 from gaplab.services.store.session import Store
 from tests.proxy import Proxy
 from tests.soak import driver
+from tests.soak.bench_faults import WAIT_S
 from tests.soak.hardware_faults import commands
 from tests.soak.operators import PHYSICAL, QUADRUPED
 from tests.soak.plugin_faults import submitted
@@ -22,8 +23,8 @@ from tests.soak.stage import until
 LEASE_S = 2
 """Of a take, without a sign of life."""
 
-WAIT_S, HANDOVER_S, END_S = 60.0, 20.0, 5.0
-"""For how long a fault waits for a driver to move the robot, for another to take over, and for one to end."""
+HANDOVER_S, END_S = 20.0, 5.0
+"""For how long a fault waits for another driver to take over, and for one to end."""
 
 _numbers = count()
 
@@ -47,6 +48,7 @@ class Driven:
 
     def close(self) -> None:
         """End it in order, if it can."""
+        self.process.send_signal(signal.SIGCONT)
         self.process.terminate()
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(END_S)
@@ -55,39 +57,18 @@ class Driven:
         self.network.close()
 
 
-@contextmanager
-def _paused(stage: Any, victim: Driven) -> Iterator[None]:
-    victim.process.send_signal(signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        victim.process.send_signal(signal.SIGCONT)
-
-
-@contextmanager
-def _cut_off(stage: Any, victim: Driven) -> Iterator[None]:
-    victim.network.hang(for_good=True)
-    yield
-
-
-@contextmanager
-def _revoked(stage: Any, victim: Driven) -> Iterator[None]:
+def _revoke(stage: Any, victim: Driven) -> None:
     with Store(stage.database.url) as store:
         until(lambda: access.revoke_token(store, victim.token.token.id), HANDOVER_S)
-    yield
-
-
-@contextmanager
-def _cancelled(stage: Any, victim: Driven) -> Iterator[None]:
-    stage.history.ask(stage.http, "cancel", "POST", f"/experiments/{victim.experiment}/cancel")
-    yield
 
 
 KINDS: dict[str, Callable[[Any, Driven], Any]] = {
-    "paused": _paused,
-    "cut off": _cut_off,
-    "revoked": _revoked,
-    "called off": _cancelled,
+    "paused": lambda stage, victim: victim.process.send_signal(signal.SIGSTOP),
+    "cut off": lambda stage, victim: victim.network.hang(for_good=True),
+    "revoked": _revoke,
+    "called off": lambda stage, victim: stage.history.ask(
+        stage.http, "cancel", "POST", f"/experiments/{victim.experiment}/cancel"
+    ),
 }
 
 
@@ -110,8 +91,9 @@ def inflicting(kind: str) -> Any:
             if not until(lambda: _movers(stage.journal, robot), WAIT_S):
                 return False
             (first, *_) = _movers(stage.journal, robot)
-            with KINDS[kind](stage, drivers[first]):
-                until(lambda: len(_movers(stage.journal, robot)) > 1, HANDOVER_S)
+            KINDS[kind](stage, drivers[first])
+            until(lambda: len(_movers(stage.journal, robot)) > 1, HANDOVER_S)
+            drivers[first].process.send_signal(signal.SIGCONT)
             until(lambda: len(_movers(stage.journal, robot, done=True) - {first}), HANDOVER_S)
             return True
 

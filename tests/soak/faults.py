@@ -75,7 +75,7 @@ def _says_it(stage: Any) -> Any:
     if plugin_faults.submission(stage, {"strategy": "random"}, "disk full").status == 503:
         with suppress(httpx2.HTTPError):
             ready = stage.http.get("/readyz")
-            return [ready.status_code != 200 or "writ" in ready.text]
+            return [ready.status_code != 200 or "writ" in ready.text or "full" in ready.text]
     return []
 
 

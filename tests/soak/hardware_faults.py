@@ -2,8 +2,9 @@
 
 import signal
 import time
+from collections import namedtuple
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from tests.soak.plugin_faults import submitted
 from tests.soak.stage import PAST_THE_LEASE, send, until
@@ -11,13 +12,8 @@ from tests.soak.stage import PAST_THE_LEASE, send, until
 SPEC = {"strategy": "simulated_fit", "reality": {"engine": "rig"}}
 
 
-class Command(NamedTuple):
-    """A line of the journal: seconds, robot, drive, and what happened: it moves, it stops, or the fitness of a run."""
-
-    at: float
-    robot: str
-    drive: str
-    what: str = "moves"
+Command = namedtuple("Command", "at robot drive what", defaults=("moves",))
+"""A line of the journal: seconds, robot, drive, and what happened: it moves, it stops, or the fitness of a run."""
 
 
 def two_drivers(stage: Any) -> bool:

@@ -28,7 +28,6 @@ RECOVERY_S = 180
 STUCK_S = 300
 """In peace, and without a fault: what has not ended by then is stuck."""
 
-
 MEMORY_S = 300.0
 """Between two measurements of memory."""
 
@@ -40,13 +39,11 @@ class Outcome:
     Attributes:
         recoveries: seconds from the end of a volley until all was well again, by the faults that were in it.
         violations: what the service did not keep.
-        memory: of the service now and then: seconds, faults so far, and that of each process.
     """
 
     database: str
     recoveries: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     violations: list[str] = field(default_factory=list)
-    memory: list[tuple[float, int, Any]] = field(default_factory=list)
     acknowledged: int = 0
     unanswered: int = 0
     experiments: int = 0
@@ -55,16 +52,19 @@ class Outcome:
     claims: int = 0
     given_up: int = 0
     begun: float = field(default_factory=time.monotonic)
+    measured_s: float = -MEMORY_S
 
     @property
     def faults(self) -> Any:
         return sum(map(len, self.recoveries.values()))
 
-    def measure(self, stage: Any, every_s: float = MEMORY_S) -> float:
-        """Measure the memory of the service, if that is due; seconds since the beginning."""
+    def measure(self, stage: Any, say: Any, every_s: float = MEMORY_S) -> float:
+        """Say how much memory the service has, if that is due, as a row of a table; seconds since the beginning."""
         now = time.monotonic() - self.begun
-        if not self.memory or now - self.memory[-1][0] >= every_s:
-            self.memory.append((now, self.faults, stage.memory()))
+        if now - self.measured_s >= every_s:
+            self.measured_s, (each, largest) = now, stage.memory()
+            when = f"| {self.database} | {now / 60:.0f} min | {self.faults} faults | {len(each)} processes"
+            say(f"{when} | {sum(each):.0f} MB together | largest {max(each):.0f} MB: {largest} |")
         return now
 
 
@@ -104,10 +104,10 @@ def soak(
         stage.clients = clients
         clients.start()
         _attack(stage, store, outcome, number, faults.volleys(kinds, random.Random(seed), at_once), say)
-        until(lambda: outcome.measure(stage) > 60 * minutes, 60 * minutes, every_s=1.0)
+        until(lambda: outcome.measure(stage, say) > 60 * minutes, 60 * minutes, every_s=1.0)
         clients.stop()
         _peace(clients, store, outcome)
-        outcome.measure(stage, 0.0)
+        outcome.measure(stage, say, 0.0)
         outcome.violations += [*stage.complaints, *import_faults.broken_lists(stage.http), *stage.stop()]
         _check(history.records(), gather(store, database, stage.journal), outcome)
     finally:
@@ -122,7 +122,7 @@ def soak(
 def _attack(stage: Any, store: Store, outcome: Any, number: Any, volleys: Any, say: Any) -> None:
     faults.recovered(stage, store, RECOVERY_S)  # from the start
     while outcome.faults < number:
-        outcome.measure(stage)
+        outcome.measure(stage, say)
         hit = faults.strike(stage, next(volleys)[: number - outcome.faults])
         seconds = faults.recovered(stage, store, RECOVERY_S)
         after = "never well again" if seconds is None else f"well again after {seconds:.1f} s"

@@ -206,13 +206,13 @@ class Stage:
         return [pid for pid, command in self.processes().items() if role_of(command) == role]
 
     def memory(self) -> Any:
-        """Resident memory of each process in MB, with what it is, the largest first."""
+        """Resident memory of each process in MB, and what the largest one is."""
         found = []
         for pid, command in self.processes().items():
             with suppress(OSError):  # it has ended
                 pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-                found.append((pages * os.sysconf("SC_PAGE_SIZE") / 1e6, role_of(command) or "other"))
-        return sorted(found, reverse=True)
+                found.append((pages * os.sysconf("SC_PAGE_SIZE") / 1e6, role_of(command) or command))
+        return [size for size, _ in found], max(found)[1]
 
     def logs(self) -> Any:
         return "\n".join(path.read_text(errors="replace")[-3000:] for path in sorted(self._folder.glob("*.log")))
