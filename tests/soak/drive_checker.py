@@ -14,18 +14,20 @@ PAUSED_S = 1.0
 
 def drives(commands: Sequence[Command]) -> Iterator[str]:
     """Once a drive has begun, no earlier one moves the same robot, but for one command that it had in hand."""
-    now, ended, last = dict[str, str](), set[str](), dict[str, float]()
+    now, ended, last, late = dict[str, str](), set[str](), dict[str, float](), dict[tuple[str, str], list[float]]()
     for at, robot, drive, what in commands:
         if what != "moves":
             continue
         if drive in ended:
             if at - last[drive] < PAUSED_S:
-                yield f"{drive} moved {robot} at {at}, after another had begun"
+                late.setdefault((robot, drive), []).append(at)
         elif now.get(robot, drive) != drive:
             ended.add(now[robot])
         if drive not in ended:
             now[robot] = drive
         last[drive] = at
+    for (robot, drive), when in late.items():
+        yield f"{drive} moved {robot} {len(when)} times from {when[0]} to {when[-1]}, after another had begun"
 
 
 def held(evidence: Any) -> Iterator[str]:

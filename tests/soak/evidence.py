@@ -124,7 +124,7 @@ def _experiment(session: Any, row: Any) -> Any:
             epoch=each.epoch,
             steps=each.steps,
             iterations_done=each.iterations_done,
-            log=tuple(map(digest, steps[each.id])),
+            log=tuple(digest(step, measured=on_a_bench(row.spec)) for step in steps[each.id]),
             places=tuple(map(mapping.position, steps[each.id])),
             error=each.error,
         )
@@ -138,11 +138,12 @@ def undisturbed(spec: dict, number: int) -> tuple[str, ...]:
 
     A robot on a bench of the soak has no noise, so a simulated reality gives its steps.
     """
-    if on_a_bench(spec):
+    measured = on_a_bench(spec)
+    if measured:
         reality = as_simulated(spec["robot"]["name"]).model_dump(mode="json")
         spec = spec | {"reality": reality | {"probes": spec["reality"]["probes"]}}
     settings = {name: value for name, value in spec.items() if name not in {"name", "repetitions"}}
-    return _undisturbed(json.dumps(settings, sort_keys=True), number)
+    return _undisturbed(json.dumps(settings, sort_keys=True), number, measured)
 
 
 def on_a_bench(spec: dict) -> bool:
@@ -151,15 +152,16 @@ def on_a_bench(spec: dict) -> bool:
 
 
 @cache
-def _undisturbed(spec: str, number: int) -> tuple[str, ...]:
-    return tuple(map(digest, repetition(setting(ExperimentSpec.model_validate_json(spec), number))))  # type: ignore[arg-type]
+def _undisturbed(spec: str, number: int, measured: bool) -> tuple[str, ...]:
+    steps = repetition(setting(ExperimentSpec.model_validate_json(spec), number))  # type: ignore[arg-type]
+    return tuple(digest(step, measured=measured) for step in steps)
 
 
-def digest(step: Step) -> str:
-    """A hash of all that the store keeps of a step; floats to the last bit."""
+def digest(step: Step, *, measured: bool) -> str:
+    """A hash of all that the store keeps of a step; floats to the last bit. Those who measure give no readings."""
     kept = {"kind": type(step).__name__, "iteration": step.iteration, "columns": mapping.iteration_columns(step)}
     if isinstance(step, Tuned):
         kept["simulators"] = mapping.simulator_columns(step)
     if isinstance(step, Measured | Probed):
-        kept["measurement"] = mapping.measurement_columns(step, "reality")
+        kept["measurement"] = mapping.measurement_columns(step, "reality") | ({"readings": None} if measured else {})
     return sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()

@@ -293,10 +293,10 @@ def moves(drive: Any, *at: Any, robot: Any = "r") -> Any:
     ("commands", "violation"),
     [
         ([*moves("1.1", 1.0, 1.1), *moves("2.1", 1.2, 1.3), *moves("2.2", 1.4)], None),
-        ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 1.3)], "1.1 moved r at 1.3"),
+        ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 1.3)], "1.1 moved r 1 times from 1.3"),
         ([*moves("1.1", 1.0), *moves("2.1", 1.2, robot="s"), *moves("1.1", 1.3)], None),
         ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 4.0), *moves("2.1", 4.1, 4.2)], None),
-        ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 4.0, 4.1)], "1.1 moved r at 4.1"),
+        ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 4.0, 4.1)], "1.1 moved r 1 times from 4.1"),
         ([*moves("1.1", 1.0), *moves("2.1", 1.2), Command(1.3, "r", "1.1", "stop")], None),
     ],
     ids=["in turn", "two at once", "two robots", "a command in hand", "more than one", "a stop"],
