@@ -52,9 +52,8 @@ def here(given: Any) -> Any:
     console.print(f"{given.faults} faults with --seed {given.seed} on {given.database}: about {_duration(expected)}")
     folder = given.folder / given.database
     folder.mkdir(parents=True)
-    chosen = MISBEHAVIOURS[given.plug_ins]
     kind, tell = KINDS[given.database], partial(console.print, style="dim")
-    much = {"minutes": given.minutes, "misbehaviours": chosen}
+    much = {"minutes": given.minutes, "misbehaviours": MISBEHAVIOURS[given.plug_ins]}
     outcome = soak(folder, kind, given.faults, given.seed, given.at_once, tell, **much)
     show(console, outcome)
     return 1 if outcome.violations else 0

@@ -26,12 +26,6 @@ NONSENSE: tuple[dict[str, Any], ...] = (
     {"values": [1e400]},
 )
 
-LIED_TO_S = 120.0
-"""Lease of a take about which others lie: longer than any fault keeps the service away."""
-
-STALE = f"Bearer gaplab_stale_{'0' * 64}"
-"""A token that admits nobody."""
-
 _numbers = count()
 
 Inflict = Callable[[Operator, Any], None]
@@ -77,11 +71,11 @@ def _talks_nonsense(operator: Operator, request: Any) -> None:
 def _lies(operator: Operator, request: Any) -> None:
     """Answer for the holder of the request: without a take, with one that never was, with a stale token, and again."""
     honest = Operator(operator.http, operator.history, f"{operator.name}, an honest one")
-    if taken := honest.take(request["id"], LIED_TO_S):
-        wrong = right(taken["genome"]) + 1.0
+    if taken := honest.take(request["id"], lease_s=120.0):  # longer than any fault keeps the service away
+        wrong, stale = right(taken["genome"]) + 1.0, {"Authorization": f"Bearer gaplab_stale_{'0' * 64}"}
         for take in (None, taken["takes"] + 1, 2**31 - 1):
             operator.answer(taken, wrong, verb="lie", take=take)
-        operator.answer(taken, wrong, verb="nonsense", sent={"headers": {"Authorization": STALE}})
+        operator.answer(taken, wrong, verb="nonsense", headers=stale)
         for changes in NONSENSE:
             operator.answer(taken, verb="nonsense", **changes)
         if honest.answer(taken, right(taken["genome"])).acknowledged:

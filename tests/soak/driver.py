@@ -9,8 +9,7 @@ from gaplab import MeasurementFailed
 from tests import pretended_robot
 from tests.soak.plugins.rig import JOURNAL
 
-ROBOT = "GAPLAB_SOAK_ROBOT"
-"""Environment variable with the name of the robot."""
+ROBOT = "GAPLAB_SOAK_ROBOT"  # environment variable with its name
 
 COMMANDS, EVERY_S = 100, 0.05
 """Of one run, which lasts longer than a take without a sign of life, and than others need to take over."""

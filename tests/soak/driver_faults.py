@@ -23,8 +23,8 @@ from tests.soak.stage import until
 LEASE_S = 2
 """Of a take, without a sign of life."""
 
-HANDOVER_S, END_S = 20.0, 5.0
-"""For how long a fault waits for another driver to take over, and for one to end."""
+HANDOVER_S = 20.0
+"""For how long a fault waits for another driver to take over."""
 
 _numbers = count()
 
@@ -33,25 +33,21 @@ class Driven:
     """`gaplab drive` for one experiment, with a token and a network of its own."""
 
     def __init__(self, stage: Any, experiment: str, robot: str) -> None:
-        self.experiment, self.token, self.network = experiment, stage.new_token(), Proxy(stage.port)
+        self.path, self.token, self.network = f"/experiments/{experiment}", stage.new_token(), Proxy(stage.port)
         journal = stage.journal.with_name(f"{experiment}.journal")
         command = [sys.executable, "-m", "gaplab", "drive", experiment, "--driver", driver.__file__]
+        command += ["--journal", str(journal), "--lease-s", str(LEASE_S)]
         told = {driver.JOURNAL: str(stage.journal), driver.ROBOT: robot, "GAPLAB_TOKEN": self.token.secret}
+        told["GAPLAB_URL"] = f"http://127.0.0.1:{self.network.port}"
         with journal.with_suffix(".log").open("ab") as log:
-            self.process = subprocess.Popen(
-                [*command, "--journal", journal, "--lease-s", str(LEASE_S)],
-                env=os.environ | told | {"GAPLAB_URL": f"http://127.0.0.1:{self.network.port}"},
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-            )
+            self.process = subprocess.Popen(command, env=os.environ | told, stdout=log, stderr=log)
 
     def close(self) -> None:
         """End it in order, if it can."""
         self.process.send_signal(signal.SIGCONT)
         self.process.terminate()
         with suppress(subprocess.TimeoutExpired):
-            self.process.wait(END_S)
+            self.process.wait(5.0)
         self.process.kill()
         self.process.wait()
         self.network.close()
@@ -66,9 +62,7 @@ KINDS: dict[str, Callable[[Any, Driven], Any]] = {
     "paused": lambda stage, victim: victim.process.send_signal(signal.SIGSTOP),
     "cut off": lambda stage, victim: victim.network.hang(for_good=True),
     "revoked": _revoke,
-    "called off": lambda stage, victim: stage.history.ask(
-        stage.http, "cancel", "POST", f"/experiments/{victim.experiment}/cancel"
-    ),
+    "called off": lambda stage, victim: stage.history.ask(stage.http, "cancel", "POST", f"{victim.path}/cancel"),
 }
 
 
@@ -102,5 +96,5 @@ def inflicting(kind: str) -> Any:
 
 def _movers(journal: Path, robot: str, *, done: bool = False) -> Any:
     """The processes that moved a robot; only those that came to the end of a run, if so asked."""
-    given = [each for each in commands(journal) if each.robot == robot and each.what != "stop"]
-    return {int(each.drive.partition(".")[0]) for each in given if not done or each.what != "moves"}
+    given = [each for each in commands(journal, robot) if each.what != "stop" and not (done and each.what == "moves")]
+    return {int(each.drive.partition(".")[0]) for each in given}

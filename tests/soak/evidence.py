@@ -88,7 +88,11 @@ def gather(store: Store, database: Any, journal: Path) -> Evidence:
         studies = dict(session.execute(select(StudyRow.id, StudyRow.name)).all())
         checks = dict(session.execute(select(SensitivityRow.id, SensitivityRow.state)).all())
         experiments = tuple(_experiment(session, row) for row in session.scalars(select(ExperimentRow)).all())
-        answers = {row.id: _answer(session, row) for row in session.scalars(select(AnswerRow))}
+        answered = session.execute(select(AnswerRow, RequestRow.bench).join(RequestRow)).all()
+        answers = {
+            row.id: Answer(row.request_id, str(row.state), row.operator, bench, tuple(row.values or ()))
+            for row, bench in answered
+        }
     return Evidence(
         experiments,
         studies,  # type: ignore[arg-type]
@@ -98,11 +102,6 @@ def gather(store: Store, database: Any, journal: Path) -> Evidence:
         tuple(commands(journal)),
         answers,
     )
-
-
-def _answer(session: Any, row: Any) -> Answer:
-    bench = session.get_one(RequestRow, row.request_id).bench
-    return Answer(row.request_id, str(row.state), row.operator, bench, tuple(row.values or ()))
 
 
 def checks_under_way(store: Store) -> bool:

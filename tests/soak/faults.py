@@ -72,8 +72,8 @@ def _fill(stage: Any) -> bool:
 
 def _says_it(stage: Any) -> Any:
     """Whether `/readyz` names the trouble of a write that is refused; nothing, if none is, or nobody answers."""
-    if plugin_faults.submission(stage, {"strategy": "random"}, "disk full").status == 503:
-        with suppress(httpx2.HTTPError):
+    with suppress(httpx2.HTTPError):
+        if stage.http.put("/views/disk", json={}).status_code == 503:
             ready = stage.http.get("/readyz")
             return [ready.status_code != 200 or "writ" in ready.text or "full" in ready.text]
     return []

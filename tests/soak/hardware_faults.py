@@ -18,7 +18,7 @@ Command = namedtuple("Command", "at robot drive what", defaults=("moves",))
 
 def two_drivers(stage: Any) -> bool:
     """Submit an experiment whose reality is the robot, wait until it moves, and stop the supervisor that lets it."""
-    before = len(_of_rig(stage.journal))
+    before = len(commands(stage.journal, "rig"))
     if submitted(stage, SPEC, "on the robot") is None:
         return False
     driving: list[int] = []
@@ -32,19 +32,16 @@ def two_drivers(stage: Any) -> bool:
     return True
 
 
-def commands(journal: Path) -> Any:
-    """The motor commands of a journal, in the order in which they were given, and what else is in it."""
+def commands(journal: Path, robot: str | None = None) -> Any:
+    """The motor commands of a journal, in the order in which they were given, and what else is in it; of one robot."""
     lines = journal.read_text().splitlines() if journal.exists() else []
-    return sorted(Command(float(at), *others) for at, *others in map(str.split, lines))
-
-
-def _of_rig(journal: Path) -> Any:
-    return [each for each in commands(journal) if each.robot == "rig"]
+    found = (Command(float(at), *others) for at, *others in map(str.split, lines))
+    return sorted(each for each in found if robot in {None, each.robot})
 
 
 def _driving(stage: Any, before: Any) -> Any:
     """The supervisor whose worker gave the latest command, in a list; an empty one if nothing has moved."""
-    given = _of_rig(stage.journal)[before:]
+    given = commands(stage.journal, "rig")[before:]
     pid = int(given[-1].drive.partition(".")[0]) if given else 0
     supervisors = set(stage.of("supervisor"))
     while pid > 1 and pid not in supervisors:

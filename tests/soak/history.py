@@ -51,7 +51,7 @@ class History:
         """Ask, write down what came, and return it; the body is sent as JSON, unless something else is `sent`."""
         sent_at, status, answer = time.time(), None, {}
         try:
-            response = http.request(method, path, **({"json": body} | sent if "content" not in sent else sent))
+            response = http.request(method, path, **({"json": body} if "content" not in sent else {}), **sent)
             status, answer = response.status_code, response.json()
         except (httpx2.HTTPError, ValueError) as error:
             answer = {"error": type(error).__name__}

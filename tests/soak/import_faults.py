@@ -2,7 +2,7 @@
 
 import json
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from typing import Any
 from urllib.parse import quote
@@ -15,49 +15,40 @@ from tests.soak.stage import until
 
 LISTS = ("/requests?limit=500&pending=false", "/experiments?limit=500", "/studies?limit=500")
 
-Members = Mapping[str, bytes]
+DEEP = json.loads("[" * 900 + "]" * 900)
 
 
-def _with(**values: Any) -> Callable[[Any], Any]:
-    """An object with other values; a callable makes one of the old."""
-    return lambda old: old | {name: value(old[name]) if callable(value) else value for name, value in values.items()}
+def _in(table: str, change: Callable[[Any], Any]) -> Callable[[Any], bytes]:
+    """The archive with a change of the first row of a table."""
 
-
-def _in_row(table: str, **values: Any) -> Callable[[Members], bytes]:
-    """The archive with other values in the first row of a table."""
-
-    def changed(members: Members) -> bytes:
+    def changed(members: Any) -> bytes:
         first, *others = members[f"{table}.jsonl"].splitlines()
-        row = json.dumps(_with(**values)(json.loads(first))).encode()
-        return bytes(packed({**members, f"{table}.jsonl": b"\n".join([row, *others, b""])}))
+        row = json.loads(first)
+        change(row)
+        return bytes(packed({**members, f"{table}.jsonl": b"\n".join([json.dumps(row).encode(), *others, b""])}))
 
     return changed
 
 
-def _in_spec(**values: Any) -> Callable[[Members], bytes]:
-    return _in_row("experiment", spec=_with(**values))
-
-
-HOSTILE: dict[str, Callable[[Members], bytes]] = {
-    "a forecast that is a list": _in_row("request", safety=[1, 2]),
-    "traces of nothing": _in_row("answer", traces=[{"x": 1}]),
-    "a genome of one gene": _in_row("request", genome=[0.5]),
-    "genes of 500": _in_row("request", genome=lambda genome: [500.0] * len(genome)),
-    "a budget of ten million": _in_spec(budget=_with(simulator_evaluations=10**7)),
-    "an extreme priority": _in_spec(priority=-(2**30)),
-    "options of 7 MB": _in_spec(strategy={"name": "random", "options": {"x": "y" * 7_000_000}}),
-    "nested 900 deep": _in_spec(strategy={"name": "random", "options": {"x": json.loads("[" * 900 + "]" * 900)}}),
+HOSTILE: dict[str, Callable[[Any], bytes]] = {
+    "a forecast that is a list": _in("request", lambda row: row.update(safety=[1, 2])),
+    "traces of nothing": _in("answer", lambda row: row.update(traces=[{"x": 1}])),
+    "a genome of three genes": _in("request", lambda row: row.update(genome=[0.5, 0.5, 0.5])),
+    "genes of 500": _in("request", lambda row: row.update(genome=[500.0] * len(row["genome"]))),
+    "a budget of ten million": _in("experiment", lambda row: row["spec"]["budget"].update(simulator_evaluations=10**7)),
+    "an extreme priority": _in("experiment", lambda row: row["spec"].update(priority=-(2**30))),
+    "options of 7 MB": _in("experiment", lambda row: row["spec"]["strategy"].update(options={"x": "y" * 7_000_000})),
+    "nested 900 deep": _in("experiment", lambda row: row["spec"]["strategy"].update(options={"x": DEEP})),
     "a file elsewhere": lambda members: bytes(packed({**members, "../../x": b"x"})),
     "no Parquet": lambda members: bytes(packed({**members, "measurement.parquet": b"PAR1" * 100})),
     "half a file": lambda members: bytes(packed(members)[:5000]),
     "another sum": lambda members: bytes(packed({**members, "answer.jsonl": b"{}\n"}, honest=False)),
 }
-"""What is done to an archive whose experiment has requests and answers."""
 
 
 def hostile(stage: Any) -> bool:
     """Export an experiment with an answer, import it in each harmful form, and read the lists."""
-    found = list[Members]()
+    found = list[Any]()
     if not until(lambda: found.extend(_exported(stage)) or found, WAIT_S):  # type: ignore[func-returns-value]
         return False
     for kind, harm in HOSTILE.items():
@@ -83,10 +74,10 @@ def _exported(stage: Any) -> Any:
 def broken_lists(http: Any) -> Iterator[str]:
     """Pages of lists that do not answer, whatever was imported."""
     for path in LISTS:
-        following = ""
-        while following is not None:
-            answer = http.get(f"{path}{following}")
+        following = path
+        while following:
+            answer = http.get(following)
             if answer.status_code != 200:
                 yield f"GET {path}: {answer.status_code} {answer.text:.300}"
             cursor = answer.json().get("next")
-            following = f"&cursor={quote(cursor)}" if cursor else None
+            following = f"{path}&cursor={quote(cursor)}" if cursor else ""

@@ -24,7 +24,6 @@ QUADRUPED = {
     "repetitions": 1,
     "budget": {"controller_evaluations": 25, "selection_evaluations": 20, "simulator_evaluations": 20},
 }
-"""Of a driver, which moves only robots with actuators."""
 
 LEASE_S = 3
 """Of a take."""
@@ -61,10 +60,10 @@ class Operator:
         record = self._ask("take", f"/requests/{request}/take", {"operator": self.name, "lease_s": lease_s})
         return record.answer if record.acknowledged else None
 
-    def answer(self, taken: Any, *values: Any, verb: str = "answer", sent: Any = None, **changes: Any) -> Any:
+    def answer(self, taken: Any, *values: Any, verb: str = "answer", headers: Any = None, **changes: Any) -> Any:
         """Answer a request as it was taken, and return the record, which has this verb."""
         body = {"take": taken["takes"], "values": list(values), "operator": self.name} | changes
-        return self._ask(verb, f"/requests/{taken['id']}/measurements", body, **(sent or {}))
+        return self._ask(verb, f"/requests/{taken['id']}/measurements", body, headers=headers)
 
     def correct(self, answer: str, *values: float) -> Any:
         """Replace the values of an answer, and return the record."""

@@ -35,15 +35,10 @@ def submitting(kind: Any) -> Any:
     return inflict
 
 
-def submission(stage: Any, spec: Any, name: Any) -> Any:
-    """Submit an experiment before all others, and return the record."""
-    body = SPEC | spec | {"name": f"fault {next(_numbers)}: {name}"}
-    return stage.history.ask(stage.http, "submit", "POST", "/experiments", body)
-
-
 def submitted(stage: Any, spec: Any, name: Any) -> Any:
     """Submit an experiment before all others, and return its id; None if that was not acknowledged."""
-    record = submission(stage, spec, name)
+    body = SPEC | spec | {"name": f"fault {next(_numbers)}: {name}"}
+    record = stage.history.ask(stage.http, "submit", "POST", "/experiments", body)
     return record.answer["id"] if record.acknowledged else None
 
 

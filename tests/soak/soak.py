@@ -28,9 +28,6 @@ RECOVERY_S = 180
 STUCK_S = 300
 """In peace, and without a fault: what has not ended by then is stuck."""
 
-MEMORY_S = 300.0
-"""Between two measurements of memory."""
-
 
 @dataclass
 class Outcome:
@@ -52,19 +49,19 @@ class Outcome:
     claims: int = 0
     given_up: int = 0
     begun: float = field(default_factory=time.monotonic)
-    measured_s: float = -MEMORY_S
+    measured_s: float = float("-inf")
 
     @property
     def faults(self) -> Any:
         return sum(map(len, self.recoveries.values()))
 
-    def measure(self, stage: Any, say: Any, every_s: float = MEMORY_S) -> float:
+    def measure(self, stage: Any, say: Any, every_s: float = 300.0) -> float:
         """Say how much memory the service has, if that is due, as a row of a table; seconds since the beginning."""
         now = time.monotonic() - self.begun
         if now - self.measured_s >= every_s:
             self.measured_s, (each, largest) = now, stage.memory()
-            when = f"| {self.database} | {now / 60:.0f} min | {self.faults} faults | {len(each)} processes"
-            say(f"{when} | {sum(each):.0f} MB together | largest {max(each):.0f} MB: {largest} |")
+            sizes = f"{len(each)} processes | {sum(each):.0f} MB | largest {max(each):.0f} MB: {largest}"
+            say(f"| {self.database} | {now / 60:.0f} min | {self.faults} faults | {sizes} |")
         return now
 
 
