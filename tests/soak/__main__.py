@@ -52,7 +52,7 @@ def here(given: Any) -> Any:
     console.print(f"{given.faults} faults with --seed {given.seed} on {given.database}: about {_duration(expected)}")
     folder = given.folder / given.database
     folder.mkdir(parents=True)
-    kind, tell = KINDS[given.database], partial(console.print, style="dim")
+    kind, tell = KINDS[given.database], partial(console.print, style="dim", soft_wrap=True)
     much = {"minutes": given.minutes, "misbehaviours": MISBEHAVIOURS[given.plug_ins]}
     outcome = soak(folder, kind, given.faults, given.seed, given.at_once, tell, **much)
     show(console, outcome)
