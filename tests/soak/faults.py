@@ -122,7 +122,7 @@ def _restore(stage: Any) -> bool:
 def faults(database: Any, misbehaviours: Any = misbehaviour.HARMLESS) -> Any:
     """What can be done to a service on this database, and by these strategies in it."""
     found = [make(role) for role in ("api", "supervisor", "worker", "raylet") for make in (_kill, _pause)]
-    found.append(Fault("disk slow", _stall))
+    found += [Fault("disk slow", _stall), Fault("imports are hostile", import_faults.hostile)]
     if database.disk.small:
         found.append(Fault("disk full", _fill))
     if hasattr(database, "restart"):
@@ -133,7 +133,6 @@ def faults(database: Any, misbehaviours: Any = misbehaviour.HARMLESS) -> Any:
     found += [Fault("plug-in edited", plugin_faults.edited), Fault("plug-in broken", plugin_faults.broken)]
     found += [Fault(kind, bench_faults.inflicting(kind)) for kind in bench_faults.KINDS]
     found += [Fault(f"driver {kind}", driver_faults.inflicting(kind)) for kind in driver_faults.KINDS]
-    found.append(Fault("imports are hostile", import_faults.hostile))
     return found + [Fault(f"plug-in {kind}", plugin_faults.submitting(kind)) for kind in misbehaviours]
 
 
