@@ -1,4 +1,4 @@
-"""A TCP proxy before a Unix socket, whose connections can die silently, as behind a firewall that forgets them."""
+"""A TCP proxy before a server, whose connections can die silently, as behind a firewall that forgets them."""
 
 import select
 import socket
@@ -7,22 +7,23 @@ from threading import Event, Thread
 
 
 class Proxy:
-    """Forwards TCP connections of loopback to a Unix socket.
+    """Forwards TCP connections of loopback to a Unix socket, or to a port of loopback.
 
     Attributes:
         port: that it listens on.
     """
 
-    def __init__(self, target: str) -> None:
+    def __init__(self, target: str | int) -> None:
         self._target, self._listener = target, socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
         self._hung = Event()
         Thread(target=self._accept, daemon=True).start()
 
-    def hang(self) -> None:
-        """Forward nothing of the present connections; later ones are forwarded."""
+    def hang(self, *, for_good: bool = False) -> None:
+        """Forward nothing of the present connections; later ones are forwarded, unless it is for good."""
         self._hung.set()
-        self._hung = Event()
+        if not for_good:
+            self._hung = Event()
 
     def close(self) -> None:
         """Accept no more."""
@@ -37,8 +38,9 @@ class Proxy:
             Thread(target=self._forward, args=(client, self._hung), daemon=True).start()
 
     def _forward(self, client: socket.socket, hung: Event) -> None:
-        with client, socket.socket(socket.AF_UNIX) as server, suppress(OSError):
-            server.connect(self._target)
+        family = socket.AF_UNIX if isinstance(self._target, str) else socket.AF_INET
+        with client, socket.socket(family) as server, suppress(OSError):
+            server.connect(self._target if isinstance(self._target, str) else ("127.0.0.1", self._target))
             while True:
                 for ready in select.select([client, server], [], [], 0.1)[0]:
                     data = ready.recv(65536)

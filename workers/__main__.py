@@ -10,6 +10,7 @@ from secrets import token_hex
 from gaplab.services import logs
 from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.plugins import folders
+from gaplab.services.plugins.ending import end_after
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import ANSWER_S, Store
@@ -18,12 +19,17 @@ from gaplab.services.store.sqlite_file import in_use
 SHORTEST_ANSWER_S = 5.0
 """Least time for a statement in Postgres, however short a lease is."""
 
-RAY_NOTICES = {
+RAY_SETTINGS = {
+    "RAY_idle_worker_killing_time_threshold_ms": "60000",
     "RAY_gcs_rpc_server_reconnect_timeout_s": "20",
     "RAY_health_check_timeout_ms": "5000",
     "RAY_health_check_failure_threshold": "4",
 }
-"""Settings of a Ray of our own, which then gives up a part that died within half a minute instead of a whole one."""
+"""Settings of a Ray of our own.
+
+It keeps an idle process for a minute, as experiments with other plug-ins need other ones in turns. It gives up a part
+that died within half a minute instead of a whole one.
+"""
 
 
 def serve(settings: Settings) -> int:
@@ -100,7 +106,7 @@ def choose_authentication(settings: Settings, environment: MutableMapping[str, s
     else:
         environment["RAY_AUTH_MODE"] = "token"
         environment["RAY_AUTH_TOKEN"] = token_hex(32)
-        for name, value in RAY_NOTICES.items():
+        for name, value in RAY_SETTINGS.items():
             environment.setdefault(name, value)
 
 
@@ -131,4 +137,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    end_after(lambda: main(sys.argv[1:]))

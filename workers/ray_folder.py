@@ -8,6 +8,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import time
 
+from gaplab.services.core.errors import ClusterUnusable
+
 try:
     import fcntl
 except ImportError:  # not on Windows
@@ -34,12 +36,20 @@ def ray_folder(wanted: Path | None = None) -> Iterator[Path]:
 
     Args:
         wanted: where to make it; left out: RAY_TMPDIR, or the folder for temporary files.
+
+    Raises:
+        ClusterUnusable: this user cannot make one there.
     """
-    parent = wanted or Path(os.environ.get("RAY_TMPDIR") or tempfile.gettempdir()).absolute()
-    if len(str(parent)) > LONGEST_PARENT:  # too long for the sockets
-        parent = Path("/tmp")  # noqa: S108 - the folder in it is private
-    _sweep(parent)
-    folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))  # with mode 0700
+    try:
+        parent = wanted or Path(os.environ.get("RAY_TMPDIR") or tempfile.gettempdir()).absolute()
+        if len(str(parent)) > LONGEST_PARENT:  # too long for the sockets
+            parent = Path("/tmp")  # noqa: S108 - the folder in it is private
+        _sweep(parent)
+        folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))  # with mode 0700
+    except OSError as error:
+        short = f"of at most {LONGEST_PARENT} characters"
+        msg = f"Ray needs a folder for its files; let RAY_TMPDIR name one {short} that you may write: {error}"
+        raise ClusterUnusable(msg) from error
     held = _hold(folder)
     try:
         yield folder

@@ -21,8 +21,7 @@ def points_at(session: Session, counts: Mapping[str, int], known: Mapping[str, i
 
     Args:
         session: session of a transaction.
-        counts: number of real-world evaluations by experiment.
-        known: number of samples from before by experiment.
+        counts, known: numbers of real-world evaluations, and of samples from before, by experiment.
     """
     points = {
         experiment: mean_and_deviation(frozen(values)) for experiment, values in recorded_at(session, counts).items()

@@ -65,8 +65,9 @@ def evaluate_traces(
         genome = tuple(row.genome)
     if not simulators:
         raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
-    asked = sent(resolved), genome, tuple(simulators[0]), spec
-    found = process.call(said_by_files, *asked, load=lambda: _contents(store, spec.traces))
+    sent_spec = sent(resolved)
+    asked = sent_spec, genome, tuple(simulators[0]), spec
+    found = process.call(said_by_files, *asked, load=lambda: _contents(store, spec.traces), plugins=sent_spec.plugins)
     if not isinstance(found, TracesRead):
         raise InvalidSpec(found)
     return found

@@ -3,6 +3,7 @@
 import io
 import json
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from importlib.metadata import version
 from typing import Any, TypeAlias
 from zipfile import ZipFile
@@ -118,13 +119,14 @@ def _expected(outcome: ExperimentOutcome, process: RolloutProcess) -> Iterator[t
         return
     spec, fitness, apart_m = sent(outcome.spec), dict[str, float | None](), dict[str, float | None]()
     parameters = tuple(outcome.simulators[0].parameters[ref.name] for ref in outcome.spec.tunables)
-    tuned = process.call(tuned_mjcf, spec, parameters, f"Tuned by gaplab: experiment {outcome.experiment.id}.")
+    call = partial(process.call, plugins=spec.plugins)
+    tuned = call(tuned_mjcf, spec, parameters, f"Tuned by gaplab: experiment {outcome.experiment.id}.")
     yield from (("tuned.xml", text) for text in [tuned] if text)
     for each in outcome.measured[:MOST_SHOWN]:
         name = f"{each.repetition}-{each.iteration}-{each.kind.value}"
         try:
-            times_s, poses, expected = process.call(expected_motion, spec, each.genome, parameters)
-            plain_m = process.call(plain_motion, spec, parameters, each.genome, times_s) if tuned else None
+            times_s, poses, expected = call(expected_motion, spec, each.genome, parameters)
+            plain_m = call(plain_motion, spec, parameters, each.genome, times_s) if tuned else None
         except GaplabError:
             return
         if plain_m is not None:

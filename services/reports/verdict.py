@@ -57,9 +57,8 @@ def judge(
     learned.sort(key=lambda one: one.mean, reverse=True)
     names = {one.curve.experiment: one.name for one in judged}
     trends = tuple(_trend(one, one.end) for one in judged if one.end is not None)
-    ranking = list(sentences.ranking(learned, pairs, names, where))
     told = [
-        *ranking,
+        *sentences.ranking(learned, pairs, names, where),
         *sentences.share_of_direct(learned, judged, pairs),
         *(trend.sentence for trend in trends),
         *sentences.spread(learned),
@@ -68,7 +67,7 @@ def judge(
     wrong = sentences.unreproduced(unreproduced, names)
     headline = [*wrong, *sentences.standing(learned, pairs, where), *sentences.continuing(trends)]
     return VerdictRead(
-        headline=" ".join(headline or ranking[:1]) or NOTHING,
+        headline=" ".join(headline or (told[:1] if learned else [])) or NOTHING,
         sentences=tuple(told),
         trends=trends,
         evaluations=count,

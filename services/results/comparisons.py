@@ -86,13 +86,14 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
     pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
     by_id = {row.id: row for row in rows}
-    last = evaluations(final, *(row.known for row in rows if row.tunes))
-    where = f"after {last}" if first == final else f"mean of each repetition over {first} to {last}"
+    told = {"fitness": fitness, "where": _where(first, final, rows)}
     warned = (tuple(warnings(by_id[pair.first], by_id[pair.second], concealed)) for pair in pairs)
-    return tuple(
-        pair.model_copy(update={"warnings": each, "fitness": fitness, "where": where})
-        for pair, each in zip(pairs, warned, strict=True)
-    )
+    return tuple(pair.model_copy(update={"warnings": each, **told}) for pair, each in zip(pairs, warned, strict=True))
+
+
+def _where(first: int, last: int, rows: Sequence[ExperimentRow]) -> str:
+    counted = evaluations(last, *(row.known for row in rows if row.tunes))
+    return f"after {counted}" if first == last else f"mean of each repetition over {first} to {counted}"
 
 
 def _check_the_end(rows: Sequence[ExperimentRow], compared: Sequence[Compared], last: int) -> None:

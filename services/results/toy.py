@@ -73,8 +73,8 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
     _refuse_outside("repetition", [repetition], row.spec["repetitions"])
     _refuse_outside("iteration", iterations, row.iterations)
     measured = results.page_of_samples(session, row.id, repetition=repetition, kind=None, limit=MOST_ROWS, cursor=None)
-    taken = ((each.iteration, each.genome, each.fitness) for each in measured if each.kind is MeasurementKind.SAMPLE)
-    samples = (*((0, each.genome, each.fitness) for each in samples_of(spec)[: row.known]), *taken)
+    earlier = samples_of(spec)[: row.known]
+    taken = [each for each in measured if each.kind is MeasurementKind.SAMPLE]
     page = results.page_of_simulators(session, row, repetition=repetition, iteration=None, limit=MOST_ROWS, cursor=None)
     simulators = () if is_direct(spec) else page
     wanted = iterations or [max((each.iteration for each in simulators), default=0)]
@@ -86,7 +86,10 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
         and row.id not in hiding.hidden(session, [row])
         and None not in row.spec["reality"]["parameters"].values(),
         measured=measured,
-        samples=tuple(ToySample(iteration=at, gene=genome[0], fitness=fitness) for at, genome, fitness in samples),
+        samples=(
+            *(ToySample(iteration=0, gene=each.genome[0], fitness=each.fitness) for each in earlier),
+            *(ToySample(iteration=each.iteration, gene=each.genome[0], fitness=each.fitness) for each in taken),
+        ),
         simulators=simulators,
         transferred={
             each: replays.measured_controller(session, row.id, repetition, each, MeasurementKind.PROBE)
@@ -118,7 +121,8 @@ def _approximations(found: _Stored, simulators: Sequence[SimulatorRead], genes: 
 def _limits(found: _Stored, truth: FloatArray | None, genes: FloatArray) -> tuple[float, float]:
     best = _approximations(found, [each for each in found.simulators if each.rank == 0], genes)
     values = [*best.ravel().tolist(), *([] if truth is None else truth.tolist())]
-    values += [each.fitness for each in (*found.measured, *found.samples) if each.fitness is not None]
+    values += [each.fitness for each in found.measured if each.fitness is not None]
+    values += [each.fitness for each in found.samples if each.fitness is not None]
     there = [each for each in values if np.isfinite(each)] or [0.0, 1.0]
     return min(there), max(there)
 

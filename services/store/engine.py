@@ -92,6 +92,7 @@ def _prepare_sqlite(engine: Engine, *, enforce_foreign_keys: bool) -> None:
         connection.isolation_level = None
         connection.execute(f"PRAGMA journal_mode={journal}")
         connection.execute("PRAGMA synchronous=FULL")
+        connection.execute("PRAGMA temp_store=MEMORY")  # large sorts and indices need no folder that can be written
         connection.execute(f"PRAGMA foreign_keys={'ON' if enforce_foreign_keys else 'OFF'}")
 
     @event.listens_for(engine, "begin")

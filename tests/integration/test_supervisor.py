@@ -21,7 +21,7 @@ from sqlalchemy import select
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.schemas.measurements import TakeSpec
 from gaplab.services.bench import taking
-from gaplab.services.core.errors import RayGone, StoreChanged
+from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged
 from gaplab.services.experiments import reading, submission
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.running import execution
@@ -115,6 +115,11 @@ def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start()
 
     assert left not in found
     assert {held, starting} <= set(found)
+
+
+def test_a_folder_that_ray_cannot_have_is_told_with_the_remedy() -> None:
+    with pytest.raises(ClusterUnusable, match=r"let RAY_TMPDIR name one .*: .*No such file"):
+        ray_folder(Path("/no/such")).__enter__()
 
 
 def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import argparse
 import signal
 import subprocess
 import sys
+import time
 from functools import partial
 from pathlib import Path
 from random import SystemRandom
@@ -34,6 +35,7 @@ def main() -> Any:
     parser.add_argument("--database", choices=KINDS, help="left out: both at once, each in a process")
     parser.add_argument("--at-once", type=int, default=8, help="faults that may come together")
     parser.add_argument("--plug-ins", choices=MISBEHAVIOURS, default="all", help="that misbehave")
+    parser.add_argument("--minutes", type=float, default=0.0, help="that it lasts at least; --faults 0: without any")
     parser.add_argument("--folder", type=Path, help="for logs and histories; left out: they are not kept")
     given = parser.parse_args()
     given.seed = SystemRandom().randrange(10**6) if given.seed is None else given.seed
@@ -46,13 +48,13 @@ def main() -> Any:
 def here(given: Any) -> Any:
     """Hurt a service on one database."""
     console = Console()
-    expected = given.faults * FAULT_S + 120
+    expected = max(given.faults * FAULT_S, given.minutes * 60) + 120
     console.print(f"{given.faults} faults with --seed {given.seed} on {given.database}: about {_duration(expected)}")
     folder = given.folder / given.database
     folder.mkdir(parents=True)
-    chosen = MISBEHAVIOURS[given.plug_ins]
-    kind, tell = KINDS[given.database], partial(console.print, style="dim")
-    outcome = soak(folder, kind, given.faults, given.seed, given.at_once, tell, misbehaviours=chosen)
+    kind, tell = KINDS[given.database], partial(console.print, style="dim", soft_wrap=True)
+    much = {"minutes": given.minutes, "misbehaviours": MISBEHAVIOURS[given.plug_ins]}
+    outcome = soak(folder, kind, given.faults, given.seed, given.at_once, tell, **much)
     show(console, outcome)
     return 1 if outcome.violations else 0
 
@@ -60,7 +62,7 @@ def here(given: Any) -> Any:
 def side_by_side(given: Any) -> Any:
     """Hurt a service on each database, in processes of their own."""
     common = ["--seed", str(given.seed), "--at-once", str(given.at_once), "--folder", str(given.folder)]
-    common += ["--plug-ins", given.plug_ins]
+    common += ["--plug-ins", given.plug_ins, "--minutes", str(given.minutes)]
     running = []
     try:
         for index, name in enumerate(KINDS):
@@ -78,11 +80,11 @@ def side_by_side(given: Any) -> Any:
 
 def show(console: Any, outcome: Any) -> None:
     """The figures of an outcome, and what was violated."""
-    table = Table(title=f"{outcome.database}: {outcome.faults} faults in {_duration(outcome.seconds)}")
+    table = Table(title=f"{outcome.database}: {outcome.faults} faults in {_duration(time.monotonic() - outcome.begun)}")
     for column in ("fault", "times", "all others progress again after: median", "worst"):
         table.add_column(column, justify="left" if column == "fault" else "right")
     every = [each for times in outcome.recoveries.values() for each in times]
-    for name, seconds in [*sorted(outcome.recoveries.items()), ("all", every)]:
+    for name, seconds in [*sorted(outcome.recoveries.items()), *([("all", every)] if every else [])]:
         table.add_row(name, str(len(seconds)), f"{median(seconds):.1f} s", f"{max(seconds):.1f} s")
     console.print(table)
     console.print(

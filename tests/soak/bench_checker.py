@@ -11,6 +11,8 @@ def measurements(history: Any, evidence: Any) -> Iterator[Any]:
     yield from (f"request {request}: {number} answers count" for request, number in counted.items() if number > 1)
     told = [record for record in history if record.acknowledged]
     yield from (f"{each.path}: {each.body} was accepted" for each in told if each.verb == "nonsense")
+    lies = [record for record in told if record.verb == "lie" and record.answer["state"] == "counted"]
+    yield from (f"{each.path}: {each.body} counts, and it is a lie" for each in lies)
     for record in told:
         if record.verb in {"answer", "correct"} and record.answer[_ANSWERED[record.verb]] not in evidence.answers:
             yield f"{record.path}: acknowledged, and {record.answer[_ANSWERED[record.verb]]} is not there"

@@ -68,6 +68,20 @@ def _talks_nonsense(operator: Operator, request: Any) -> None:
             operator.answer(taken, verb="nonsense", **changes)
 
 
+def _lies(operator: Operator, request: Any) -> None:
+    """Answer for the holder of the request: without a take, with one that never was, with a stale token, and again."""
+    honest = Operator(operator.http, operator.history, f"{operator.name}, an honest one")
+    if taken := honest.take(request["id"], lease_s=120.0):  # longer than any fault keeps the service away
+        wrong, stale = right(taken["genome"]) + 1.0, {"Authorization": f"Bearer gaplab_stale_{'0' * 64}"}
+        for take in (None, taken["takes"] + 1, 2**31 - 1):
+            operator.answer(taken, wrong, verb="lie", take=take)
+        operator.answer(taken, wrong, verb="nonsense", headers=stale)
+        for changes in NONSENSE:
+            operator.answer(taken, verb="nonsense", **changes)
+        if honest.answer(taken, right(taken["genome"])).acknowledged:
+            operator.answer(taken, wrong, verb="lie")
+
+
 def _slips(operator: Operator, request: Any) -> None:
     """Answer with a wrong number, and correct it later."""
     if taken := operator.take(request["id"]):
@@ -104,6 +118,7 @@ KINDS: dict[str, Inflict] = {
     "driver repeats itself": _repeats_itself,
     "operators are many": _are_many,
     "driver talks nonsense": _talks_nonsense,
+    "driver lies": _lies,
     "operator slips": _slips,
 }
 
@@ -113,11 +128,11 @@ def inflicting(kind: str) -> Any:
 
     def inflict(stage: Any) -> bool:
         bench = f"bench of fault {next(_numbers)}"
-        with stage.clients.reserved(bench), httpx2.Client(base_url=stage.url, timeout=8, trust_env=False) as http:
+        with stage.clients.reserved(bench):
             spec = {"strategy": "simulated_fit", "reality": PHYSICAL | {"bench": bench}}
             if submitted(stage, spec, kind) is None:
                 return False
-            operator, found = Operator(http, stage.history, kind), []
+            operator, found = Operator(stage.http, stage.history, kind), []
             if not until(lambda: found.extend(operator.pending(bench=bench)) or found, WAIT_S):  # type: ignore[func-returns-value]
                 return False
             KINDS[kind](operator, found[0])

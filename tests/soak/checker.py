@@ -5,7 +5,6 @@ Each check takes the history and the evidence and gives a sentence for each viol
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
 from gaplab.schemas.lifecycle import MOVES, State
@@ -13,6 +12,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from tests.soak.bench_checker import measurements
+from tests.soak.drive_checker import drives, held
 from tests.soak.evidence import on_a_bench, undisturbed
 from tests.soak.misbehaviour import at_fault
 
@@ -35,8 +35,9 @@ def violations(history: Any, evidence: Any, expected: Any = undisturbed) -> Any:
         *ends(evidence),
         *results(history, evidence, expected),
         *epochs(evidence),
-        *drives(evidence),
+        *drives(evidence.commands),
         *measurements(history, evidence),
+        *held(evidence),
         *evidence.complaints,
     ]
 
@@ -198,16 +199,6 @@ def epochs(evidence: Any) -> Iterator[Any]:
         for each in experiment.repetitions:
             if each.steps != steps[each.id]:
                 yield f"{experiment.id}/{each.number}: {each.steps} steps, and {steps[each.id]} by its moves"
-
-
-def drives(evidence: Any) -> Iterator[Any]:
-    """One program drives the robot at a time."""
-    ended: set[str] = set()
-    for (_, before), (at, drive) in pairwise(evidence.commands):
-        if drive != before:
-            ended.add(before)
-        if drive in ended:
-            yield f"{drive} drove the robot at {at}, after another had begun"
 
 
 def _of_state(move: Any, winners: Any) -> Iterator[Any]:

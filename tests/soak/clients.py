@@ -15,7 +15,7 @@ from typing import Any
 import httpx2
 
 from gaplab.schemas.lifecycle import State
-from tests.soak.operators import PHYSICAL, Operator
+from tests.soak.operators import PHYSICAL, QUADRUPED, Operator
 
 VERBS = {"cancel": 2, "pause": 3, "resume": 4, "stop": 1, "extend": 2}
 """Those that are used, if the service has them, and how often compared with each other."""
@@ -25,20 +25,11 @@ OPEN = 8
 
 READS = ("", "/samples", "/repetitions", "/curve")
 
-PATIENCE_S = 8
-"""After which a client gives up on an answer."""
-
 TOY = {
     "robot": "toy_function",
     "iterations": 3,
     "repetitions": 3,
     "budget": {"controller_evaluations": 200, "selection_evaluations": 60, "simulator_evaluations": 30},
-}
-QUADRUPED = {
-    "robot": "quadruped",
-    "iterations": 1,
-    "repetitions": 2,
-    "budget": {"controller_evaluations": 25, "selection_evaluations": 20, "simulator_evaluations": 20},
 }
 ON_A_BENCH = TOY | {"iterations": 2, "repetitions": 2, "strategy": "simulated_fit"}
 BENCHES, OPERATORS = 2, 2
@@ -49,7 +40,7 @@ TOY_STRATEGIES = (*STRATEGIES, "calm", {"name": "simulated_fit_and_informative",
 def specs(rng: Any) -> Iterator[Any]:
     """Specs without end, of few kinds: what they should come to is computed once for each."""
     for number in count():
-        base, strategies = (QUADRUPED, STRATEGIES) if number % 4 == 3 else (TOY, TOY_STRATEGIES)
+        base, strategies = (QUADRUPED | {"repetitions": 2}, STRATEGIES) if number % 4 == 3 else (TOY, TOY_STRATEGIES)
         if number % 5 == 4:
             yield "/experiments", ON_A_BENCH | {"reality": PHYSICAL | {"bench": f"bench {rng.randrange(BENCHES)}"}}
         elif number % 3 == 2:
@@ -62,15 +53,14 @@ class Clients:
     """Some clients in threads of their own.
 
     Args:
-        url: of the service.
+        http: client of the service.
         history: where they write down what they were told.
         seed: of what they do; when they do it is chance.
         number: of clients.
     """
 
-    def __init__(self, url: Any, history: Any, seed: Any, number: Any = 3) -> None:
-        self._history = history
-        self._http = httpx2.Client(base_url=url, timeout=PATIENCE_S, trust_env=False)
+    def __init__(self, http: Any, history: Any, seed: Any, number: Any = 3) -> None:
+        self._http, self._history = http, history
         self._stopping = Event()
         self._known: list[Any] = []
         self._open = 0
@@ -117,11 +107,6 @@ class Clients:
         for thread in self._threads:
             if thread.is_alive():
                 thread.join()
-
-    def close(self) -> None:
-        """Let go of the connections."""
-        self.stop()
-        self._http.close()
 
     def wake(self) -> None:
         """Resume what is paused, and measure what is wanted, so that it can end."""

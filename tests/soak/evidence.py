@@ -13,12 +13,12 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed, Step, Tuned
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, SensitivityRow, StudyRow
+from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow, SensitivityRow, StudyRow
 from gaplab.services.store.queries import step_rows as mapping
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from tests.soak import witness
-from tests.soak.hardware_faults import commands
+from tests.soak.hardware_faults import Command, commands
 from tests.soak.operators import as_simulated
 
 
@@ -55,6 +55,9 @@ class Answer:
 
     request: str
     state: str
+    operator: str = ""
+    bench: str = ""
+    values: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ class Evidence:
         moves: of all repetitions, as the witness saw them.
         complaints: of the database about itself.
         answers: of operators, by id.
-        commands: that the robot got, in their order: seconds, and the drive that gave it.
+        commands: that robots got, in their order.
     """
 
     experiments: tuple[Experiment, ...] = ()
@@ -75,7 +78,7 @@ class Evidence:
     checks: dict[str, str] = field(default_factory=dict)
     moves: tuple[witness.Move, ...] = ()
     complaints: tuple[str, ...] = ()
-    commands: tuple[tuple[float, str], ...] = ()
+    commands: tuple[Command, ...] = ()
     answers: dict[str, Answer] = field(default_factory=dict)
 
 
@@ -85,7 +88,11 @@ def gather(store: Store, database: Any, journal: Path) -> Evidence:
         studies = dict(session.execute(select(StudyRow.id, StudyRow.name)).all())
         checks = dict(session.execute(select(SensitivityRow.id, SensitivityRow.state)).all())
         experiments = tuple(_experiment(session, row) for row in session.scalars(select(ExperimentRow)).all())
-        answers = {row.id: Answer(row.request_id, str(row.state)) for row in session.scalars(select(AnswerRow))}
+        answered = session.execute(select(AnswerRow, RequestRow.bench).join(RequestRow)).all()
+        answers = {
+            row.id: Answer(row.request_id, str(row.state), row.operator, bench, tuple(row.values or ()))
+            for row, bench in answered
+        }
     return Evidence(
         experiments,
         studies,  # type: ignore[arg-type]
@@ -116,7 +123,7 @@ def _experiment(session: Any, row: Any) -> Any:
             epoch=each.epoch,
             steps=each.steps,
             iterations_done=each.iterations_done,
-            log=tuple(map(digest, steps[each.id])),
+            log=tuple(digest(step, measured=on_a_bench(row.spec)) for step in steps[each.id]),
             places=tuple(map(mapping.position, steps[each.id])),
             error=each.error,
         )
@@ -130,10 +137,12 @@ def undisturbed(spec: dict, number: int) -> tuple[str, ...]:
 
     A robot on a bench of the soak has no noise, so a simulated reality gives its steps.
     """
-    if on_a_bench(spec):
-        spec = spec | {"reality": as_simulated().model_dump(mode="json") | {"probes": spec["reality"]["probes"]}}
+    measured = on_a_bench(spec)
+    if measured:
+        reality = as_simulated(spec["robot"]["name"]).model_dump(mode="json")
+        spec = spec | {"reality": reality | {"probes": spec["reality"]["probes"]}}
     settings = {name: value for name, value in spec.items() if name not in {"name", "repetitions"}}
-    return _undisturbed(json.dumps(settings, sort_keys=True), number)
+    return _undisturbed(json.dumps(settings, sort_keys=True), number, measured)
 
 
 def on_a_bench(spec: dict) -> bool:
@@ -142,15 +151,16 @@ def on_a_bench(spec: dict) -> bool:
 
 
 @cache
-def _undisturbed(spec: str, number: int) -> tuple[str, ...]:
-    return tuple(map(digest, repetition(setting(ExperimentSpec.model_validate_json(spec), number))))  # type: ignore[arg-type]
+def _undisturbed(spec: str, number: int, measured: bool) -> tuple[str, ...]:
+    steps = repetition(setting(ExperimentSpec.model_validate_json(spec), number))  # type: ignore[arg-type]
+    return tuple(digest(step, measured=measured) for step in steps)
 
 
-def digest(step: Step) -> str:
-    """A hash of all that the store keeps of a step; floats to the last bit."""
+def digest(step: Step, *, measured: bool) -> str:
+    """A hash of all that the store keeps of a step; floats to the last bit. Those who measure give no readings."""
     kept = {"kind": type(step).__name__, "iteration": step.iteration, "columns": mapping.iteration_columns(step)}
     if isinstance(step, Tuned):
         kept["simulators"] = mapping.simulator_columns(step)
     if isinstance(step, Measured | Probed):
-        kept["measurement"] = mapping.measurement_columns(step, "reality")
+        kept["measurement"] = mapping.measurement_columns(step, "reality") | ({"readings": None} if measured else {})
     return sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()

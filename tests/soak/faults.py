@@ -6,10 +6,13 @@ import time
 from collections import namedtuple
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from typing import Any
 
+import httpx2
+
 from gaplab.services.store.session import Store
-from tests.soak import bench_faults, hardware_faults, misbehaviour, plugin_faults, witness
+from tests.soak import bench_faults, driver_faults, hardware_faults, import_faults, misbehaviour, plugin_faults, witness
 from tests.soak.databases import CLOCK_JUMP
 from tests.soak.stage import PAST_THE_LEASE, send, until
 
@@ -55,12 +58,25 @@ def _signal(stage: Any, role: Any, number: Any) -> Any:
 
 
 def _fill(stage: Any) -> bool:
+    """Fill the disk for a while, and see whether `/readyz` says so once writes are refused."""
+    told = list[bool]()
     stage.database.disk.fill()
     try:
-        time.sleep(DISK_S)
+        until(lambda: told.extend(_says_it(stage)), DISK_S, every_s=0.5)  # type: ignore[func-returns-value]
     finally:
         stage.database.disk.free()
+    if told and not any(told):
+        stage.complaints.append(f"the disk is full, {len(told)} writes were refused, and /readyz does not say so")
     return True
+
+
+def _says_it(stage: Any) -> Any:
+    """Whether `/readyz` names the trouble of a write that is refused; nothing, if none is, or nobody answers."""
+    with suppress(httpx2.HTTPError):
+        if stage.http.put("/views/disk", json={}).status_code == 503:
+            ready = stage.http.get("/readyz")
+            return [ready.status_code != 200 or "writ" in ready.text or "full" in ready.text]
+    return []
 
 
 def _stall(stage: Any) -> bool:
@@ -106,7 +122,7 @@ def _restore(stage: Any) -> bool:
 def faults(database: Any, misbehaviours: Any = misbehaviour.HARMLESS) -> Any:
     """What can be done to a service on this database, and by these strategies in it."""
     found = [make(role) for role in ("api", "supervisor", "worker", "raylet") for make in (_kill, _pause)]
-    found.append(Fault("disk slow", _stall))
+    found += [Fault("disk slow", _stall), Fault("imports are hostile", import_faults.hostile)]
     if database.disk.small:
         found.append(Fault("disk full", _fill))
     if hasattr(database, "restart"):
@@ -116,6 +132,7 @@ def faults(database: Any, misbehaviours: Any = misbehaviour.HARMLESS) -> Any:
     found += [Fault("earlier state restored", _restore, alone=True), Fault("two drivers", hardware_faults.two_drivers)]
     found += [Fault("plug-in edited", plugin_faults.edited), Fault("plug-in broken", plugin_faults.broken)]
     found += [Fault(kind, bench_faults.inflicting(kind)) for kind in bench_faults.KINDS]
+    found += [Fault(f"driver {kind}", driver_faults.inflicting(kind)) for kind in driver_faults.KINDS]
     return found + [Fault(f"plug-in {kind}", plugin_faults.submitting(kind)) for kind in misbehaviours]
 
 

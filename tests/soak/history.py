@@ -47,11 +47,11 @@ class History:
         self._path = path
         self._lock = Lock()
 
-    def ask(self, http: Any, verb: Any, method: Any, path: Any, body: Any = None) -> Any:
-        """Ask, write down what came, and return it."""
+    def ask(self, http: Any, verb: Any, method: Any, path: Any, body: Any = None, **sent: Any) -> Any:
+        """Ask, write down what came, and return it; the body is sent as JSON, unless something else is `sent`."""
         sent_at, status, answer = time.time(), None, {}
         try:
-            response = http.request(method, path, json=body)
+            response = http.request(method, path, **({"json": body} if "content" not in sent else {}), **sent)
             status, answer = response.status_code, response.json()
         except (httpx2.HTTPError, ValueError) as error:
             answer = {"error": type(error).__name__}

@@ -18,6 +18,13 @@ PHYSICAL = {"kind": "physical", "probes": "each"}
 
 TOY = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
 
+QUADRUPED = {
+    "robot": "quadruped",
+    "iterations": 1,
+    "repetitions": 1,
+    "budget": {"controller_evaluations": 25, "selection_evaluations": 20, "simulator_evaluations": 20},
+}
+
 LEASE_S = 3
 """Of a take."""
 
@@ -53,10 +60,10 @@ class Operator:
         record = self._ask("take", f"/requests/{request}/take", {"operator": self.name, "lease_s": lease_s})
         return record.answer if record.acknowledged else None
 
-    def answer(self, taken: Any, *values: Any, verb: str = "answer", **changes: Any) -> Any:
+    def answer(self, taken: Any, *values: Any, verb: str = "answer", headers: Any = None, **changes: Any) -> Any:
         """Answer a request as it was taken, and return the record, which has this verb."""
         body = {"take": taken["takes"], "values": list(values), "operator": self.name} | changes
-        return self._ask(verb, f"/requests/{taken['id']}/measurements", body)
+        return self._ask(verb, f"/requests/{taken['id']}/measurements", body, headers=headers)
 
     def correct(self, answer: str, *values: float) -> Any:
         """Replace the values of an answer, and return the record."""
@@ -69,25 +76,26 @@ class Operator:
             if request["state"] == "stuck":
                 self._ask("reopen", f"/requests/{request['id']}/reopen", None)
 
-    def _ask(self, verb: str, path: str, body: Any) -> Any:
-        return self.history.ask(self.http, verb, "POST", path, body)
+    def _ask(self, verb: str, path: str, body: Any, **sent: Any) -> Any:
+        return self.history.ask(self.http, verb, "POST", path, body, **sent)
 
 
 def right(genome: Any) -> float:
-    """The fitness of a controller of the toy function on any bench."""
-    return float(_reality()(np.array(genome)).fitness)
+    """The fitness of a controller on any bench."""
+    robot = "quadruped" if len(genome) == 24 else "toy_function"
+    return float(_reality(robot)(np.array(genome)).fitness)
 
 
-def as_simulated() -> Any:
-    """A simulated reality that is like every bench."""
-    return _spec().reality
-
-
-@cache
-def _spec() -> Any:
-    return resolve_experiment(ExperimentSpec.model_validate(TOY))
+def as_simulated(robot: str) -> Any:
+    """A simulated reality that is like every bench of this robot."""
+    return _spec(robot).reality
 
 
 @cache
-def _reality() -> Any:
-    return setting(_spec(), 0).reality
+def _spec(robot: str) -> Any:
+    return resolve_experiment(ExperimentSpec.model_validate(TOY | {"robot": robot}))
+
+
+@cache
+def _reality(robot: str) -> Any:
+    return setting(_spec(robot), 0).reality

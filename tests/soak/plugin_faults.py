@@ -37,9 +37,8 @@ def submitting(kind: Any) -> Any:
 
 def submitted(stage: Any, spec: Any, name: Any) -> Any:
     """Submit an experiment before all others, and return its id; None if that was not acknowledged."""
-    with httpx2.Client(base_url=stage.url, timeout=8, trust_env=False) as http:
-        body = SPEC | spec | {"name": f"fault {next(_numbers)}: {name}"}
-        record = stage.history.ask(http, "submit", "POST", "/experiments", body)
+    body = SPEC | spec | {"name": f"fault {next(_numbers)}: {name}"}
+    record = stage.history.ask(stage.http, "submit", "POST", "/experiments", body)
     return record.answer["id"] if record.acknowledged else None
 
 
@@ -68,6 +67,6 @@ def _changed(stage: Any, addition: Any, role: Any) -> bool:
 
 def _state(stage: Any, experiment: Any) -> Any:
     try:
-        return httpx2.get(f"{stage.url}/experiments/{experiment}", timeout=8, trust_env=False).json().get("state")
+        return stage.http.get(f"/experiments/{experiment}").json().get("state")
     except (httpx2.HTTPError, ValueError):
         return None

@@ -12,7 +12,7 @@ import httpx2
 
 from gaplab.services.core import external_plugins
 from gaplab.services.store.session import Store
-from tests.soak import checker, faults, misbehaviour
+from tests.soak import checker, faults, import_faults, misbehaviour
 from tests.soak.clients import Clients
 from tests.soak.evidence import checks_under_way, gather
 from tests.soak.history import History
@@ -48,11 +48,21 @@ class Outcome:
     steps: int = 0
     claims: int = 0
     given_up: int = 0
-    seconds: float = 0.0
+    begun: float = field(default_factory=time.monotonic)
+    measured_s: float = float("-inf")
 
     @property
     def faults(self) -> Any:
         return sum(map(len, self.recoveries.values()))
+
+    def measure(self, stage: Any, say: Any, every_s: float = 300.0) -> float:
+        """Say how much memory the service has, if that is due, as a row of a table; seconds since the beginning."""
+        now = time.monotonic() - self.begun
+        if now - self.measured_s >= every_s:
+            self.measured_s, (each, largest) = now, stage.memory()
+            sizes = f"{len(each)} processes | {sum(each):.0f} MB | largest {max(each):.0f} MB: {largest}"
+            say(f"| {self.database} | {now / 60:.0f} min | {self.faults} faults | {sizes} |")
+        return now
 
 
 def soak(
@@ -63,6 +73,7 @@ def soak(
     at_once: Any = 4,
     say: Any = lambda sentence: None,
     *,
+    minutes: Any = 0.0,
     misbehaviours: Any = misbehaviour.HARMLESS,
 ) -> Any:
     """Run so many faults on a service in this folder, and check it; the evidence stays there.
@@ -74,28 +85,30 @@ def soak(
         seed: of their order and of what clients do.
         at_once: faults that the service has to bear together.
         say: is told of every volley.
+        minutes: that it lasts at least; once all faults are over, without any.
         misbehaviours: kinds of strategies that do harm.
     """
     folder = Path(folder)
     plugins = Path(shutil.copytree(misbehaviour.FOLDER, folder / "plugins", ignore=shutil.ignore_patterns("__*")))
     external_plugins.set_folders((misbehaviour.FOLDER,))  # the checker computes with the strategy that behaves
-    begun, database = time.monotonic(), kind(folder)
+    database = kind(folder)
     history, store = History(folder / "history.jsonl"), Store(database.url)
     outcome, stage = Outcome(database.name), Stage(folder, database, LEASE_S, plugins, history)
     kinds = faults.faults(database, misbehaviours)
-    clients = Clients(stage.url, history, seed)
+    clients = Clients(stage.http, history, seed)
     try:
         stage.start()
         stage.clients = clients
         clients.start()
         _attack(stage, store, outcome, number, faults.volleys(kinds, random.Random(seed), at_once), say)
+        until(lambda: outcome.measure(stage, say) > 60 * minutes, 60 * minutes, every_s=1.0)
         clients.stop()
         _peace(clients, store, outcome)
-        outcome.violations += stage.stop()
+        outcome.measure(stage, say, 0.0)
+        outcome.violations += [*stage.complaints, *import_faults.broken_lists(stage.http), *stage.stop()]
         _check(history.records(), gather(store, database, stage.journal), outcome)
-        outcome.seconds = time.monotonic() - begun
     finally:
-        clients.close()
+        clients.stop()
         stage.kill()
         store.dispose()
         database.close()
@@ -106,6 +119,7 @@ def soak(
 def _attack(stage: Any, store: Store, outcome: Any, number: Any, volleys: Any, say: Any) -> None:
     faults.recovered(stage, store, RECOVERY_S)  # from the start
     while outcome.faults < number:
+        outcome.measure(stage, say)
         hit = faults.strike(stage, next(volleys)[: number - outcome.faults])
         seconds = faults.recovered(stage, store, RECOVERY_S)
         after = "never well again" if seconds is None else f"well again after {seconds:.1f} s"

@@ -19,16 +19,22 @@ from typing import Any
 import httpx2
 
 from gaplab import migrations
+from gaplab.schemas.access import Role
+from gaplab.services import access
 from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.store.session import Store
 from tests.ports import free_port
 from tests.soak import witness
 from tests.waiting import wait_until
 
-ROLLOUT_LIMIT_S = 2
-"""In production it is 60 s; a worker without a rollout for 20 times as long counts as hung."""
+STEP_LIMIT_S = 40
+"""In production it is a week; the steps of a soak take seconds, and a worker that takes longer counts as hung."""
 
 PAST_THE_LEASE = 1.5
 """For how many leases a process is stopped."""
+
+PATIENCE_S = 8
+"""After which a client gives up on an answer."""
 
 RESTART_S = 1.0
 """After how long a service manager starts again what has ended."""
@@ -97,13 +103,15 @@ class Stage:
     """Everything that a fault can hit.
 
     Attributes:
-        url: of the API.
+        port, url: of the API.
+        http: client with a token of its own, for all that use the service.
         database: Sqlite or Postgres, as in `databases`.
         lease_s: for which a supervisor may be silent.
         plugins: folder of the service's external plug-ins.
         history: of what clients were told, for faults that are requests.
         clients: that use the service.
-        journal: of the commands that the robot got.
+        journal: of the commands that the robots got.
+        complaints: of faults that saw the service say what is not so.
     """
 
     clients: Any
@@ -111,17 +119,18 @@ class Stage:
     def __init__(self, folder: Path, database: Any, lease_s: Any, plugins: Any = None, history: Any = None) -> None:
         self.database, self.lease_s, self.plugins, self.history = database, lease_s, plugins, history
         self._folder = Path(folder)
-        self.journal = self._folder / "journal.txt"
-        self._port = free_port()
-        self.url = f"http://127.0.0.1:{self._port}"
+        self.journal, self.complaints = self._folder / "journal.txt", list[str]()
+        self.port = free_port()
+        self.url = f"http://127.0.0.1:{self.port}"
+        self.http = httpx2.Client(base_url=self.url, timeout=PATIENCE_S, trust_env=False)
         self._environment = os.environ | {
             "GAPLAB_DATABASE_URL": database.url_of_service,
             "GAPLAB_SOAK_JOURNAL": str(self.journal),
-            "GAPLAB_PORT": str(self._port),
+            "GAPLAB_PORT": str(self.port),
             "GAPLAB_WORKERS": "1",
             "GAPLAB_LEASE_S": str(lease_s),
             "GAPLAB_PLUGINS": str(plugins or ""),
-            "GAPLAB_ROLLOUT_LIMIT_S": str(ROLLOUT_LIMIT_S),
+            "GAPLAB_STEP_LIMIT_S": str(STEP_LIMIT_S),
             "RAY_TMPDIR": mkdtemp(prefix="gaplab-"),  # Ray leaves logs behind; the paths of its sockets must be short
         }
         self._kept: list[Any] = []
@@ -130,10 +139,18 @@ class Stage:
         """Migrate, set the witness, start the processes, and wait until the API answers."""
         migrations.upgrade(self.database.url)
         witness.install(self.database.url)
+        self.http.headers["Authorization"] = f"Bearer {self.new_token().secret}"
         for name, module in (("service", "gaplab"), ("second", "gaplab.workers")):
             log = self._folder / f"{name}.log"
             self._kept.append(Kept([sys.executable, "-m", module, "serve"], log, self._environment))
         wait_until(self.answers, otherwise=self.logs)
+
+    def new_token(self) -> Any:
+        """A token that may submit and measure, with its secret."""
+        made = list[access.NewToken]()
+        with Store(self.database.url) as store:
+            until(lambda: made.append(access.create_token(store, Role.RUNNER)) or made, 60)  # type: ignore[func-returns-value]
+        return made[0]
 
     def stop(self) -> Any:
         """End all in order; what did not end when asked, and what was left behind, in words."""
@@ -158,6 +175,7 @@ class Stage:
 
     def kill(self) -> None:
         """End what is left outright, and remove what it left."""
+        self.http.close()
         for each in self._kept:
             each.stop(signal.SIGKILL)
         for pid in self.processes():
@@ -173,7 +191,7 @@ class Stage:
 
     def processes(self) -> Any:
         """All processes of the service that live, by id, with their commands."""
-        mark = f"GAPLAB_PORT={self._port}".encode()
+        mark = f"GAPLAB_PORT={self.port}".encode()
         found: dict[int, str] = {}
         for path in Path("/proc").glob("[0-9]*"):
             try:
@@ -186,6 +204,15 @@ class Stage:
     def of(self, role: Any) -> Any:
         """The ids of the processes that play a role: api, supervisor, worker or raylet."""
         return [pid for pid, command in self.processes().items() if role_of(command) == role]
+
+    def memory(self) -> Any:
+        """Resident memory of each process in MB, and what the largest one is."""
+        found = []
+        for pid, command in self.processes().items():
+            with suppress(OSError):  # it has ended
+                pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+                found.append((pages * os.sysconf("SC_PAGE_SIZE") / 1e6, role_of(command) or command))
+        return [size for size, _ in found], max(found)[1]
 
     def logs(self) -> Any:
         return "\n".join(path.read_text(errors="replace")[-3000:] for path in sorted(self._folder.glob("*.log")))

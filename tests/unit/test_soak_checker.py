@@ -1,5 +1,6 @@
 """The soak's checker finds what it looks for: histories and databases that were broken by hand."""
 
+import socket
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,10 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from tests.soak.bench_checker import measurements
 from tests.soak.checker import ends, epochs, results, violations
+from tests.soak.drive_checker import drives, held
+from tests.soak.driver_faults import LEASE_S
 from tests.soak.evidence import Answer, Evidence, Experiment, Repetition, undisturbed
+from tests.soak.hardware_faults import Command
 from tests.soak.history import Record
 from tests.soak.witness import Move
 
@@ -257,6 +261,8 @@ ANSWERS = {"a1": Answer("r1", "counted")}
         ([TAKE, ANSWER, OTHER_TAKE], ANSWERS, "its controller was measured"),
         ([TAKE, ANSWER, replace(OTHER_TAKE, answer=OTHER_TAKE.answer | {"genome": [0.6]})], ANSWERS, None),
         ([replace(ANSWER, verb="nonsense")], ANSWERS, "was accepted"),
+        ([replace(ANSWER, verb="lie")], ANSWERS, "it is a lie"),
+        ([replace(ANSWER, verb="lie", answer=ANSWER.answer | {"state": "conflict"})], ANSWERS, None),
     ],
 )
 def test_measurements_that_are_lost_doubled_or_asked_for_again_are_found(
@@ -277,3 +283,40 @@ def test_an_answer_may_add_steps_of_a_repetition_that_nobody_holds_and_a_correct
 
     assert list(epochs(replace(EVIDENCE, experiments=(on_bench,), moves=moves))) == []
     assert len(list(epochs(replace(EVIDENCE, moves=moves)))) == 3
+
+
+def moves(drive: Any, *at: Any, robot: Any = "r") -> Any:
+    return [Command(each, robot, drive) for each in at]
+
+
+@pytest.mark.parametrize(
+    ("commands", "violation"),
+    [
+        ([*moves("1.1", 1.0, 1.1), *moves("2.1", 1.2, 1.3), *moves("2.2", 1.4)], None),
+        ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 1.3)], "1.1 moved r 1 times from 1.3"),
+        ([*moves("1.1", 1.0), *moves("2.1", 1.2, robot="s"), *moves("1.1", 1.3)], None),
+        ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 4.0), *moves("2.1", 4.1, 4.2)], None),
+        ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 4.0, 4.1)], "1.1 moved r 1 times from 4.1"),
+        ([*moves("1.1", 1.0), *moves("2.1", 1.2), Command(1.3, "r", "1.1", "stop")], None),
+    ],
+    ids=["in turn", "two at once", "two robots", "a command in hand", "more than one", "a stop"],
+)
+def test_two_programs_that_move_one_robot_are_found(commands: Any, violation: Any) -> None:
+    (*wrong,) = drives(commands)
+
+    assert (violation is None) is not bool(wrong)
+    assert violation is None or violation in wrong[0]
+
+
+@pytest.mark.parametrize(
+    ("at", "value", "count"),
+    [((1.0, 1.1, 1.2), "0.25", 0), ((1.0, 1.1 + LEASE_S, 1.2 + LEASE_S), "0.25", 1), ((1.0, 1.1), "0.5", 1)],
+    ids=["held", "it stood still", "another fitness"],
+)
+def test_an_answer_of_a_driver_counts_only_of_a_run_that_had_its_take_throughout(
+    at: Any, value: Any, count: Any
+) -> None:
+    commands = [*moves("1.1", *at), Command(at[-1], "r", "1.1", value)]
+    answer = Answer("r1", "counted", socket.gethostname(), "r", (0.25,))
+
+    assert len([*held(Evidence(commands=tuple(commands), answers={"a1": answer}))]) == count

@@ -12,7 +12,6 @@ from gaplab.api.clients.records import Record
 from gaplab.schemas.curves import from_before
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Progress, StudyRead, TimeLeft
-from gaplab.services.figures.words import evaluations
 
 COLORS = {
     State.QUEUED: "dim",
@@ -93,8 +92,9 @@ def best(study: StudyRead) -> list[str]:
     found = study.best
     if not found:
         return []
-    after = evaluations(found.evaluations, found.known)
-    return [f"best: {found.name.replace('_', ' ')}, mean {found.mean:.3f} after {after} (n = {found.n})"]
+    evaluations = f"{found.evaluations} real-world evaluation{'' if found.evaluations == 1 else 's'}"
+    mean = f"mean {found.mean:.3f} after {evaluations}{from_before(found.known)}"
+    return [f"best: {found.name.replace('_', ' ')}, {mean} (n = {found.n})"]
 
 
 def fraction(progress: Progress) -> float:

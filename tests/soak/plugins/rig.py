@@ -1,4 +1,6 @@
-"""A pretended robot as reality, and the journal of the motor commands that it got."""
+"""A pretended robot as reality, and the journal of the motor commands that it got.
+
+A line of it: seconds, robot, drive (one run of one program), and what happened."""
 
 import os
 import time
@@ -47,6 +49,6 @@ class Rig(Analytic):
             if self._stopped.is_set() or at - before > DEAD_MAN_S:
                 raise TryAgain("the robot's motors have stopped by themselves")
             with open(journal, "a") as file:
-                file.write(f"{at} {drive}\n")
+                file.write(f"{at} rig {drive} moves\n")
             before = at
             time.sleep(EVERY_S)
