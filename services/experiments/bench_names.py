@@ -26,14 +26,11 @@ def check_benches(session: Session, specs: Sequence[ResolvedSpec], admitted: Adm
     known = {key_of(each): each for each in spellings(session)}
     for bench in named:
         key = key_of(bench)
-        alike = [each for each in known if _digits(each) == _digits(key)]
+        digits = list(filter(str.isdigit, key))
+        alike = [each for each in known if list(filter(str.isdigit, each)) == digits]
         if key not in known and (close := get_close_matches(key, alike, n=1, cutoff=CLOSE)):
             message = (
                 f"the bench {bench!r} is new, and {known[close[0]]!r} is known; if they are two robots, confirm it"
             )
             how = "confirm_cost=true, --yes, or yes=True in Python"
             raise CostUnconfirmed([Violation("confirm_cost", False, f"{message}: {how}", "true")])
-
-
-def _digits(name: str) -> list[str]:
-    return [each for each in name if each.isdigit()]

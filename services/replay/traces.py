@@ -1,6 +1,6 @@
 """Evaluation of traces: fitness and readings of a physical robot, computed by its code from its recorded motion."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isfinite
 
 import numpy as np
@@ -74,20 +74,11 @@ def evaluate_traces(
 
 
 def said_by_files(
-    sent_spec: SentSpec,
-    genes: Sequence[float],
-    parameters: Sequence[float],
-    spec: TracesSpec,
-    files: Mapping[str, bytes],
+    sent_spec: SentSpec, genes: Sequence[float], parameters: Sequence[float], spec: TracesSpec, files: dict[str, bytes]
 ) -> TracesRead | tuple[Violation, ...]:
     """Return what traces say about a genome, beside the motion in a simulator of a spec; or what is wrong with them.
 
-    Args:
-        sent_spec: of the experiment.
-        genes: the genome.
-        parameters: of the simulator.
-        spec: the traces.
-        files: contents by hash; each is read once, however often the spec names it.
+    Files are by hash, and each is read once, however often `spec` names it.
     """
     robot = robot_of(received(sent_spec))
     try:
