@@ -21,7 +21,8 @@ def points_at(session: Session, counts: Mapping[str, int], known: Mapping[str, i
 
     Args:
         session: session of a transaction.
-        counts, known: numbers of real-world evaluations, and of samples from before, by experiment.
+        counts: numbers of real-world evaluations, by experiment.
+        known: numbers of samples from before, by experiment.
     """
     points = {
         experiment: mean_and_deviation(frozen(values)) for experiment, values in recorded_at(session, counts).items()
