@@ -69,12 +69,12 @@ def doubt_others(session: Session, request: RequestRow, take: int, moved_s: floa
     given = select(answer).join(row, row.id == answer.request_id).where(of_bench, answer.at >= since)
     counted = session.scalars(given.where(answer.state == AnswerState.COUNTED, answer.failed.is_(None))).all()
     others = [each for each in counted if (each.request_id, each.take) != (request.id, take)]
-    for other in others:
-        other.doubts = [*(other.doubts or ()), why]
-    for ended in taken:
-        note_take(session, ended, EventKind.RELEASED, by=storable(by), reason=why)
-    for fenced in {request, *taken} if others or taken else ():
-        fenced.takes += 1  # answers of earlier ones are in conflict
+    for measured in others:
+        measured.doubts = [*(measured.doubts or ()), why]
+    for each in taken:
+        note_take(session, each, EventKind.RELEASED, by=storable(by), reason=why)
+    for each in {request, *taken} if others or taken else ():
+        each.takes += 1  # fences the answers of earlier ones
 
 
 def _beside_repeats(values: Sequence[float]) -> Iterator[str]:
