@@ -11,18 +11,19 @@ down_revision = "0001"
 branch_labels = None
 depends_on = None
 
-COLUMNS = (("answer", "doubts", sa.JSON), ("simulator", "fit", sa.JSON))
-COLUMNS += (("checkpoint", "rollouts", sa.BigInteger), ("checkpoint", "budget", sa.BigInteger))
+COLUMNS = (("answer", "doubts"), ("simulator", "fit"))
+COUNTS = (("checkpoint", "rollouts"), ("checkpoint", "budget"))
 
 
 def upgrade() -> None:
     """Add the columns."""
-    for table, name, kind in COLUMNS:
-        always = {} if kind is sa.JSON else {"nullable": False, "server_default": "0"}
-        op.add_column(table, sa.Column(name, kind(), **always))
+    for table, name in COLUMNS:
+        op.add_column(table, sa.Column(name, sa.JSON()))
+    for table, name in COUNTS:
+        op.add_column(table, sa.Column(name, sa.BigInteger(), nullable=False, server_default="0"))
 
 
 def downgrade() -> None:
     """Drop them."""
-    for table, name, _ in reversed(COLUMNS):
+    for table, name in reversed(COLUMNS + COUNTS):
         op.drop_column(table, name)
