@@ -36,10 +36,14 @@ Diverged physics is not an error: its fitness is nan, which never wins.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gaplab.services.core.arrays import FloatArray
+
+MOST_VIOLATIONS = 100
+"""Most violations of one spec that are looked for."""
 
 
 class GaplabError(Exception):
@@ -72,10 +76,10 @@ class Violation:
 
 
 class InvalidSpec(GaplabError):
-    """A spec that cannot run, with all its violations."""
+    """A spec that cannot run, with its first `MOST_VIOLATIONS` violations."""
 
     def __init__(self, violations: Iterable[Violation]) -> None:
-        self.violations = tuple(violations)
+        self.violations = tuple(islice(violations, MOST_VIOLATIONS))
         super().__init__("; ".join(f"{each.pointer or '/'}: {each.message}" for each in self.violations))
 
 
