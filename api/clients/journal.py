@@ -21,7 +21,7 @@ class Journal:
     last line that a power cut left half-written is ignored.
 
     Args:
-        file: created if it does not exist; None: no file.
+        file: created, for its owner alone, if it does not exist; None: no file.
     """
 
     def __init__(self, file: str | Path | None = None) -> None:
@@ -31,6 +31,7 @@ class Journal:
             path = Path(file)
             content = path.read_bytes() if path.exists() else b""
             self._lines = list(_lines(content))
+            path.touch(0o600)
             self._file = path.open("ab")
             if content and not content.endswith(b"\n"):
                 self._file.write(b"\n")

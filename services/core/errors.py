@@ -42,9 +42,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gaplab.services.core.arrays import FloatArray
 
-MOST_VIOLATIONS = 100
-"""Most violations of one spec that are looked for."""
-
 
 class GaplabError(Exception):
     """Base of all errors; the message is one sentence."""
@@ -76,10 +73,10 @@ class Violation:
 
 
 class InvalidSpec(GaplabError):
-    """A spec that cannot run, with its first `MOST_VIOLATIONS` violations."""
+    """A spec that cannot run, with its first hundred violations."""
 
     def __init__(self, violations: Iterable[Violation]) -> None:
-        self.violations = tuple(islice(violations, MOST_VIOLATIONS))
+        self.violations = tuple(islice(violations, 100))
         super().__init__("; ".join(f"{each.pointer or '/'}: {each.message}" for each in self.violations))
 
 
