@@ -24,6 +24,7 @@ from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
 from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
+from gaplab.workers.run import stuck
 from gaplab.workers.sensitivity import Checks
 from gaplab.workers.stop import Stop
 
@@ -67,7 +68,7 @@ class Supervisor:
         self._repetitions = Repetitions(store, self._owner, versions or {}, checkpoint_s, patience, lease_s)
         self._checks = Checks(store, self._owner, lease_s, versions, patience)
         self._takes = Silences[str]()
-        self._lease_s = lease_s
+        self._lease_s, self._start_s = lease_s, (patience or Patience()).start_s
         self._beat = -lease_s
         self._noted: datetime | None = None
         self._pulse = PulsePipe()
@@ -98,6 +99,7 @@ class Supervisor:
                 except StoreChanged:
                     raise
                 except StoreUnavailable as error:
+                    self._pulse.trouble = str(error)
                     log.warning("waiting: %s", error)
                     self._takes.forget()
                     stop.wait(RETRY_S)
@@ -139,6 +141,7 @@ class Supervisor:
         self._repetitions.receive()
         self._repetitions.store_received()
         self._repetitions.end()
+        self._pulse.trouble = stuck(self._repetitions.runs, self._start_s)
 
     def _heartbeat(self) -> None:
         if monotonic() - self._beat < self._lease_s / HEARTBEATS:
