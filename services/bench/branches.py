@@ -100,17 +100,7 @@ def list_branches(session: Session, experiment: str) -> tuple[BranchRead, ...]:
     row, repetition = BranchRow, RepetitionRow
     query = select(row, repetition.number).join(repetition, repetition.id == row.repetition_id)
     found = session.execute(query.where(repetition.experiment_id == experiment).order_by(repetition.number, row.number))
-    return tuple(
-        BranchRead(
-            repetition=number,
-            number=each.number,
-            iteration=each.iteration,
-            reason=each.reason,
-            steps=tuple(each.steps),
-            closed_at=each.closed_at,
-        )
-        for each, number in found
-    )
+    return tuple(BranchRead.filled_from(each, repetition=number) for each, number in found)
 
 
 def _withdraw(session: Session, repetition: int, place: int, branch: int | None) -> None:

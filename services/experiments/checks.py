@@ -175,16 +175,12 @@ def _findings(check: SensitivityRow) -> tuple[Sensitivity, ...]:
 
 def _view(check: SensitivityRow) -> SensitivityRead:
     spec = Checked.model_validate(check.spec)
-    return SensitivityRead(
-        id=check.id,
-        state=check.state,
+    return SensitivityRead.filled_from(
+        check,
         spec=spec,
         rollouts=Effort(spec.points, spec.evaluations).rollouts(len(spec.tunables)),
         unit=unit(spec),
         tunables=_findings(check),
         warnings=warnings(check),
         reason=check.error,
-        created_at=check.created_at,
-        started_at=check.started_at,
-        ended_at=check.ended_at,
     )

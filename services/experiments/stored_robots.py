@@ -167,13 +167,11 @@ def _entry(found: RobotRead) -> PluginRead:
 
 def _view(row: RobotRow, file: RobotFile) -> RobotRead:
     world = file.world
-    return RobotRead(
-        sha256=row.sha256,
-        name=row.name,
+    return RobotRead.filled_from(
+        row,
         file=file.source.file if file.source else None,
         bodies=len(world.bodies),
         actuators=len(world.actuators),
         mass_kg=sum(body.mass_kg for body in world.bodies),
         lost=file.lost,
-        created_at=row.created_at,
     )
