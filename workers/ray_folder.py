@@ -31,11 +31,9 @@ STARTING_S = 60.0
 def ray_folder(wanted: Path | None = None) -> Iterator[Path]:
     """Make a folder that only this user can enter, and remove it when the context ends.
 
-    Ray's own default is one that all users of the machine share, where others could connect to its sockets. Folders of
-    processes that were killed are removed at the next start.
-
-    Args:
-        wanted: where to make it; left out: RAY_TMPDIR, or the folder for temporary files.
+    It is in the `wanted` one; left out: in RAY_TMPDIR, or the folder for temporary files. Ray's own default is one that
+    all users of the machine share, where others could connect to its sockets. Folders of processes that were killed are
+    removed at the next start.
 
     Raises:
         ClusterUnusable: this user cannot make one there.

@@ -40,13 +40,6 @@ def answer(
     conflict. The answer that counts, sent twice, is stored once, also if parts of it are left out the second time. With
     another value, reading, note, attachment or operator it is a conflict too.
 
-    Args:
-        store: the database.
-        id_: id of the request.
-        spec: the answer.
-        admitted: with the idempotency key.
-        traces: values and readings of its traces, if it has any.
-
     Raises:
         NotFound: the request does not exist.
         InvalidSpec: the values do not fit the request; every violation is named.

@@ -61,11 +61,7 @@ def list_robots(session: Session) -> tuple[RobotRead, ...]:
 
 @snapshot
 def robot_text(session: Session, named: str) -> str:
-    """Return the text of a robot file.
-
-    Args:
-        session: a snapshot of the database.
-        named: hash or name of the robot.
+    """Return the text of a robot file, named by its hash or its name.
 
     Raises:
         NotFound: there is no such robot.

@@ -32,13 +32,7 @@ _MOVING = (State.RUNNING, State.PAUSING, State.STOPPING)
 def view_experiments(
     session: Session, rows: Sequence[ExperimentRow], *, reveal: bool = False
 ) -> tuple[ExperimentRead, ...]:
-    """Return the experiments with their progress.
-
-    Args:
-        session: session of a transaction.
-        rows: rows of the experiments.
-        reveal: include hidden parameters of reality.
-    """
+    """Return the experiments with their progress; `reveal` includes hidden parameters of reality."""
     return _view(session, rows, _work(session, rows), reveal=reveal)
 
 
@@ -62,12 +56,7 @@ def view_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = F
 
 
 def view_repetition(row: RepetitionRow, *, secret: bool) -> RepetitionRead:
-    """Return the repetition.
-
-    Args:
-        row: the repetition.
-        secret: keep what reality's code said about an error to itself.
-    """
+    """Return the repetition; `secret` leaves out what reality's code said about an error."""
     return RepetitionRead.filled_from(row, error=row.error if secret else row.hidden_error or row.error)
 
 

@@ -36,13 +36,9 @@ def named(session: Session, repetitions: ScalarSelect[int] | None = None) -> set
 
 
 def remove_unnamed(session: Session, once_named: Collection[str]) -> None:
-    """Remove files that no answer names.
+    """Remove files that no answer names; `once_named` are those that deleted answers named.
 
     A file that no answer has named yet is kept for `UNNAMED_LIVE`, since its answer may be on its way.
-
-    Args:
-        session: session of a transaction that writes.
-        once_named: ids that deleted answers named.
     """
     row = AttachmentRow
     old = row.created_at < moment(session) - UNNAMED_LIVE

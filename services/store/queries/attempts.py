@@ -81,13 +81,7 @@ def work_spans(session: Session, experiments: Sequence[str]) -> dict[str, list[t
 
 
 def attempts_of(session: Session, experiment: str, number: int, *, secret: bool = True) -> tuple[AttemptRead, ...]:
-    """Return the attempts at a repetition, by number.
-
-    Args:
-        session: of a transaction.
-        experiment: its id.
-        number: of the repetition.
-        secret: keep what reality's code said about an error to itself.
+    """Return the attempts at a repetition, by number; `secret` leaves out what reality's code said about an error.
 
     Raises:
         NotFound: the experiment has no such repetition.
