@@ -135,12 +135,7 @@ def _check(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) ->
     Raises:
         InvalidSpec: with every violation.
     """
-    stored = attachments.present(session, spec.traces)
-    violations = [
-        Violation(f"/traces/{place}", digest, "no attachment with this hash is stored; send the file first")
-        for place, digest in enumerate(spec.traces)
-        if digest not in stored
-    ]
+    violations = attachments.missing(session, spec.traces, "/traces")
     if len(spec.traces) > repeats or (answer and len(spec.traces) < repeats):
         message = f"an answer has one trace for each repeat: {repeats}, not {len(spec.traces)}"
         violations.append(Violation("/traces", f"traces: {len(spec.traces)}", message, f"exactly {repeats}"))
