@@ -31,11 +31,9 @@ STARTING_S = 60.0
 def ray_folder(wanted: Path | None = None) -> Iterator[Path]:
     """Yield a place for Ray in a new folder that only this user can enter, and remove both when the context ends.
 
-    Ray lets all users of the machine write into the place itself, and so connect to its sockets. Folders of processes
-    that were killed are removed at the next start.
-
-    Args:
-        wanted: where to make it; left out: RAY_TMPDIR, or the folder for temporary files.
+    It is in the `wanted` one; left out: in RAY_TMPDIR, or the folder for temporary files. Ray lets all users of the
+    machine write into the place itself, and so connect to its sockets. Folders of processes that were killed are
+    removed at the next start.
 
     Raises:
         ClusterUnusable: this user cannot make one there.

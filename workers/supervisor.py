@@ -43,13 +43,8 @@ log = logging.getLogger("gaplab.supervisor")
 class Supervisor:
     """Runs the queued work of a store.
 
-    Args:
-        store: the database.
-        capacity: returns the number of repetitions to submit to Ray at once; called before each claim.
-        versions: versions that a node must have to run them.
-        checkpoint_s: seconds between the checkpoints of a long step.
-        lease_s: seconds without a heartbeat after which a supervisor loses its work; the same for all supervisors.
-        patience: how long work may take; default: that of the default settings.
+    Before each claim, `capacity` returns the number of repetitions to submit to Ray at once. Nodes must have the
+    versions to run them. All supervisors have the same `lease_s`: without a heartbeat for so long, one loses its work.
     """
 
     def __init__(
@@ -79,11 +74,9 @@ class Supervisor:
         return bool(self._repetitions.runs)
 
     def serve(self, stop: Stop | Event, pulse: PulsePipe | None = None) -> None:
-        """Work until told to stop; then hand back unfinished repetitions, each after one more delivery.
+        """Work until `stop` is set; then hand back unfinished repetitions, each after one more delivery.
 
-        Args:
-            stop: is set to end the work.
-            pulse: to the process that keeps this one; None if no process does.
+        The pulse goes to the process that keeps this one; None if no process does.
 
         Raises:
             ClusterUnusable: a node would compute other numbers, or Ray died; this ends the work as well.

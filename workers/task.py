@@ -56,13 +56,7 @@ def _give_back_memory() -> None:
 
 
 def delivered(prepare: Callable[[], Setting], claim: Claim, checkpoint_s: float) -> Iterator[Batch]:
-    """Yield what follows the claim's log, in batches; if anything raises, the last batch is the failure.
-
-    Args:
-        prepare: returns the setting of the repetition.
-        claim: with the log and checkpoints to go on from.
-        checkpoint_s: seconds between the checkpoints of a step.
-    """
+    """Yield what follows the claim's log, in batches; if anything raises, the last batch is the failure."""
     try:
         yield from batches(recorded(prepare(), claim.log, claim.checkpoints, checkpoint_s))
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything

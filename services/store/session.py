@@ -165,11 +165,7 @@ class Store:
 
 @contextmanager
 def private_store(file: Path) -> Iterator[Store]:
-    """Open a new SQLite database with the present tables, for a computation that no other process sees.
-
-    Args:
-        file: does not exist; the caller deletes it.
-    """
+    """Open a new SQLite database with the present tables, for a computation that no other process sees."""
     create(file)
     file.write_bytes(_without_rows())
     with Store(url_of(file)) as store:
