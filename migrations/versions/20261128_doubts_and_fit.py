@@ -1,4 +1,4 @@
-"""Doubts about answers, the fit of simulators beside what noise alone leaves, and rollouts of checkpoints.
+"""Doubts about answers, and the fit of simulators beside what noise alone leaves.
 
 Revision: 0002, after 0001.
 """
@@ -11,18 +11,16 @@ down_revision = "0001"
 branch_labels = None
 depends_on = None
 
-COLUMNS = (("answer", "doubts", sa.JSON), ("simulator", "fit", sa.JSON))
-COLUMNS += (("checkpoint", "rollouts", sa.BigInteger), ("checkpoint", "budget", sa.BigInteger))
+COLUMNS = (("answer", "doubts"), ("simulator", "fit"))
 
 
 def upgrade() -> None:
     """Add the columns."""
-    for table, name, kind in COLUMNS:
-        always = {} if kind is sa.JSON else {"nullable": False, "server_default": "0"}
-        op.add_column(table, sa.Column(name, kind(), **always))
+    for table, name in COLUMNS:
+        op.add_column(table, sa.Column(name, sa.JSON()))
 
 
 def downgrade() -> None:
     """Drop them."""
-    for table, name, _ in reversed(COLUMNS):
+    for table, name in reversed(COLUMNS):
         op.drop_column(table, name)

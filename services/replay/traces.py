@@ -1,6 +1,6 @@
 """Evaluation of traces: fitness and readings of a physical robot, computed by its code from its recorded motion."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 
 import numpy as np
@@ -37,14 +37,7 @@ LONGEST_PLOT_S = 20.0
 def evaluate_traces(
     store: Store, process: RolloutProcess, request: str, spec: TracesSpec, *, answer: bool = False
 ) -> TracesRead:
-    """Return what traces say about the controller of a request; nothing is stored.
-
-    Args:
-        store: the store.
-        process: process that reads them, and computes the expected motion.
-        request: id of the request.
-        spec: the traces.
-        answer: whether they answer the request, which takes a trace of each repeat.
+    """Return what traces say about the controller of a request; nothing is stored. An answer takes one of each repeat.
 
     Raises:
         NotFound: the request does not exist.
@@ -74,11 +67,15 @@ def evaluate_traces(
 
 
 def said_by_files(
-    sent_spec: SentSpec, genes: Sequence[float], parameters: Sequence[float], spec: TracesSpec, files: dict[str, bytes]
+    sent_spec: SentSpec,
+    genes: Sequence[float],
+    parameters: Sequence[float],
+    spec: TracesSpec,
+    files: Mapping[str, bytes],
 ) -> TracesRead | tuple[Violation, ...]:
     """Return what traces say about a genome, beside the motion in a simulator of a spec; or what is wrong with them.
 
-    Files are by hash, and each is read once, however often `spec` names it.
+    `files` are contents by hash; each is read once, however often the spec names it.
     """
     robot = robot_of(received(sent_spec))
     try:
@@ -138,12 +135,7 @@ def _check(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) ->
     Raises:
         InvalidSpec: with every violation.
     """
-    stored = attachments.present(session, spec.traces)
-    violations = [
-        Violation(f"/traces/{place}", digest, "no attachment with this hash is stored; send the file first")
-        for place, digest in enumerate(spec.traces)
-        if digest not in stored
-    ]
+    violations = attachments.missing(session, spec.traces, "/traces")
     if len(spec.traces) > repeats or (answer and len(spec.traces) < repeats):
         message = f"an answer has one trace for each repeat: {repeats}, not {len(spec.traces)}"
         violations.append(Violation("/traces", f"traces: {len(spec.traces)}", message, f"exactly {repeats}"))

@@ -10,6 +10,7 @@ import pytest
 
 from gaplab.api.clients.progress.text import counts
 from gaplab.schemas.lifecycle import State, Verb
+from gaplab.schemas.records import Progress
 from gaplab.services.core.answers import unpack
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
@@ -19,7 +20,7 @@ from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.lease import Failure
+from gaplab.services.store.lease import Failure, Pulse
 from gaplab.services.store.models import CheckpointRow
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import StepRecorder, recorded
@@ -242,13 +243,14 @@ def test_progress_tells_how_far_a_tuning_has_come(store: Store) -> None:
     spec = toy(repetitions=1, iterations=1)
     submitted = submission.submit_experiment(store, spec)
     (claim,) = execution.claim(store, "me", 1)
-    told, seen = recorded(setting(claim.spec, claim.number), (), (), 0.0), []
+    seen: list[Progress] = []
 
-    for each in told:
-        execution.record_all(store, [(claim, [each])])
-        seen.append(reading.read_experiment(store, submitted.id).progress)
+    for each in recorded(setting(claim.spec, claim.number), (), (), 0.0):
+        if not isinstance(each, Pulse):
+            execution.record_all(store, [(claim, [each])])
+            seen.append(reading.read_experiment(store, submitted.id).progress)
 
-    tuning = [(*progress.steps, progress) for progress in seen if progress.steps and progress.steps[0].kind == "tuning"]
+    tuning = [(step, progress) for progress in seen for step in progress.steps if step.kind == "tuning"]
     assert {(step.repetition, step.iteration, step.budget) for step, _ in tuning} == {(0, 1, tuning[0][0].budget)}
     assert 0 < tuning[0][0].rollouts < tuning[-1][0].rollouts <= tuning[0][0].budget
     assert f"; tuning 1: {100 * tuning[1][0].rollouts // tuning[1][0].budget} %" in counts(tuning[1][1])

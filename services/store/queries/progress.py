@@ -115,8 +115,8 @@ def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str
 
 def _tally(*counts: int, seconds: float) -> Tally:
     """Return a tally from counts in the order of its fields, as int: Postgres returns decimals."""
-    names = (each.name for each in fields(Tally))
-    return Tally(seconds=seconds, **{name: int(count) for name, count in zip(names, counts, strict=False)})
+    named: dict[str, Any] = {each.name: int(count) for each, count in zip(fields(Tally), counts, strict=False)}
+    return Tally(seconds=seconds, **named)
 
 
 def _count(condition: ColumnElement[bool]) -> ColumnElement[int]:
