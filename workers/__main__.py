@@ -11,7 +11,6 @@ from secrets import token_hex
 from gaplab.services import logs
 from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.plugins import folders
-from gaplab.services.plugins.ending import end_after
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import ANSWER_S, Store
@@ -26,11 +25,7 @@ RAY_SETTINGS = {
     "RAY_health_check_timeout_ms": "5000",
     "RAY_health_check_failure_threshold": "4",
 }
-"""Settings of a Ray of our own.
-
-It keeps an idle process for a minute, as experiments with other plug-ins need other ones in turns. It gives up a part
-that died within half a minute instead of a whole one.
-"""
+"""Settings of a Ray of our own: idle processes are kept for a minute, and a part that died is given up within half."""
 
 
 def serve(settings: Settings) -> int:
@@ -141,4 +136,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    end_after(lambda: main(sys.argv[1:]))
+    sys.exit(main(sys.argv[1:]))

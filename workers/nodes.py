@@ -19,7 +19,7 @@ from gaplab.schemas.provenance import Provenance
 from gaplab.services.core import robot_library
 from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.plugins import folders
-from gaplab.services.plugins.contents import Contents, read
+from gaplab.services.plugins.contents import ANY, Contents, read
 from gaplab.services.plugins.external import unavailable
 from gaplab.services.plugins.watching import imported, present
 from gaplab.services.running.versions import Versions as Versions
@@ -54,16 +54,10 @@ def with_plugins(shared: Versions, under: Provenance, spec: Mapping[str, Any]) -
 
 
 def process_for(expected: Versions) -> dict[str, Any]:
-    """Return options of a task of Ray for a process that has imported the expected plug-ins, and no others.
-
-    Actors that the task starts have it too. Work without external plug-ins shares the processes without any.
-    """
+    """Return Ray's options for a task, and actors that it starts, in processes of these plug-ins and no others."""
     plugins = sorted(text for name, text in expected.items() if name.startswith(PLUGIN))
-    return _process_with(sha256(repr(plugins).encode()).hexdigest()) if plugins else {}
-
-
-def _process_with(plugins: str) -> dict[str, Any]:
-    return {"runtime_env": {"env_vars": {IMPORTED: plugins}}}
+    digest = sha256(repr(plugins).encode()).hexdigest()
+    return {"runtime_env": {"env_vars": {IMPORTED: digest}}} if plugins else {}
 
 
 def check_here(expected: Versions) -> None:
@@ -94,7 +88,8 @@ def check_nodes() -> None:
     """
     alive = [node for node in ray.nodes() if node["Alive"]]
     only = [NodeAffinitySchedulingStrategy(node["NodeID"], soft=False) for node in alive]
-    answers = [_versions_of_node.options(scheduling_strategy=each, **_process_with("all")).remote() for each in only]
+    every = process_for({PLUGIN: ANY})
+    answers = [_versions_of_node.options(scheduling_strategy=each, **every).remote() for each in only]
     ours = versions() | _prefixed(plugin_versions(present()))
     for answer, node in zip(answers, alive, strict=True):
         name = f"{node['NodeManagerHostname']} ({node['NodeManagerAddress']})"
@@ -108,11 +103,13 @@ def check_nodes() -> None:
             log.warning("the node %s has another version of the %s; experiments that name it wait", name, plugin)
 
 
-@ray.remote(num_cpus=0, max_retries=0)
-def _versions_of_node() -> Versions:
+def _versions_here() -> Versions:
     folders.find()
     imported.contents()
     return versions() | _prefixed(plugin_versions(imported.contents()))
+
+
+_versions_of_node = ray.remote(num_cpus=0, max_retries=0)(_versions_here)  # which Ray sends by its name
 
 
 def _prefixed(plugins: Versions) -> Versions:
@@ -130,7 +127,7 @@ def _other_files(wanted: Versions) -> dict[str, str]:
 
 def _different(wanted: Versions) -> dict[str, str]:
     """Return a sentence for each plug-in that this process has in another version, by its kind and name."""
-    found = plugin_versions(imported.contents()) if wanted else {}
+    found = plugin_versions(imported.contents())
     wrong = [plugin for plugin in wanted if found.get(plugin) != wanted[plugin]]
     return {plugin: unavailable(plugin) or _sentence(found.get(plugin, "none"), wanted[plugin]) for plugin in wrong}
 

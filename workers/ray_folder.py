@@ -45,8 +45,7 @@ def ray_folder(wanted: Path | None = None) -> Iterator[Path]:
         _sweep(parent)
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))  # with mode 0700
     except OSError as error:
-        short = f"of at most {LONGEST_PARENT} characters"
-        msg = f"Ray needs a folder for its files; let RAY_TMPDIR name one {short} that you may write: {error}"
+        msg = f"Ray needs a folder for its files; let RAY_TMPDIR name a short one that you may write: {error}"
         raise ClusterUnusable(msg) from error
     held = _hold(folder)
     try:

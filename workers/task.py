@@ -46,13 +46,8 @@ def run(claim: Claim, expected: Versions, checkpoint_s: float, permits: Handle |
     check_here(expected)
     yield ()
     yield from delivered(lambda: _prepared(claim, expected, permits), claim, checkpoint_s)
-    _give_back_memory()
-
-
-def _give_back_memory() -> None:
-    """Give the system what was freed, of which glibc keeps hundreds of MB for later; it takes milliseconds."""
     with suppress(AttributeError, OSError, TypeError):  # another C library
-        CDLL(None).malloc_trim(0)
+        CDLL(None).malloc_trim(0)  # gives the system what was freed, of which glibc else keeps hundreds of MB
 
 
 def delivered(prepare: Callable[[], Setting], claim: Claim, checkpoint_s: float) -> Iterator[Batch]:

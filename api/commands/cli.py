@@ -17,17 +17,13 @@ from gaplab.api.commands.app import app as app
 from gaplab.api.commands.exit_codes import CommandError, Exit, code_of
 from gaplab.api.commands.json_output import echo
 from gaplab.services.core.errors import GaplabError
-from gaplab.services.plugins.ending import end_after
+from gaplab.services.plugins.threads import leave_threads
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command; an error is a sentence and an exit code.
-
-    Args:
-        arguments: left out: those of the process, which then ends.
-    """
+    """Run the command, by default with the process's arguments; an error is a sentence and an exit code."""
     if arguments is None:
-        end_after(lambda: main(sys.argv[1:]))
+        leave_threads()
     try:
         app(arguments, prog_name="gaplab")
     except NotSubmitted as error:

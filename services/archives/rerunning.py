@@ -11,7 +11,6 @@ from datetime import UTC, datetime
 from itertools import groupby
 from math import inf
 from multiprocessing import get_context
-from multiprocessing.util import Finalize
 from time import time
 from typing import IO, Any
 
@@ -149,12 +148,7 @@ def _rerun_alone(recorded: Recorded, plugins: tuple[str, ...]) -> RepetitionReru
 
 
 def _pool(cores: int | None, plugins: tuple[str, ...]) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(cores, get_context("spawn"), _begin, (plugins,))
-
-
-def _begin(plugins: tuple[str, ...]) -> None:
-    folders.use(plugins)
-    Finalize(None, os._exit, (0,), exitpriority=0)  # no thread of a plug-in keeps the process
+    return ProcessPoolExecutor(cores, get_context("spawn"), folders.use, (plugins,))
 
 
 def _recorded(session: Session, checked: CheckedArchive, part: Part) -> Iterator[Recorded]:

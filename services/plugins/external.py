@@ -30,10 +30,7 @@ def external_plugins(contents: Contents | None = None) -> Mapping[str, str]:
 
 
 def named_in(spec: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the plug-ins that a resolved spec needs, or the spec of a sensitivity check, by kind and name.
-
-    Those are the ones that it names, and the usual controller and task of its robot.
-    """
+    """Return the plug-ins of a resolved spec or sensitivity check, and those usual for its robot, by kind and name."""
     return tuple(dict.fromkeys(_named_in(spec)))
 
 

@@ -14,6 +14,7 @@ from gaplab.services.core import external_plugins
 from gaplab.services.plugins.contents import module_of
 from gaplab.services.plugins.external import REGISTRIES
 from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.plugins.threads import leave_threads
 from gaplab.services.plugins.watching import imported
 
 VARIABLE = "GAPLAB_PLUGINS"
@@ -35,19 +36,22 @@ def find() -> None:
 
 
 def use(files: Iterable[str]) -> None:
-    """Import the modules of these files and no others, since a module may change gaplab for all that a process does.
+    """Import the modules of these files and no others: a module may change gaplab for all that a process does.
 
     The files are as `imported_files` has them: those of each plug-in, the first its own, with their hashes.
     """
     find()
     if external_plugins.chosen() != (modules := frozenset(map(module_of, files))):
         external_plugins.set_folders(external_plugins.named_folders(), modules)
+    leave_threads()
+    imported.contents()
 
 
 @cache
 def load() -> None:
     """Find and import every plug-in, and warn of those that cannot be used; later calls do nothing."""
     find()
+    leave_threads()
     imported.contents()
     for folder in external_plugins.named_folders():
         if not folder.is_dir():

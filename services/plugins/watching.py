@@ -27,10 +27,6 @@ class FolderWatch:
         self._state: tuple[object, contents.State] | None = None
         self._contents = Contents()
 
-    def __reduce__(self) -> tuple[type["FolderWatch"], tuple[()]]:
-        """Let another process, to which Ray sends this with a function, look at its own folders."""
-        return FolderWatch, ()
-
     def contents(self) -> Contents:
         """Return the contents, at most `LOOK_S` old; the same object as long as they do not change."""
         package, now = external_plugins.package(), self._clock()
@@ -48,10 +44,6 @@ class Imported:
     def __init__(self) -> None:
         self._package: object = None
         self._contents = Contents()
-
-    def __reduce__(self) -> tuple[type["Imported"], tuple[()]]:
-        """Let another process, to which Ray sends this with a function, tell what it imported itself."""
-        return Imported, ()
 
     def contents(self) -> Contents:
         """Return the contents of the imported files; the first call imports them."""

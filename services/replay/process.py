@@ -190,4 +190,3 @@ def _serve(pipe: Connection, output: Connection, plugins: tuple[str, ...]) -> No
                 answer = (False, (type(error).__name__, brief(str(error))))
             print(end="", flush=True)  # noqa: T201 - what the call printed
             pipe.send(answer)
-    os._exit(0)  # no thread of a plug-in keeps it

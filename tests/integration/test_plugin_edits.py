@@ -127,14 +127,18 @@ def test_a_process_that_cannot_import_a_named_plug_in_says_why(
 
 def test_a_process_imports_what_the_spec_needs_alone(put: Any) -> None:
     brave = CAREFUL.replace("careful", "brave")
-    put(careful=f"from gaplab_plugins import _shared\n{CAREFUL}", brave=brave, _shared="")
+    home = put(careful=f"from gaplab_plugins import _shared\n{CAREFUL}", brave=brave, _shared="")
+    (home / "_shared.py").write_text(f"print(end='x', file=open({str(home / 'imports')!r}, 'a'))\n")
+    put()
     wanted = expected()
     put()
+    (home / "imports").unlink()
 
+    nodes.check_here(wanted)
     nodes.check_here(wanted)
 
     assert ("careful" in strategies, "brave" in strategies) == (True, False)
-    assert "gaplab_plugins._shared" in sys.modules
+    assert (home / "imports").read_text() == "x"
     assert "gaplab_plugins.brave" not in sys.modules
 
 

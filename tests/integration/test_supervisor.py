@@ -138,7 +138,7 @@ def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start()
 
 
 def test_a_folder_that_ray_cannot_have_is_told_with_the_remedy() -> None:
-    with pytest.raises(ClusterUnusable, match=r"let RAY_TMPDIR name one .*: .*No such file"):
+    with pytest.raises(ClusterUnusable, match=r"let RAY_TMPDIR name a short one .*: .*No such file"):
         ray_folder(Path("/no/such")).__enter__()
 
 

@@ -1,7 +1,6 @@
 """Plug-ins from outside: found in a folder, told apart by their content, unavailable with a reason if broken."""
 
 import os
-import pickle
 import re
 import subprocess
 import sys
@@ -18,7 +17,7 @@ from gaplab.services.core.registry import Registry
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.engines.base import Engine
-from gaplab.services.plugins import contents, watching
+from gaplab.services.plugins import contents
 from tests.fakes import CAREFUL
 
 ROOT = Path(__file__).parents[2]
@@ -349,11 +348,3 @@ def test_what_plug_ins_are_written_with_is_there() -> None:
     assert gaplab.plugins.Strategy is Strategy
     assert gaplab.plugins.Engine is Engine
     assert gaplab.plugins.frozen([1]).dtype == np.float64
-
-
-def test_what_is_sent_to_another_process_is_asked_anew_there() -> None:
-    watching.imported.contents()
-
-    sent = pickle.loads(pickle.dumps(watching.imported))
-
-    assert (sent._package, watching.imported._package is None) == (None, False)

@@ -1,0 +1,8 @@
+"""Threads of plug-ins, which keep no process."""
+
+import threading
+
+
+def leave_threads() -> None:
+    """Let this process end as soon as its own code has: a plug-in may have started a thread that never ends."""
+    threading._shutdown = lambda: None  # type: ignore[attr-defined]  # which waits for them
