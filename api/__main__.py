@@ -6,6 +6,7 @@ from gaplab.api.process.errors import CommandError
 from gaplab.api.process.server import listen, serve_api
 from gaplab.services import logs
 from gaplab.services.core.errors import GaplabError
+from gaplab.services.plugins.ending import end_after
 from gaplab.services.settings import Settings
 
 
@@ -20,4 +21,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    end_after(main)

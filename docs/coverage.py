@@ -17,9 +17,9 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.discrepancies.readings import Readings
-from gaplab.services.core.identification import Means, verdicts
+from gaplab.services.core.identification import Doubt, Means, verdicts
 from gaplab.services.core.misfit import Tuning, misfit_point
-from gaplab.services.core.misspecification import SURPRISING, fit_of, widened
+from gaplab.services.core.misspecification import fit_of, widened
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.space import Space
@@ -28,6 +28,7 @@ from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.gauss_newton import GaussNewton
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Sample
+from gaplab.services.core.unreproduced import doubt
 from gaplab.services.engines import engines
 from gaplab.services.specs.simulation import Simulation
 
@@ -78,12 +79,12 @@ def row(kind: str, samples: int, realities: Sequence[int]) -> str:
     for seed in realities:
         truth, found = tuned(kind, samples, seed)
         assert found.interval is not None
-        unreproduced = found.fit is not None and found.fit.surprise <= SURPRISING
+        doubted = doubt([found], simulated=False)
         point = misfit_point(samples, [found], NAMES, SPACE)
-        told = verdicts([point], [samples], Means(), unreproduced=unreproduced)
+        told = verdicts([point], [samples], Means(), doubted)
         inside.append((found.interval[:, 0] <= truth) & (truth <= found.interval[:, 1]))
         identified.append([each.verdict is Identification.IDENTIFIED for each in told])
-        surprised += unreproduced
+        surprised += doubted is Doubt.WRONG
     within, called = np.array(inside), np.array(identified)
     shares = "  ".join(f"{share:4.0%}" for share in within.mean(axis=0))
     said = f"{(within & called).sum():3} of {called.sum():3} identified are right; {surprised} unreproduced"

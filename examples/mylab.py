@@ -33,4 +33,4 @@ class Driver:
         return float(self.robot.fitness(path)[0, 0]) + self.noise.normal(0, 0.005)
 
     def stop(self) -> None:
-        """Let the robot stand still, at once: called at the end, and from another thread if a run takes too long."""
+        """Let the robot stand still, at once: called at the end, and from another thread if a run must not go on."""

@@ -115,6 +115,7 @@ class Comparison(Groups, Pair):
     """
 
     fitness: Fitness = Fitness.RECORDED
+    where: str = Field(default="", description="these numbers", examples=["after 5 real-world evaluations"])
     difference: Statistic = Field(
         description="difference of the means; where streams are shared, over the repetitions that both have"
     )

@@ -8,6 +8,12 @@ from gaplab.schemas.base import Frozen, Id, Name, Statistic, Unit
 from gaplab.schemas.lifecycle import State
 
 
+def from_before(*counts: int) -> str:
+    """Return ` (and 12 from before)`, or ` (and 0–12 from before)`, of numbers of samples; "" without any."""
+    span = "\N{EN DASH}".join(map(str, sorted({min(counts, default=0), max(counts, default=0)})))
+    return "" if span == "0" else f" (and {span} from before)"
+
+
 class Fitness(StrEnum):
     """Whose fitness in reality counts after each number of real-world evaluations.
 
@@ -59,6 +65,7 @@ class Curve(Frozen):
     fitness: Fitness = Fitness.RECORDED
     direct: bool = Field(default=False, description="true for the direct baseline, which evolves in reality itself")
     level: bool = Field(default=False, description="true for a strategy without samples: a level across the figure")
+    known: int = Field(default=0, description="samples from before the experiment, which no point counts")
     points: tuple[CurvePoint, ...]
     best_of: tuple[Statistic, ...] = Field(
         default=(),

@@ -72,7 +72,8 @@ class TakeSpec(Frozen):
 
     operator: Label = Field(description="person or driver", examples=["Ada"])
     lease_s: Annotated[Real, Field(ge=1, le=86_400)] = Field(
-        default=600.0, description="seconds without a heartbeat after which the request is open again"
+        default=600.0,
+        description="seconds without a heartbeat, by the clock of a supervisor, after which it is open again",
     )
 
 
@@ -89,6 +90,11 @@ class ReleaseSpec(HolderSpec):
 
     operator: Label | None = None
     reason: Annotated[str, Field(min_length=1, max_length=2_000)] | None = None
+    moved_s: Annotated[Real, Field(ge=0, le=1e9)] | None = Field(
+        default=None,
+        description="for how many seconds the robot may have moved for it, to now, if it may have ended before: what "
+        "others measured meanwhile does not count by itself",
+    )
 
 
 class MeasurementSpec(Frozen):
@@ -188,10 +194,10 @@ class RequestRead(Frozen):
     repeats: int
     genome: tuple[float, ...] = Field(examples=[(0.12, 0.55, 0.83, 0.31)])
     state: RequestState
-    takes: int = Field(description="number of times that it was taken; the number of the latest take")
+    takes: int = Field(description="number of the latest take; 0: it was never taken")
     unanswered: int = Field(description="takes in a row that ended without an answer")
     taken_by: str | None = Field(default=None, examples=["Ada"])
-    taken_until: Moment | None = Field(default=None, description="when the take ends without a heartbeat")
+    taken_until: Moment | None = Field(default=None, description="about when the take ends without a heartbeat")
     busy: bool = Field(default=False, description="whether another request of the same bench is taken")
     safety: Safety | None = None
     expected: tuple[str, ...] = Field(

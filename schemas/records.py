@@ -34,6 +34,16 @@ class TimeLeft(Frozen):
     high_s: float = Field(examples=[4200.0])
 
 
+class StepRead(Frozen):
+    """A step that a repetition has begun, as of its last checkpoint; steps of less than ten seconds have none."""
+
+    repetition: int
+    iteration: int = Field(examples=[3])
+    kind: str = Field(description="selection, tuning or transfer", examples=["tuning"])
+    rollouts: int = Field(description="rollouts done", examples=[4100])
+    budget: int = Field(description="most rollouts of the step; it saves the others", examples=[10_000])
+
+
 class Progress(Frozen):
     """Completed and remaining work."""
 
@@ -49,7 +59,7 @@ class Progress(Frozen):
     rollouts: int = Field(
         description="budgeted rollouts: in the end those done plus those saved, unless the experiment was stopped"
     )
-    rollouts_done: int = Field(examples=[4_363_000])
+    rollouts_done: int = Field(description="those of `steps` too", examples=[4_363_000])
     rollouts_failed: int = Field(description="rollouts done whose physics failed (nan); they never win")
     rollouts_saved: int = Field(
         description="budgeted rollouts that were not simulated, because they cannot change a number"
@@ -62,6 +72,7 @@ class Progress(Frozen):
     time_left: TimeLeft | None = Field(
         default=None, description="interval of the remaining time; null until enough is measured, and at the end"
     )
+    steps: tuple[StepRead, ...] = Field(default=(), description="what repetitions have begun")
 
 
 class FitnessRead(Frozen):
@@ -72,6 +83,7 @@ class FitnessRead(Frozen):
     """
 
     evaluations: int = Field(examples=[10])
+    known: int = Field(default=0, description="samples from before the experiment, which `evaluations` does not count")
     n: int = Field(description="repetitions in the mean", examples=[40])
     mean: float = Field(examples=[0.585])
     sd: Statistic = Field(description="sample standard deviation")

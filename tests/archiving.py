@@ -9,6 +9,8 @@ from gaplab.services.archives import Archive, import_archive
 from gaplab.services.archives.opening import json_lines_beside
 from gaplab.services.archives.unpacking import convert
 from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.experiments.limits import FREELY, Admission
+from gaplab.services.settings import Limits
 from gaplab.services.store.session import Store
 
 
@@ -26,4 +28,5 @@ def convert_here(files: Mapping[Path, int]) -> None:
 
 def imported(store: Store, archive: bytes | bytearray, most_rows: int | None = None) -> ImportRead:
     """Import an archive; its Parquet is read in this process."""
-    return import_archive(store, BytesIO(archive), most_rows=most_rows, convert=convert_here)
+    admitted = Admission(limits=Limits(imported_rows=most_rows)) if most_rows else FREELY
+    return import_archive(store, BytesIO(archive), admitted, convert=convert_here)

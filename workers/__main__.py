@@ -5,11 +5,13 @@ import os
 import signal
 import sys
 from collections.abc import Callable, MutableMapping
+from math import inf
 from secrets import token_hex
 
 from gaplab.services import logs
 from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.plugins import folders
+from gaplab.services.plugins.ending import end_after
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import ANSWER_S, Store
@@ -18,16 +20,21 @@ from gaplab.services.store.sqlite_file import in_use
 SHORTEST_ANSWER_S = 5.0
 """Least time for a statement in Postgres, however short a lease is."""
 
-RAY_NOTICES = {
+RAY_SETTINGS = {
+    "RAY_idle_worker_killing_time_threshold_ms": "60000",
     "RAY_gcs_rpc_server_reconnect_timeout_s": "20",
     "RAY_health_check_timeout_ms": "5000",
     "RAY_health_check_failure_threshold": "4",
 }
-"""Settings of a Ray of our own, which then gives up a part that died within half a minute instead of a whole one."""
+"""Settings of a Ray of our own.
+
+It keeps an idle process for a minute, as experiments with other plug-ins need other ones in turns. It gives up a part
+that died within half a minute instead of a whole one.
+"""
 
 
 def serve(settings: Settings) -> int:
-    """Work until SIGTERM or SIGINT; return 1 without a cluster or a usable database, or if the latter was changed."""
+    """Work until a signal; return 1 without a cluster or a usable database, or if the latter was changed."""
     choose_authentication(settings)
     pulse = PulsePipe.inherited()
     logs.adopt("ray")
@@ -64,8 +71,11 @@ def _work(store: Store, settings: Settings, pulse: PulsePipe) -> None:
     with cluster(settings) as joined:
         for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
             signal.signal(signum, lambda *_: stop.set())
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as `nohup` sets it
+            signal.signal(signal.SIGHUP, lambda *_: stop.set())
         logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
-        patience = Patience(settings.rollout_limit_s, settings.step_limit_s)
+        start_s = inf if settings.ray_address else Patience.start_s
+        patience = Patience(settings.rollout_limit_s, settings.step_limit_s, start_s)
         supervisor = Supervisor(store, joined.capacity, joined.versions, lease_s=settings.lease_s, patience=patience)
         supervisor.serve(stop, pulse)
 
@@ -100,7 +110,7 @@ def choose_authentication(settings: Settings, environment: MutableMapping[str, s
     else:
         environment["RAY_AUTH_MODE"] = "token"
         environment["RAY_AUTH_TOKEN"] = token_hex(32)
-        for name, value in RAY_NOTICES.items():
+        for name, value in RAY_SETTINGS.items():
             environment.setdefault(name, value)
 
 
@@ -131,4 +141,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    end_after(lambda: main(sys.argv[1:]))

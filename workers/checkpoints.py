@@ -93,7 +93,7 @@ class StepRecorder:
         self._before_s = sum(checkpoint.seconds for checkpoint in checkpoints)
         self._begun = self._last = self._called = self._progressed = perf_counter()
         self._answers: list[Answer] = []
-        self._rollout_s = 0.0
+        self._rollouts, self._rollout_s = 0, 0.0
         self._measuring = False
 
     def run(self, setting: Setting) -> None:
@@ -112,7 +112,7 @@ class StepRecorder:
                 steps = len(self._log)
                 if not may_pass(error) or tries > len(PAUSES_S):
                     raise
-                self._answers, self._progressed = [], perf_counter() + PAUSES_S[tries - 1]
+                self._answers, self._rollouts, self._progressed = [], 0, perf_counter() + PAUSES_S[tries - 1]
                 sleep(PAUSES_S[tries - 1])
             else:
                 return
@@ -129,13 +129,14 @@ class StepRecorder:
             return 1
         return max(1, int(self._every_s / CALLS_PER_CHECKPOINT / (self._rollout_s * simulators)))
 
-    def record(self, answers: Sequence[Answer], rollouts: int) -> None:
+    def record(self, answers: Sequence[Answer], rollouts: int, budget: int) -> None:
         """Keep the answers of a call that has just ended, and emit a checkpoint if it is time."""
         self._progressed = now = perf_counter()
         self._rollout_s = (now - self._called) / rollouts
         self._answers += answers
+        self._rollouts += rollouts
         if now - self._last >= self._every_s:
-            self._checkpoint(now)
+            self._checkpoint(now, budget)
 
     def end(self, step: Step) -> None:
         """Emit the completed step, and begin the next."""
@@ -143,7 +144,7 @@ class StepRecorder:
         self._emit(TimedStep(step, self._before_s + now - self._begun))
         self._log.append(step)
         self._before_s, self._begun, self._last, self._progressed = 0.0, now, now, now
-        self._parts, self._answers = [], []
+        self._parts, self._answers, self._rollouts = [], [], 0
 
     def request(self, setting: Setting, genome: Genome) -> Requested:
         """Return the request for the measurement that the log needs next, with its safety forecast."""
@@ -182,11 +183,13 @@ class StepRecorder:
         finally:
             self._measuring = False
 
-    def _checkpoint(self, now: float) -> None:
-        checkpoint = Checkpoint(len(self._log), len(self._parts), pack(self._answers), now - self._last)
+    def _checkpoint(self, now: float, budget: int) -> None:
+        rollouts = min(budget, self._rollouts + (self._parts[-1].rollouts if self._parts else 0))  # some are not needed
+        place, seconds = (len(self._log), len(self._parts)), now - self._last
+        checkpoint = Checkpoint(*place, pack(self._answers), seconds, rollouts, budget)
         self._emit(checkpoint)
         self._parts.append(checkpoint)
-        self._last, self._answers = now, []
+        self._last, self._answers, self._rollouts = now, [], 0
 
 
 def may_pass(error: BaseException) -> bool:

@@ -42,13 +42,14 @@ class Cluster:
     def capacity(self) -> int:
         """Return the number of repetitions to submit to Ray at once; it changes as nodes join or leave.
 
-        There are two for each core: while one runs, the next one waits in Ray, so no core idles between them.
+        There are two for each core: while one runs, the next one waits in Ray, so no core idles between them, and an
+        autoscaler sees a demand. So it is also without cores.
 
         Raises:
             RayGone: this process can run nothing any more.
         """
         cores = self.watch.cores()
-        return self.workers or 2 * cores
+        return self.workers or 2 * max(1, cores)
 
 
 @contextmanager

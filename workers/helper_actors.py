@@ -1,7 +1,6 @@
 """Helpers: Ray actors on idle cores that simulate parts of a repetition's calls."""
 
 from collections.abc import Sequence
-from functools import cache
 from time import monotonic
 from typing import Any, TypeAlias
 
@@ -10,7 +9,6 @@ from ray.exceptions import RayError
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, Genomes, Outcomes, Parameters
-from gaplab.services.core.ports import Sense, Simulate
 from gaplab.services.specs.assembly import simulated
 from gaplab.workers.nodes import Versions, check_here
 
@@ -32,12 +30,12 @@ class Helper:
     """A process that simulates on request.
 
     Ray places it where a core is idle and still counts that core as idle, so the next repetition can take it. It has no
-    permit, and no hardware.
+    permit, and no hardware. It has the variables of the task that starts it, and so its plug-ins.
     """
 
     def __init__(self, spec: str, expected: Versions) -> None:
         check_here(expected)
-        self._simulate, self._sense = _simulated(spec)
+        self._simulate, self._sense = simulated(ResolvedSpec.model_validate_json(spec))
 
     def part(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed."""
@@ -46,11 +44,6 @@ class Helper:
     def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
         """Return fitness and readings `(n, m, 1 + q)` of genomes `(n, g)` in simulators `(m, p)`."""
         return self._sense(genomes, parameters)
-
-
-@cache
-def _simulated(spec: str) -> tuple[Simulate, Sense]:
-    return simulated(ResolvedSpec.model_validate_json(spec))
 
 
 class Helpers:

@@ -7,6 +7,7 @@ only the experiments that name it: a process that has another version refuses th
 import logging
 import platform
 from collections.abc import Mapping
+from hashlib import sha256
 from typing import Any
 
 import ray
@@ -18,7 +19,7 @@ from gaplab.schemas.provenance import Provenance
 from gaplab.services.core import robot_library
 from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.plugins import folders
-from gaplab.services.plugins.contents import Contents
+from gaplab.services.plugins.contents import Contents, read
 from gaplab.services.plugins.external import unavailable
 from gaplab.services.plugins.watching import imported, present
 from gaplab.services.running.versions import Versions as Versions
@@ -31,6 +32,9 @@ ANSWER_S = 60.0
 
 PLUGIN = "plug-in "
 """Begins the names of external plug-ins among versions."""
+
+IMPORTED = "GAPLAB_PLUGINS_IMPORTED"
+"""Variable of a process that imports external plug-ins; Ray gives a task only a process with the same variables."""
 
 ROBOT = "robot "
 """Begins the names of robot files, whose texts are among versions."""
@@ -52,23 +56,36 @@ def with_plugins(shared: Versions, under: Provenance, spec: Mapping[str, Any]) -
     )
 
 
+def process_for(expected: Versions) -> dict[str, Any]:
+    """Return options of a task of Ray for a process that has imported the expected plug-ins, and no others.
+
+    Actors that the task starts have it too. Work without external plug-ins shares the processes without any.
+    """
+    plugins = sorted(text for name, text in expected.items() if name.startswith(PLUGIN))
+    return _process_with(sha256(repr(plugins).encode()).hexdigest()) if plugins else {}
+
+
+def _process_with(plugins: str) -> dict[str, Any]:
+    return {"runtime_env": {"env_vars": {IMPORTED: plugins}}}
+
+
 def check_here(expected: Versions) -> None:
     """Check that this process has the expected versions, and learn the robot files that came with them.
 
-    It imports plug-ins again that were edited since.
+    It imports the expected plug-ins and no others; their files only if they are the expected ones.
 
     Raises:
         ClusterUnusable: it lacks versions of gaplab or its libraries; the message says which.
         PluginDiffers: it lacks versions of plug-ins.
     """
     limit_prints()
-    folders.find()
-    imported.contents()
     shared = {name: text for name, text in expected.items() if not name.startswith((PLUGIN, ROBOT))}
+    wanted = {name.removeprefix(PLUGIN): text for name, text in expected.items() if name.startswith(PLUGIN)}
+    different = _other_files(wanted)
+    folders.use(() if different else wanted.values())  # nothing undoes an import
     _compare(platform.node(), versions(), shared)
     robot_library.learn(text for name, text in expected.items() if name.startswith(ROBOT))
-    wanted = {name.removeprefix(PLUGIN): text for name, text in expected.items() if name.startswith(PLUGIN)}
-    if wanted and _different(imported.contents(), wanted) and (different := _different(imported.renewed(), wanted)):
+    if different := different or _different(wanted):
         raise PluginDiffers(different, wanted)
 
 
@@ -80,7 +97,7 @@ def check_nodes() -> None:
     """
     alive = [node for node in ray.nodes() if node["Alive"]]
     only = [NodeAffinitySchedulingStrategy(node["NodeID"], soft=False) for node in alive]
-    answers = [_versions_of_node.options(scheduling_strategy=each).remote() for each in only]
+    answers = [_versions_of_node.options(scheduling_strategy=each, **_process_with("all")).remote() for each in only]
     ours = versions() | _prefixed(plugin_versions(present()))
     for answer, node in zip(answers, alive, strict=True):
         name = f"{node['NodeManagerHostname']} ({node['NodeManagerAddress']})"
@@ -105,9 +122,18 @@ def _prefixed(plugins: Versions) -> Versions:
     return {f"{PLUGIN}{plugin}": text for plugin, text in plugins.items()}
 
 
-def _different(contents: Contents, wanted: Versions) -> dict[str, str]:
+def _other_files(wanted: Versions) -> dict[str, str]:
+    """Return a sentence for each plug-in whose file is another here."""
+    folders.find()
+    here = read() if wanted else Contents()
+    files = {plugin: here.text_of(text.partition(" ")[0]) or "none" for plugin, text in wanted.items()}
+    wrong = [plugin for plugin, file in files.items() if not wanted[plugin].startswith(file)]
+    return {plugin: _sentence(files[plugin], wanted[plugin]) for plugin in wrong}
+
+
+def _different(wanted: Versions) -> dict[str, str]:
     """Return a sentence for each plug-in that this process has in another version, by its kind and name."""
-    found = plugin_versions(contents)
+    found = plugin_versions(imported.contents()) if wanted else {}
     wrong = [plugin for plugin in wanted if found.get(plugin) != wanted[plugin]]
     return {plugin: unavailable(plugin) or _sentence(found.get(plugin, "none"), wanted[plugin]) for plugin in wrong}
 

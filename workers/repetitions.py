@@ -17,7 +17,7 @@ from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store
 from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
-from gaplab.workers.nodes import Versions
+from gaplab.workers.nodes import Versions, process_for
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import PERMIT_SHARE, Handle, permits_here
 from gaplab.workers.plugins import Plugins
@@ -67,17 +67,16 @@ class Repetitions:
         self._unsure = False
         self._permits: Handle | None = None
         self._renewed = -lease_s
-        self._silences = Silences()
+        self._silences = Silences[int]()
 
     def launch(self, claim: Claim) -> Run:
         """Give a claimed repetition to a Ray task."""
         hardware = hardware_of(claim.spec) is not None
         if hardware and self._permits is None:
             self._permits = permits_here()
-        permits = self._permits if hardware else None
-        return Run(
-            claim, task.run.remote(claim, self._plugins.expected(claim.spec), self._checkpoint_s, permits), permits
-        )
+        permits, expected = self._permits if hardware else None, self._plugins.expected(claim.spec)
+        run = task.run.options(**process_for(expected))
+        return Run(claim, run.remote(claim, expected, self._checkpoint_s, permits), permits)
 
     def heartbeat(self) -> None:
         """Renew the claims, stop the runs whose claim is no longer valid, and end those that hang."""

@@ -20,7 +20,7 @@ from gaplab.services.specs.assembly import subject
 from gaplab.services.specs.blame import describe
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
-from gaplab.workers.nodes import Versions, check_here
+from gaplab.workers.nodes import Versions, check_here, process_for
 from gaplab.workers.patience import Patience
 from gaplab.workers.plugins import Plugins
 from gaplab.workers.task import told
@@ -108,7 +108,9 @@ class Checks:
     def _claim(self) -> None:
         _, refused = self._plugins.present()
         if (claim := sensitivity.claim(self._store, self._owner, refused)) is not None:
-            self._run, self._begun = (claim, check.remote(claim.spec, self._plugins.expected(claim.spec))), monotonic()
+            expected = self._plugins.expected(claim.spec)
+            result = check.options(**process_for(expected)).remote(claim.spec, expected)
+            self._run, self._begun = (claim, result), monotonic()
 
     def _end(self, claim: CheckClaim, result: Result) -> None:
         if not ray.wait([result], timeout=0)[0]:

@@ -17,12 +17,14 @@ from time import monotonic
 from gaplab.services.bench.taking import open_again
 from gaplab.services.core.errors import RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.running import execution, supervisors
+from gaplab.services.running.leases import Silences
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
 from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
+from gaplab.workers.run import stuck
 from gaplab.workers.sensitivity import Checks
 from gaplab.workers.stop import Stop
 
@@ -65,7 +67,8 @@ class Supervisor:
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._repetitions = Repetitions(store, self._owner, versions or {}, checkpoint_s, patience, lease_s)
         self._checks = Checks(store, self._owner, lease_s, versions, patience)
-        self._lease_s = lease_s
+        self._takes = Silences[str]()
+        self._lease_s, self._start_s = lease_s, (patience or Patience()).start_s
         self._beat = -lease_s
         self._noted: datetime | None = None
         self._pulse = PulsePipe()
@@ -96,7 +99,9 @@ class Supervisor:
                 except StoreChanged:
                     raise
                 except StoreUnavailable as error:
+                    self._pulse.trouble = str(error)
                     log.warning("waiting: %s", error)
+                    self._takes.forget()
                     stop.wait(RETRY_S)
             self._wind_down()
         except RayGone as error:
@@ -136,6 +141,7 @@ class Supervisor:
         self._repetitions.receive()
         self._repetitions.store_received()
         self._repetitions.end()
+        self._pulse.trouble = stuck(self._repetitions.runs, self._start_s)
 
     def _heartbeat(self) -> None:
         if monotonic() - self._beat < self._lease_s / HEARTBEATS:
@@ -145,7 +151,7 @@ class Supervisor:
         self._repetitions.heartbeat()
         self._checks.heartbeat()
         self._repetitions.requeue_lost()
-        if opened := open_again(self._store):
+        if opened := open_again(self._store, self._takes):
             log.warning("%d requests whose take ran out are open again", opened)
         self._beat = monotonic()
 

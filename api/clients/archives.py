@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO
 
-from gaplab.api.clients.connection import Connection
+from gaplab.api.clients.connection import CONFIRMED, Connection
 from gaplab.api.clients.records import Records, path_of
 from gaplab.schemas.archives import ImportRead
 
@@ -38,18 +38,20 @@ class Archives:
             for chunk in answer.iter_bytes():
                 file.write(chunk)
 
-    def import_(self, file: str | Path | IO[bytes]) -> ImportRead:
-        """Store the content of an archive, a file or an open one; the answer has its ids."""
+    def import_(self, file: str | Path | IO[bytes], *, yes: bool = False) -> ImportRead:
+        """Store the content of an archive, a file or an open one, whatever its work costs if `yes`; return its ids."""
         if isinstance(file, str | Path):
             with Path(file).open("rb") as source:
-                return self.import_(source)
-        return self._connection.upload(ImportRead, "/import", iter(partial(file.read, _CHUNK), b""), "application/zip")
+                return self.import_(source, yes=yes)
+        path, parts = f"/import{CONFIRMED if yes else ''}", iter(partial(file.read, _CHUNK), b"")
+        return self._connection.upload(ImportRead, path, parts, "application/zip")
 
 
 @contextmanager
 def _new(path: Path) -> Iterator[IO[bytes]]:
-    """Open a new file to write into; remove it if that fails."""
-    with path.open("xb") as file:
+    """Open a new file to write into, which its owner alone may read; remove it if that fails."""
+    path.touch(0o600, exist_ok=False)
+    with path.open("wb") as file:
         try:
             yield file
         except BaseException:

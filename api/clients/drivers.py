@@ -9,6 +9,7 @@
 """
 
 import importlib.util
+import time
 from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
@@ -16,8 +17,16 @@ from typing import Any, Protocol
 
 from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
 from gaplab.api.clients.driving import TakenRequest
+from gaplab.api.clients.errors import ServiceError
 from gaplab.api.clients.motions import DriverMotion
+from gaplab.api.clients.takes import Take, TakeLost
 from gaplab.schemas.records import SensorsRead
+
+POLL_S = 0.1
+"""Seconds between two looks whether a run may go on."""
+
+STOP_S = 10.0
+"""Longest time of a stop."""
 
 
 class MeasurementFailed(Exception):
@@ -42,7 +51,7 @@ class Driver(Protocol):
         """
 
     def stop(self) -> None:
-        """Stop the robot at once; called from another thread if a run takes too long."""
+        """Stop the robot at once; called from another thread if a run must not go on."""
 
 
 def load(file: Path) -> Driver:
@@ -69,25 +78,111 @@ def load(file: Path) -> Driver:
     return driver
 
 
-def measure(task: TakenRequest, driver: Driver, limit_s: float | None, tell: Callable[[str], None]) -> None:
+class Robot:
+    """A driver whose run and stop have threads of their own, so that one that hangs holds up nothing."""
+
+    def __init__(self, driver: Driver, stop_s: float = STOP_S) -> None:
+        self.connect = driver.connect
+        self._driver, self._stop_s = driver, stop_s
+        self._run, self._hangs = _Call(lambda: None), False
+
+    def run(self, motion: DriverMotion, take: Take, limit_s: float) -> Any:  # noqa: ANN401 - whatever a driver returns
+        """Return what a run returns; raise TakeLost, MeasurementFailed, or DriverBroken if it is too long or fails."""
+        self._run = run = _Call(self._driver.run, motion)
+        until = time.monotonic() + limit_s
+        while run.is_alive() and not take.lost and time.monotonic() < until:
+            run.join(POLL_S)
+        if take.lost:
+            raise TakeLost(take.lost)
+        if run.is_alive():
+            msg = f"the driver's run took more than {limit_s:g} s, so the robot was stopped; `--limit-s` permits more"
+            raise DriverBroken(msg)
+        if isinstance(run.error, MeasurementFailed):
+            raise run.error
+        if run.error:
+            raise DriverBroken(f"the driver's run raised {type(run.error).__name__}: {run.error}") from run.error
+        return run.answer
+
+    def stop(self) -> None:
+        """Stop the robot, and wait for the end of its run; once, raise DriverBroken if it may still move."""
+        if self._hangs:
+            return
+        stop = _Call(self._driver.stop)
+        for call, name in ((stop, "stop"), (self._run, "run")):
+            call.join(self._stop_s)
+            if call.is_alive():
+                self._hangs = True
+                msg = f"the driver's {name} has not returned {self._stop_s:g} s after a stop: the robot may still move"
+                raise DriverBroken(msg)
+        if stop.error:
+            raise DriverBroken(f"the driver's stop raised {type(stop.error).__name__}: {stop.error}") from stop.error
+
+
+class _Call(Thread):
+    """A call in a thread, with what it returned or raised."""
+
+    def __init__(self, function: Callable[..., Any], *arguments: object) -> None:
+        super().__init__(name="driver", daemon=True)
+        self.answer: Any = None
+        self.error: BaseException | None = None
+        self._function, self._arguments = function, arguments
+        self.start()
+
+    def run(self) -> None:
+        """Call the function."""
+        try:
+            self.answer = self._function(*self._arguments)
+        except BaseException as error:  # noqa: BLE001 - whoever waits for the call raises it again
+            self.error = error
+
+
+def measure(task: TakenRequest, robot: Robot, limit_s: float | None, tell: Callable[[str], None]) -> None:
     """Run a taken request to its end: all repeats that an earlier run did not measure, then the answer.
+
+    If others may have the robot, or the request is not wanted any more, it ends without an answer.
 
     Args:
         task: the taken request.
-        driver: what runs its motion.
+        robot: what runs its motion.
         limit_s: longest time of one run; None: a minute more than ten times the motion.
         tell: is told what happens.
 
     Raises:
-        DriverBroken: the driver hangs or answers nonsense; the request is released.
+        DriverBroken: the driver hangs or answers nonsense. If the robot may still move, the take is left to its lease.
+        ServiceError: the service refuses the answer, and would refuse the next one.
     """
-    limit_s, sensors = limit_s or 60.0 + 10.0 * task.motion.observe_s[-1], task.sensors
+    motion, sensors = task.motion, task.sensors
+    limit_s = limit_s or 60.0 + 10.0 * motion.observe_s[-1]
+    try:
+        _answer(task, lambda: robot.run(motion, task.take, limit_s), sensors, tell)
+    except ServiceError as error:
+        if error.problem.status not in {404, 409}:
+            raise
+        tell(f"not taken: {error}")
+    except BaseException as error:
+        try:
+            robot.stop()
+        except DriverBroken as unstopped:
+            task.take.leave()
+            raise DriverBroken(f"{unstopped}; {error}".removesuffix("; ")) from error
+        if not isinstance(error, TakeLost):
+            raise
+        if task.take.refused:
+            task.forget()
+        tell(f"stopped: {error}")
+
+
+def _answer(
+    task: TakenRequest, run: Callable[[], Any], sensors: SensorsRead | None, tell: Callable[[str], None]
+) -> None:
+    """Measure the repeats that are missing, and answer."""
     found = [(value, readings) for value, readings in task.known if not _mistake_of(readings, sensors)]
     if found:
         tell(f"{len(found)} of {task.repeats} repeats are in the journal already")
     try:
         while len(found) < task.repeats:
-            value, readings = _checked(_limited(driver, task.motion, limit_s))
+            task.take.ask()
+            value, readings = _checked(run())
             if mistake := _mistake_of(readings, sensors):
                 raise DriverBroken(f"the driver's run returned {mistake}")
             task.note(value, readings)
@@ -101,36 +196,6 @@ def measure(task: TakenRequest, driver: Driver, limit_s: float | None, tell: Cal
     answer = task.tell([value for value, _ in found], None if None in tables else tables)
     for doubt in answer.doubts:
         tell(f"doubtful: {doubt}; correct {answer.id}, or confirm it")
-
-
-def _limited(driver: Driver, motion: DriverMotion, limit_s: float) -> Any:  # noqa: ANN401 - whatever a driver returns
-    """Return what a run returns, or stop the robot if it takes too long.
-
-    Raises:
-        DriverBroken: it took too long, or raised an error that is no MeasurementFailed.
-    """
-    answers: list[Any] = []
-    errors: list[BaseException] = []
-
-    def work() -> None:
-        try:
-            answers.append(driver.run(motion))
-        except BaseException as error:  # noqa: BLE001 - it is raised again in the caller
-            errors.append(error)
-
-    thread = Thread(target=work, name="driver", daemon=True)
-    thread.start()
-    thread.join(limit_s)
-    if thread.is_alive():
-        driver.stop()
-        msg = f"the driver's run took more than {limit_s:g} s, so the robot was stopped; `--limit-s` permits more"
-        raise DriverBroken(msg)
-    if errors:
-        if isinstance(errors[0], MeasurementFailed):
-            raise errors[0]
-        driver.stop()
-        raise DriverBroken(f"the driver's run raised {type(errors[0]).__name__}: {errors[0]}") from errors[0]
-    return answers[0]
 
 
 def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a driver returns

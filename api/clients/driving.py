@@ -1,20 +1,19 @@
-"""The loop of a driver: requests are taken one after the other, kept by heartbeats, and answered once."""
+"""The loop of a driver: requests are taken one after the other, and answered once."""
 
 import socket
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
 from functools import cached_property
-from threading import Event, Thread
 from typing import Any
 
 from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
-from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.connection import Connection
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
 from gaplab.api.clients.journal import PAUSE_S, Deliveries, Journal, log
 from gaplab.api.clients.motions import DriverMotion, motion_of
 from gaplab.api.clients.records import Records
-from gaplab.schemas.measurements import AnswerRead, RequestRead, RequestState
+from gaplab.api.clients.takes import Take
+from gaplab.schemas.measurements import AnswerRead, AnswerState, RequestRead, RequestState
 from gaplab.schemas.records import Page, SensorsRead
 
 WAIT_S = 20.0
@@ -29,14 +28,11 @@ class TakenRequest:
 
     Attributes:
         request: the request, as it was taken.
-        answered: the service's answer, once it is told.
-        over: is set once it is answered or released, so that no sign of life is due.
+        take: its take; stop the robot if it is `lost`, and `ask` before the robot moves again.
     """
 
-    def __init__(self, driving: "Driving", request: RequestRead) -> None:
-        self.request = request
-        self.answered: AnswerRead | None = None
-        self.over = Event()
+    def __init__(self, driving: "Driving", take: Take) -> None:
+        self.request, self.take = take.request, take
         self._driving = driving
 
     @cached_property
@@ -75,12 +71,22 @@ class TakenRequest:
     @property
     def known(self) -> list[tuple[float, Any]]:
         """Repeats that an earlier run of the driver measured and journalled, with their readings."""
-        return self._driving.deliveries.journal.repeats(self.id)[: self.repeats]
+        return self._driving.deliveries.journal.repeats(self.id, self._void)[: self.repeats]
 
     def note(self, value: float, readings: Any = None) -> None:  # noqa: ANN401 - JSON
         """Journal one repeat, so that a power cut before the last one loses nothing; its errors are those of `tell`."""
         (number,) = numbers_of([value], "/values")
-        self._driving.deliveries.journal.repeat(self.id, number, json_of(readings_of(readings), "/readings"))
+        noted = json_of(readings_of(readings), "/readings")
+        self._driving.deliveries.journal.repeat(self.id, number, noted, self._void)
+
+    @property
+    def _void(self) -> list[str]:
+        """Answers that counted once: what was measured before their correction or void is worth nothing."""
+        return [each.id for each in self.request.answers if each.state in {AnswerState.REPLACED, AnswerState.VOID}]
+
+    def forget(self) -> None:
+        """Forget the repeats that were noted: others may have had the robot meanwhile."""
+        self._driving.deliveries.journal.forget(self.id)
 
     def tell(self, values: float | Sequence[float], readings: Any = None, note: str | None = None) -> AnswerRead:  # noqa: ANN401 - JSON
         """Answer with the value, or the values of all repeats.
@@ -103,10 +109,14 @@ class TakenRequest:
         return self._answer({"failed": str(reason) or type(reason).__name__})
 
     def _answer(self, answer: dict[str, Any]) -> AnswerRead:
-        given = {name: value for name, value in answer.items() if value is not None}
-        self.answered = self._driving.deliveries.send(self.id, given | {"take": self.request.takes})
-        self.over.set()
-        return self.answered
+        deliveries = self._driving.deliveries
+        given = {name: value for name, value in answer.items() if value is not None} | {"take": self.request.takes}
+        key = deliveries.journal.answer(self.id, given)
+        if self.take.lost:
+            self.take.release()
+        answered = deliveries.deliver(self.id, given, key)
+        self.take.over.set()
+        return answered
 
 
 class Driving:
@@ -123,20 +133,19 @@ class Driving:
         """Yield taken requests until the experiment has ended; send first what an earlier run left in the journal."""
         self.deliveries.send_leftovers()
         while True:
-            request = self._next(experiment, bench)
-            if request is None:
+            task = self._next(experiment, bench)
+            if task is None:
                 if experiment is not None and self._ended(experiment):
                     return
                 continue
-            task = TakenRequest(self, request)
-            with self._held(task):
+            with task.take.kept():
                 try:
                     yield task
                 finally:
-                    if task.answered is None:
-                        self._release(request)
+                    if not task.take.over.is_set():
+                        task.take.release()
 
-    def _next(self, experiment: str | None, bench: str | None) -> RequestRead | None:
+    def _next(self, experiment: str | None, bench: str | None) -> TakenRequest | None:
         """Take the oldest open request; None if there is none, or others have the bench.
 
         Raises:
@@ -160,43 +169,18 @@ class Driving:
             time.sleep(PAUSE_S)
         return None
 
-    def _take(self, request: RequestRead) -> RequestRead | None:
+    def _take(self, request: RequestRead) -> TakenRequest | None:
         """Take a request; None if somebody else was faster, or it is wanted no more."""
-        body = {"operator": self._operator, "lease_s": self._lease_s}
         try:
-            return self.connection.post(RequestRead, f"/requests/{segment(request.id)}/take", body)
+            return TakenRequest(self, Take(self.connection, request.id, self._operator, self._lease_s))
         except ServiceError as error:
             if error.problem.status not in _NOT_THIS_ONE:
                 raise
             log.info("not taken: %s", error)
             return None
 
-    def _release(self, request: RequestRead) -> None:
-        with suppress(ServiceError, ServiceUnreachable):
-            path = f"/requests/{segment(request.id)}/release"
-            self.connection.change(RequestRead, "POST", path, json={"take": request.takes})
-
     def _ended(self, experiment: str) -> bool:
         try:
             return self.records.experiment(experiment).state.ended
         except (ServiceError, ServiceUnreachable):
             return False
-
-    @contextmanager
-    def _held(self, task: TakenRequest) -> Iterator[None]:
-        """Show signs of life for a request from another thread, until it is answered."""
-        thread = Thread(target=self._beat, args=(task,), name="heartbeat", daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            task.over.set()
-            thread.join()
-
-    def _beat(self, task: TakenRequest) -> None:
-        path = f"/requests/{segment(task.id)}/heartbeat"
-        while not task.over.wait(self._lease_s / 3):
-            try:
-                self.connection.change(RequestRead, "POST", path, json={"take": task.request.takes})
-            except (ServiceError, ServiceUnreachable) as error:
-                log.warning("no heartbeat: %s", error)

@@ -66,7 +66,7 @@ class ExtraMissing(ImportError):
 def is_final(error: Exception) -> bool:
     """Return whether a repeated request would fail the same way."""
     if isinstance(error, ServiceError):
-        return error.problem.status < 500
+        return error.problem.status < 500 and error.problem.status != HTTPStatus.TOO_MANY_REQUESTS
     return isinstance(error, UnknownService)
 
 
@@ -78,6 +78,11 @@ def if_found() -> Iterator[None]:
     except ServiceError as error:
         if error.problem.status != HTTPStatus.NOT_FOUND:
             raise
+
+
+def is_of_gaplab(error: Exception) -> bool:
+    """Return whether gaplab itself refused a request, and not a proxy or another service at its address."""
+    return isinstance(error, ServiceError) and error.problem.type.startswith("urn:gaplab:")
 
 
 def refuses_sender(error: ServiceError) -> bool:

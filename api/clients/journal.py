@@ -4,24 +4,27 @@ import json
 import logging
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any, Self
 from uuid import uuid4
 
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, refuses_sender
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_of_gaplab, refuses_sender
 from gaplab.schemas.measurements import AnswerRead
+
+log = logging.getLogger("gaplab.driver")
 
 
 class Journal:
     """Lines of JSON in a file, each on disk when its method returns; without a file, they are in memory.
 
-    A line is a repeat of a request, an answer with its idempotency key, or the note that the service has an answer. A
-    last line that a power cut left half-written is ignored.
+    A line is a repeat of a request, an answer with its idempotency key, or the note that the service has an answer. One
+    that is none of these, as a power cut leaves, is logged once, and copied to a file beside, `*.unreadable`.
 
     Args:
-        file: created if it does not exist; None: no file.
+        file: created, for its owner alone, if it does not exist; None: no file.
     """
 
     def __init__(self, file: str | Path | None = None) -> None:
@@ -30,7 +33,8 @@ class Journal:
         if file is not None:
             path = Path(file)
             content = path.read_bytes() if path.exists() else b""
-            self._lines = list(_lines(content))
+            self._lines = list(_lines(content, path.with_name(f"{path.name}.unreadable")))
+            path.touch(0o600)
             self._file = path.open("ab")
             if content and not content.endswith(b"\n"):
                 self._file.write(b"\n")
@@ -42,20 +46,27 @@ class Journal:
         if self._file is not None:
             self._file.close()
 
-    def repeat(self, request: str, value: float, readings: Any = None) -> None:  # noqa: ANN401 - JSON
-        """Keep the value of one repeat."""
-        self._write({"request": request, "repeat": value, "readings": readings})
+    def repeat(self, request: str, value: float, readings: Any = None, void: Sequence[str] = ()) -> None:  # noqa: ANN401 - JSON
+        """Keep the value of one repeat, with the answers to its request that counted once and were void by then."""
+        self._write({"request": request, "repeat": value, "readings": readings, "void": list(void)})
 
-    def repeats(self, request: str) -> list[tuple[float, Any]]:
-        """Return the repeats of a request that no answer has used; an answer that was refused has used none."""
+    def forget(self, request: str) -> None:
+        """Note that the repeats of a request are worth nothing."""
+        self._write({"request": request, "forgotten": True})
+
+    def repeats(self, request: str, void: Sequence[str] = ()) -> list[tuple[float, Any]]:
+        """Return the repeats of a request that no answer has used; an answer that was refused has used none.
+
+        Repeats from before one of the answers became void are left out.
+        """
         refused = {line["sent"] for line in self._lines if line.get("refused")}
         found: list[tuple[float, Any]] = []
         for line in self._lines:
             if line.get("request") != request:
                 continue
             if line.get("repeat") is not None:
-                found.append((line["repeat"], line.get("readings")))
-            elif "answer" in line and line["key"] not in refused:
+                found += [(line["repeat"], line.get("readings"))] if line.get("void", []) == list(void) else []
+            elif line.get("key") not in refused:
                 found = []
         return found
 
@@ -88,14 +99,28 @@ class Journal:
             os.fsync(self._file.fileno())
 
 
-def _lines(content: bytes) -> Iterator[dict[str, Any]]:
+def _lines(content: bytes, aside: Path) -> Iterator[dict[str, Any]]:
+    known = aside.read_bytes().splitlines() if aside.exists() else []
     for text in content.splitlines():
         try:
-            line = json.loads(text)
-        except ValueError:
-            continue
-        if isinstance(line, dict):
+            if not _is_line(line := json.loads(text)):
+                raise ValueError("it is neither a repeat, nor an answer, nor a note about one")
+        except (ValueError, RecursionError) as error:
+            if text and text not in known:
+                log.error("a line of the journal cannot be used, and is copied to %s: %s", aside, error)
+                with aside.open("ab") as file:
+                    file.write(text + b"\n")
+        else:
             yield line
+
+
+def _is_line(line: Any) -> bool:  # noqa: ANN401 - JSON
+    match line:
+        case {"request": str(), "repeat": float() as value}:
+            return isfinite(value)
+        case {"request": str(), "answer": dict(), "key": str()} | {"request": str(), "forgotten": True}:
+            return True
+    return isinstance(line, dict) and isinstance(line.get("sent"), str)
 
 
 PAUSE_S = 2.0
@@ -104,7 +129,8 @@ PAUSE_S = 2.0
 INVALID = 422
 """Status of an answer with a mistake, like too few values: what was measured is still good."""
 
-log = logging.getLogger("gaplab.driver")
+ENDED = 409
+"""Status of an answer to a request that is wanted no more. Any other refusal may come from a service without it."""
 
 
 class Deliveries:
@@ -114,14 +140,6 @@ class Deliveries:
         self.journal = journal
         self._connection, self._operator = connection, operator
 
-    def send(self, request: str, answer: dict[str, Any]) -> AnswerRead:
-        """Journal an answer to a request, and send it until the service has it.
-
-        Raises:
-            ServiceError: the service refuses it.
-        """
-        return self._deliver(request, answer, self.journal.answer(request, answer))
-
     def send_leftovers(self) -> None:
         """Send the answers that an earlier run left in the journal; one that is refused does not stop the others.
 
@@ -130,13 +148,18 @@ class Deliveries:
         """
         for request, answer, key in self.journal.unsent():
             try:
-                self._deliver(request, answer, key)
+                self.deliver(request, answer, key)
             except ServiceError as error:
                 if refuses_sender(error):
                     raise
                 log.error("the answer %s in the journal, to request %s, is refused: %s", answer, request, error)
 
-    def _deliver(self, request: str, answer: dict[str, Any], key: str) -> AnswerRead:
+    def deliver(self, request: str, answer: dict[str, Any], key: str) -> AnswerRead:
+        """Send a journalled answer until the service has it; it stays in the journal if the service never saw it.
+
+        Raises:
+            ServiceError: the service refuses it.
+        """
         path = f"/requests/{segment(request)}/measurements"
         while True:
             try:
@@ -146,9 +169,9 @@ class Deliveries:
                 time.sleep(PAUSE_S)
             except ServiceError as error:
                 if error.problem.status < 500 and error.problem.status != 429:
-                    if error.problem.status == INVALID:
+                    if is_of_gaplab(error) and error.problem.status == INVALID:
                         self.journal.refused(key)
-                    elif not refuses_sender(error):
+                    elif is_of_gaplab(error) and error.problem.status == ENDED:
                         self.journal.sent(key)
                     raise
                 log.warning("not taken yet: %s", error)

@@ -11,6 +11,7 @@ from gaplab.api.clients.client import Client
 from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands import completion
 from gaplab.api.commands.exit_codes import Exit
+from gaplab.api.commands.json_output import echo
 from gaplab.schemas.mistakes import sentence
 
 
@@ -58,7 +59,7 @@ Url = Annotated[
 
 def _print_version(asked: bool) -> None:
     if asked:
-        typer.echo(f"gaplab {version('gaplab')}")
+        echo(f"gaplab {version('gaplab')}")
         raise typer.Exit
 
 
@@ -79,4 +80,4 @@ def connect(url: str | None) -> Client:
 def print_warnings(record: Record) -> None:
     """Print the warnings of experiments on standard error."""
     for warning in sorted({warning for experiment in experiments_of(record) for warning in experiment.warnings}):
-        typer.echo(f"warning: {warning}", err=True)
+        echo(f"warning: {warning}", err=True)

@@ -11,12 +11,14 @@ from rich.markup import escape
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import KEEPING, AsJson, Id, Url, app, connect
 from gaplab.api.commands.exit_codes import Exit
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.api.commands.submission import submit_confirmed
 from gaplab.schemas.archives import MOST_BYTES_OF_IMPORT, RepetitionRerun, RerunRead
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.settings import Settings
 from gaplab.services.store.atomic_files import PRIVATE, appearing
+
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")]
 
 
 @app.command(rich_help_panel=KEEPING)
@@ -35,22 +37,24 @@ def export(
     print_result({"file": str(file), "bytes": size}, f"Wrote {file}.", as_json=as_json)
     if size > MOST_BYTES_OF_IMPORT:
         most = f"{size:,} bytes; gaplab import takes {MOST_BYTES_OF_IMPORT:,}. gaplab backup copies any size"
-        typer.echo(f"{file} has {most}", err=True)
+        echo(f"{file} has {most}", err=True)
 
 
 @app.command("import", rich_help_panel=KEEPING)
-def import_(file: Annotated[Path, typer.Argument(help="an archive")], as_json: AsJson = False, url: Url = None) -> None:
+def import_(
+    file: Annotated[Path, typer.Argument(help="an archive")], yes: Yes = False, as_json: AsJson = False, url: Url = None
+) -> None:
     """Store the content of an archive; nothing in it is run."""
     with connect(url) as client, file.open("rb") as source:
-        stored = client.import_(source)
+        stored = client.import_(source, yes=yes)
     if as_json:
         print_json(stored)
         return
-    typer.echo(stored.study or stored.experiments[0])
+    echo(stored.study or stored.experiments[0])
     for old, new in stored.renamed.items():
-        typer.echo(f"{old} is taken here; its new id is {new}", err=True)
+        echo(f"{old} is taken here; its new id is {new}", err=True)
     for cancelled in stored.called_off:
-        typer.echo(f"{cancelled} had not ended; it is cancelled here", err=True)
+        echo(f"{cancelled} had not ended; it is cancelled here", err=True)
 
 
 @app.command(rich_help_panel=KEEPING)
@@ -96,7 +100,7 @@ def rerun(  # noqa: PLR0913, PLR0917 - each is an option of the command
     minutes: Annotated[
         float | None, typer.Option(min=0.01, help="verify the first steps, until this time is over", show_default=False)
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")] = False,
+    yes: Yes = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:

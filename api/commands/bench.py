@@ -11,7 +11,7 @@ from gaplab.api.clients.errors import if_found
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import BENCH, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.api.commands.measured_values import ValuesCommand, numbers
 from gaplab.api.commands.questions import confirmed
 from gaplab.api.commands.request_words import print_safety, request_table, request_words, stored_words
@@ -53,7 +53,7 @@ def requests(
         read = client.bench.history if all_ else client.bench.pending
         items = read(id, bench=bench)
         if not items and not as_json:
-            typer.echo(_nothing(client, id, bench, all_=all_))
+            echo(_nothing(client, id, bench, all_=all_))
             return
     if as_json:
         print_json([each.model_dump(mode="json") for each in items])
@@ -70,7 +70,7 @@ def motion(
 ) -> None:
     """Print the motion that a request asks for."""
     with connect(url) as client:
-        typer.echo(client.bench.motion(id, "json" if as_json else form), nl=False)
+        echo(client.bench.motion(id, "json" if as_json else form), nl=False)
 
 
 @app.command("measured", cls=ValuesCommand, rich_help_panel=BENCH)
@@ -211,7 +211,7 @@ def _print_request(found: RequestRead, *, as_json: bool) -> None:
     if as_json:
         print_json(found)
         return
-    typer.echo("\n".join(request_words(found)))
+    echo("\n".join(request_words(found)))
     print_safety(found)
 
 

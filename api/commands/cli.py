@@ -3,8 +3,6 @@
 import sys
 from collections.abc import Sequence
 
-import typer
-
 from gaplab.api.clients.confirmation import NotSubmitted
 from gaplab.api.clients.errors import ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable, lines_of
 
@@ -17,11 +15,19 @@ from gaplab.api.commands import archives, plugins, robots, tokens, help  # noqa:
 # isort: on
 from gaplab.api.commands.app import app as app
 from gaplab.api.commands.exit_codes import CommandError, Exit, code_of
+from gaplab.api.commands.json_output import echo
 from gaplab.services.core.errors import GaplabError
+from gaplab.services.plugins.ending import end_after
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command, by default with the process's arguments; an error is a sentence and an exit code."""
+    """Run the command; an error is a sentence and an exit code.
+
+    Args:
+        arguments: left out: those of the process, which then ends.
+    """
+    if arguments is None:
+        end_after(lambda: main(sys.argv[1:]))
     try:
         app(arguments, prog_name="gaplab")
     except NotSubmitted as error:
@@ -37,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _exit(lines: list[str], code: int) -> None:
     for line in lines:
         printable = line.encode("utf-8", "backslashreplace").decode()  # names of files need not be Unicode
-        typer.echo(f"gaplab: {printable}", err=True)
+        echo(f"gaplab: {printable}", err=True)
     sys.exit(code)
 
 

@@ -21,11 +21,8 @@ NAMES = {
 
 def comparisons(pairs: Sequence[Comparison]) -> Iterator[Table | str]:
     """Yield the experiments, the differences of their pairs, the tests, and the verdicts that were asked for."""
-    first, last = pairs[0].from_evaluations, pairs[0].to_evaluations
-    several = first != last
-    where = f"mean of each repetition over {first} to {last}" if several else f"after {first}"
     yield from dict.fromkeys(f"! {escape(warning)}\n" for pair in pairs for warning in pair.warnings)
-    yield f"{pairs[0].fitness.words} in reality, {where} real-world evaluations; 95 % intervals"
+    yield f"{pairs[0].fitness.words} in reality, {pairs[0].where}; 95 % intervals"
     yield table(("experiment", "n", "mean", "interquartile mean", "SD"), map(_experiment, *_summaries(pairs)))
     yield "Differences with 90 % intervals, Cohen's d, and the probability that a repetition of the first is fitter"
     yield table(("first", "second", "n", "difference", "d", "P(first > second)"), map(_sizes, pairs))

@@ -11,7 +11,7 @@ from gaplab.api.clients.comparisons import Comparisons
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands import comparison_tables
 from gaplab.api.commands.app import RESULTS, AsJson, Ids, Url, app, connect
-from gaplab.api.commands.json_output import print_json
+from gaplab.api.commands.json_output import echo, print_json
 from gaplab.schemas.curves import Fitness
 
 
@@ -92,7 +92,7 @@ def margins(text: str | None) -> tuple[float | None, float | None]:
 
 _PRINTERS: dict[Format, Callable[[Comparisons], None]] = {
     Format.TABLE: lambda pairs: console().print(*comparison_tables.comparisons(pairs)),
-    Format.CSV: lambda pairs: typer.echo(pairs.csv(), nl=False),
+    Format.CSV: lambda pairs: echo(pairs.csv(), nl=False),
     Format.JSON: print_json,
-    Format.LATEX: lambda pairs: typer.echo(pairs.latex(), nl=False),
+    Format.LATEX: lambda pairs: echo(pairs.latex(), nl=False),
 }

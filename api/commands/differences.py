@@ -11,7 +11,7 @@ from gaplab.api.clients.progress.text import console
 from gaplab.api.clients.records import experiments_of
 from gaplab.api.commands import completion, tables
 from gaplab.api.commands.app import RESULTS, AsJson, Url, app, connect
-from gaplab.api.commands.json_output import print_json
+from gaplab.api.commands.json_output import echo, print_json
 from gaplab.schemas.differences import SpecDiff, Values
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def diff(of: Compared, as_json: AsJson = False, url: Url = None) -> None:
     columns = ("setting", *(escape(column.name) for column in found.columns))
     rows = ((escape(each.setting), *map(_cell, each.values)) for each in found.settings)
     console().print(tables.table(columns, rows) if found.settings else "No setting differs.")
-    typer.echo(_equal(found))
+    echo(_equal(found))
 
 
 def _with_files(names: list[str], url: str | None) -> SpecDiff:

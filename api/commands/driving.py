@@ -1,15 +1,15 @@
 """The command that drives a robot on a bench."""
 
 import signal
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gaplab.api.clients.drivers import DriverBroken, load, measure
+from gaplab.api.clients.drivers import DriverBroken, Robot, load, measure
 from gaplab.api.commands.app import BENCH, ExperimentId, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.json_output import echo
 from gaplab.api.commands.request_words import print_safety
 from gaplab.schemas.measurements import RequestRead
 
@@ -32,23 +32,29 @@ def drive(  # noqa: PLR0913, PLR0917 - each is an option of the command
     url: Url = None,
 ) -> None:
     """Measure what an experiment asks for with a driver, until the experiment has ended."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _stop_at_signals()
     kept = journal or driver.with_name(f"{driver.stem}-{id}.journal")
     try:
-        robot = load(driver)
+        robot = Robot(load(driver))
         with connect(url) as client:
             client.experiment(id)
             robot.connect()
             try:
                 for task in client.requests(id, lease_s=lease_s, journal=kept):
                     _announce(task.request, within_limits=within_limits)
-                    measure(task, robot, limit_s, lambda sentence: typer.echo(f"  {sentence}"))
+                    measure(task, robot, limit_s, lambda sentence: echo(f"  {sentence}"))
             finally:
-                with suppress(Exception):
-                    robot.stop()
+                robot.stop()
     except DriverBroken as error:
         raise CommandError(str(error), Exit.FAILED) from error
-    typer.echo("The experiment has ended.")
+    echo("The experiment has ended.")
+
+
+def _stop_at_signals() -> None:
+    """Stop in order also if the terminal closes or the machine shuts down; a signal that a shell ignores stays so."""
+    for each in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        if signal.getsignal(each) is not signal.SIG_IGN:
+            signal.signal(each, signal.default_int_handler)
 
 
 def _announce(request: RequestRead, *, within_limits: bool) -> None:
@@ -58,7 +64,7 @@ def _announce(request: RequestRead, *, within_limits: bool) -> None:
         CommandError: it is expected to exceed a limit, and must stay within them.
     """
     place = f"repetition {request.repetition}, iteration {request.iteration}, {request.kind.value}"
-    typer.echo(f"{request.id}: {place}")
+    echo(f"{request.id}: {place}")
     print_safety(request)
     if within_limits and request.safety and request.safety.beyond:
         msg = f"request {request.id} is beyond its limits, so it was not measured; without --within-limits it is"

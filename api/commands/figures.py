@@ -9,7 +9,7 @@ from gaplab.api.clients.figures import FORMATS
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands import completion, tables
 from gaplab.api.commands.app import RESULTS, AsJson, Ids, Url, app, connect
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import echo, print_json, print_result
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -29,7 +29,7 @@ def curve(
         if as_json:
             print_json(client.curves(ids))
         elif csv:
-            typer.echo(client.curves_csv(ids), nl=False)
+            echo(client.curves_csv(ids), nl=False)
         elif not files:
             curves = client.curves(ids)
             console().print(tables.curves(curves), *tables.baselines(curves))
@@ -37,7 +37,7 @@ def curve(
             if file:
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_bytes(client.figure(*ids).content(format))
-                typer.echo(f"Wrote {file}.", err=as_json or csv)
+                echo(f"Wrote {file}.", err=as_json or csv)
 
 
 @app.command(rich_help_panel=RESULTS)

@@ -6,16 +6,23 @@ from typing import Any
 import typer
 from pydantic import TypeAdapter
 
+from gaplab.api.clients.progress.text import printable
+
+
+def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
+    """Print a text without characters that a terminal obeys."""
+    typer.echo(printable(text), err=err, nl=nl)
+
 
 def print_result(value: object, text: str, *, as_json: bool) -> None:
     """Print the value as JSON, or the text for people."""
     if as_json:
         print_json(value)
     else:
-        typer.echo(text)
+        echo(text)
 
 
 def print_json(value: object, *, line: bool = False) -> None:
     """Print a value in the JSON of the API, perhaps on one line, for several documents in one output."""
     plain = TypeAdapter(Any).dump_python(value, mode="json")
-    typer.echo(json.dumps(plain, ensure_ascii=False, allow_nan=False, indent=None if line else 2))
+    echo(json.dumps(plain, ensure_ascii=False, allow_nan=False, indent=None if line else 2))

@@ -4,10 +4,10 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-import typer
-
 from gaplab.api.clients.confirmation import Ask, is_yes
+from gaplab.api.clients.progress.text import printable
 from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.json_output import echo
 
 
 @contextmanager
@@ -37,7 +37,7 @@ def confirmed(doubts: Sequence[str]) -> bool:
         CommandError: the person says that it is not.
     """
     for doubt in doubts:
-        typer.echo(f"doubtful: {doubt}", err=True)
+        echo(f"doubtful: {doubt}", err=True)
     with keyboard() as ask:
         if not doubts or ask is None:
             return False
@@ -59,7 +59,7 @@ def demand_yes(what: str) -> None:
 
 def _demand(ask: Ask, question: str, otherwise: str) -> None:
     try:
-        answer = ask(f"{question} [y/N] ")
+        answer = ask(printable(f"{question} [y/N] "))
     except (KeyboardInterrupt, EOFError):
         answer = ""
     if not is_yes(answer):

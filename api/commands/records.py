@@ -14,7 +14,7 @@ from gaplab.api.clients.records import Record
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import LIFE, RESULTS, SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.misfit import TunableVerdict
 from gaplab.schemas.mistakes import sentence
@@ -79,7 +79,7 @@ def spec(
         record, found = client.find(id), client.spec(id)
     complete = found.resolved if isinstance(record, StudyRead) else found.resolved[0]
     for remark in found.remarks:
-        typer.echo(f"note: {remark}", err=True)
+        echo(f"note: {remark}", err=True)
     if as_json:
         print_json(found)
     elif resolved or found.spec is not None:

@@ -10,7 +10,7 @@ from gaplab.api.clients.reports import FORMATS
 from gaplab.api.commands.app import BENCH, RESULTS, AsJson, ExperimentId, Id, Url, app, connect
 from gaplab.api.commands.comparisons import MarginOption, margins
 from gaplab.api.commands.figures import named_option
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.schemas.replays import ReplayWorld
 
 
@@ -37,11 +37,11 @@ def report(
     if as_json:
         print_json(verdict)
     else:
-        typer.echo(verdict.headline)
+        echo(verdict.headline)
         for sentence in () if files else verdict.sentences:
-            typer.echo(f"- {sentence}")
+            echo(f"- {sentence}")
     for file in files:
-        typer.echo(f"Wrote {file}.", err=as_json)
+        echo(f"Wrote {file}.", err=as_json)
 
 
 @app.command(rich_help_panel=BENCH)
@@ -94,9 +94,9 @@ def replay(
         print_json(found)
     else:
         for name, world in (("in its simulator", found.simulation), ("in reality", found.reality)):
-            typer.echo(f"{name}: {_told(world, found.unit)}")
+            echo(f"{name}: {_told(world, found.unit)}")
     if file:
-        typer.echo(f"Wrote {file}.", err=as_json)
+        echo(f"Wrote {file}.", err=as_json)
 
 
 def _told(world: ReplayWorld | None, unit: str) -> str:

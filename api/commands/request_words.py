@@ -3,10 +3,10 @@
 import json
 from collections.abc import Iterator, Sequence
 
-import typer
 from rich.markup import escape
 from rich.table import Table
 
+from gaplab.api.commands.json_output import echo
 from gaplab.api.commands.tables import table
 from gaplab.schemas.measurements import AnswerRead, AnswerState, RequestRead, RequestState
 
@@ -54,9 +54,9 @@ def print_safety(found: RequestRead) -> None:
     if found.state not in _WANTED:
         return
     for line in filter(None, (found.needs, found.between_repeats, *found.expected)):
-        typer.echo(f"  {line}")
+        echo(f"  {line}")
     for warning in (*found.safety.beyond, *found.safety.unknown) if found.safety else ():
-        typer.echo(f"warning: {warning}", err=True)
+        echo(f"warning: {warning}", err=True)
 
 
 def _row(found: RequestRead) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from rich.table import Table
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.api.commands.tables import minute
 from gaplab.schemas.mistakes import sentence
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
@@ -66,9 +66,9 @@ def import_file(  # noqa: PLR0913, PLR0917 - each is an option of the command
     try:
         imported = _imported(file, chosen)
     except InvalidRobot as error:
-        typer.echo(f"gaplab: {file} cannot be imported:", err=True)
+        echo(f"gaplab: {file} cannot be imported:", err=True)
         for reason in error.reasons:
-            typer.echo(f"  - {reason}", err=True)
+            echo(f"  - {reason}", err=True)
         raise typer.Exit(Exit.INVALID) from error
     written = output or Path(f"{imported.robot.name}.json")
     if written.exists() and not force:

@@ -15,7 +15,7 @@ from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import print_json
+from gaplab.api.commands.json_output import echo, print_json
 from gaplab.api.commands.questions import keyboard
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import State
@@ -45,7 +45,7 @@ def submit(
             return
         record = submit_confirmed(client, content, yes=yes)
         if not as_json:
-            typer.echo(record.id)
+            echo(record.id)
         if watch:
             _watch(client, record.id, as_json=as_json)
     if as_json and not watch:
@@ -68,7 +68,7 @@ def _print_estimate(estimate: EstimateRead, *, as_json: bool) -> None:
         print_json(estimate)
         return
     print_json(estimate.specs[0] if len(estimate.specs) == 1 else estimate.specs)
-    typer.echo(f"{sentence(estimate)}. Nothing was submitted.", err=True)
+    echo(f"{sentence(estimate)}. Nothing was submitted.", err=True)
 
 
 @app.command(rich_help_panel=SPECS)
@@ -96,7 +96,7 @@ def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> Non
     if not as_json:
         console().print(tables.sensitivity(check))
         for warning in check.warnings:
-            typer.echo(warning)
+            echo(warning)
 
 
 def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  # noqa: ANN401 - those of `show`
@@ -109,9 +109,9 @@ def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  
     if as_json:
         print_json(record)
     else:
-        typer.echo(f"{record.name}: {state_text(record)}; {counts(record.progress)}.")
+        echo(f"{record.name}: {state_text(record)}; {counts(record.progress)}.")
     for reason in sorted({reason for experiment in experiments_of(record) for reason in experiment.reasons}):
-        typer.echo(f"  {reason}", err=True)
+        echo(f"  {reason}", err=True)
     print_warnings(record)
     if any(each.state is not State.COMPLETED for each in experiments_of(record)):
         raise typer.Exit(Exit.FAILED)

@@ -11,7 +11,7 @@ from rich.table import Table
 from gaplab.api.clients.progress.text import colored, fitness, left, percent, standing
 from gaplab.api.clients.records import Record
 from gaplab.api.commands.completion import KINDS
-from gaplab.schemas.curves import Curve, CurvePoint
+from gaplab.schemas.curves import Curve, CurvePoint, from_before
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.misfit import MisfitRead, TunableDistribution
 from gaplab.schemas.plugin import Catalogue, PluginRead
@@ -43,7 +43,8 @@ def curves(found: Sequence[Curve]) -> Table:
         (f"{count}", *(_mean(points.get((curve.experiment, count))) for curve in lines))
         for count in sorted({count for _, count in points})
     ]
-    made = table(("after", *(escape(titled(curve.name, curve.strategy)) for curve in lines)), rows)
+    after = f"after{from_before(*(curve.known for curve in lines))}"
+    made = table((after, *(escape(titled(curve.name, curve.strategy)) for curve in lines)), rows)
     made.collapse_padding, made.show_edge = True, False
     return made
 

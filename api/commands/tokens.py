@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import OTHERS, AsJson, app
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.api.commands.tables import minute, table
 from gaplab.schemas.access import Role, TokenRead
 from gaplab.services.settings import Settings
@@ -41,8 +41,8 @@ def create(
     if as_json:
         print_json({"token": made.token, "secret": made.secret})
         return
-    typer.echo(f"{made.token.id} ({made.token.name}, {role.value}); this is shown once, for GAPLAB_TOKEN:", err=True)
-    typer.echo(made.secret)
+    echo(f"{made.token.id} ({made.token.name}, {role.value}); this is shown once, for GAPLAB_TOKEN:", err=True)
+    echo(made.secret)
 
 
 @tokens.command("list")
@@ -69,7 +69,7 @@ def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="id of the token
         left = [token for token in access.list_tokens(store) if token.revoked_at is None]
     print_result({"id": id, "revoked": True}, f"Revoked {id}.", as_json=as_json)
     if not left:
-        typer.echo(NONE_LEFT, err=True)
+        echo(NONE_LEFT, err=True)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, lines_of
 from gaplab.api.commands.app import RESULTS, AsJson, ExperimentId, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import print_json
+from gaplab.api.commands.json_output import echo, print_json
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.results import SimulatorRead
 from gaplab.services.core.errors import InvalidRobot
@@ -59,15 +59,15 @@ def simulator(
     try:
         written, *distances_m = _written(id, spec, best, (output, original), partial=partial)
     except InvalidRobot as error:
-        typer.echo(f"gaplab: {output} was not written:", err=True)
+        echo(f"gaplab: {output} was not written:", err=True)
         for reason in error.reasons:
-            typer.echo(f"  - {reason}", err=True)
+            echo(f"  - {reason}", err=True)
         raise typer.Exit(Exit.INVALID) from error
     if as_json:
         print_json(_facts(output, best, written, distances_m))
     else:
         for line in _lines(output, best, written, distances_m):
-            typer.echo(line)
+            echo(line)
 
 
 def _written(
@@ -184,7 +184,7 @@ def try_tunables(
         return
     for each in tried:
         error = f"{each['error'] or nan:.3g} {each['unit']}"
-        typer.echo(f"{error} with {each['added']}, by {each['tuner']}: {each['experiment']}")
+        echo(f"{error} with {each['added']}, by {each['tuner']}: {each['experiment']}")
 
 
 def _tried(client: Client, id: str, further: Sequence[str]) -> Iterator[dict[str, Any]]:
@@ -202,7 +202,7 @@ def _tried(client: Client, id: str, further: Sequence[str]) -> Iterator[dict[str
         try:
             sent.append((added, tuner, client.submission.send(again | asked | by, confirm_cost=True).id))
         except ServiceError as refused:
-            typer.echo(f"{added} is not tried: {lines_of(refused.problem)[0]}", err=True)
+            echo(f"{added} is not tried: {lines_of(refused.problem)[0]}", err=True)
     for added, tuner, made in sent:
         client.wait(made)
         found = client.misfit(made)

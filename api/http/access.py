@@ -1,6 +1,6 @@
 """Access control: a request is authenticated before any other code sees it.
 
-A request that lasts, like a stream, is authenticated again and again.
+A request that reads and lasts, like a stream, is authenticated again and again.
 
 Methods that only read need a reader's token, all others a runner's. The method alone decides, so that no new route can
 forget it; the exception is a POST that only asks.
@@ -65,7 +65,10 @@ class Access:
             if not (isinstance(error, StoreUnavailable) and path == WITHOUT_A_STORE):
                 await problems.of_gaplab(request, error)(scope, receive, send)
                 return
-        await self._serve(request, receive, send)
+        if request.method in READING:
+            await self._serve(request, receive, send)
+        else:  # a write under way is finished, and answered by its result
+            await self.app(scope, receive, send)
 
     async def _serve(self, request: Request, receive: Receive, send: Send) -> None:
         """Serve a request for as long as its caller has access; then an answer that has begun is broken off."""

@@ -13,7 +13,6 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, Response
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
 
 from gaplab.api.http.security_headers import page
 from gaplab.api.http.violations import MOST_ERRORS, explain, finite, without_consequences
@@ -38,6 +37,7 @@ from gaplab.services.core.errors import (
     Unauthenticated,
     Violation,
 )
+from gaplab.services.core.nesting import MOST_LEVELS
 from gaplab.services.specs.blame import is_external, raised
 from gaplab.services.store.texts import brief
 
@@ -48,7 +48,7 @@ MEDIA_TYPE = "application/problem+json"
 
 KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     InvalidSpec: (422, "invalid-spec", "The spec is invalid"),
-    CostUnconfirmed: (422, "cost-unconfirmed", "The cost needs a confirmation"),
+    CostUnconfirmed: (422, "cost-unconfirmed", "This needs a confirmation"),
     InvalidRobotFile: (422, "invalid-robot-file", "The robot file is invalid"),
     NotFound: (404, "not-found", "Not found"),
     Conflict: (409, "conflict", "The present state forbids this"),
@@ -76,7 +76,7 @@ FRAMEWORK: dict[int, tuple[int, str, str]] = {
 }
 
 DETAILS: dict[int, str] = {
-    400: "The body cannot be parsed as JSON in UTF-8.",
+    400: f"The body cannot be parsed as JSON in UTF-8, nested at most {MOST_LEVELS} levels deep.",
     404: "There is nothing at {path}; /docs lists all addresses.",
     405: "{method} is not allowed at {path}.",
 }
@@ -89,7 +89,6 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(GaplabError, of_gaplab)
     app.add_exception_handler(RequestValidationError, _of_validation)
     app.add_exception_handler(HTTPException, _of_framework)
-    app.add_exception_handler(ClientDisconnect, _of_absent_client)
     app.add_exception_handler(Exception, _of_bug)
 
 
@@ -188,11 +187,6 @@ def _of_framework(request: Request, error: Exception) -> Response:
     template = DETAILS.get(error.status_code, str(error.detail).replace("{", "{{").replace("}", "}}"))
     detail = template.format(path=finite(request.url.path), method=request.method)
     return _shown(request, problem(*kind, detail), dict(error.headers or {}))
-
-
-def _of_absent_client(request: Request, error: Exception) -> Response:  # noqa: ARG001 - a handler's signature
-    """Return what the client no longer receives; that it left in the middle of its request is no incident."""
-    return response(problem(*FRAMEWORK[400], "The request ended before its body did."))
 
 
 def _of_bug(request: Request, error: Exception) -> Response:

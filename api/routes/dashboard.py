@@ -2,7 +2,6 @@
 
 import json
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
@@ -15,14 +14,15 @@ from gaplab.services.figures.words import PROPER
 
 FILES: Final = Path(__file__).parents[1] / "dashboard"
 SCRIPT: Final = "app.js"
+PLOTLY: Final = FILES.parents[1] / "services" / "figures" / "plotly" / "library"
 
 
 def install(app: FastAPI) -> None:
-    """Serve the page, its modules, and Plotly from its installed package."""
+    """Serve the page, its modules, and Plotly."""
     app.add_api_route("/", _index, include_in_schema=False)
     app.mount("/assets/dashboard", Assets(directory=FILES), name="dashboard")
     app.mount("/assets/{version}/dashboard", Assets(directory=FILES), name="versioned_dashboard")
-    app.mount("/assets/plotly", Assets(packages=[("plotly", "package_data")]), name="plotly")
+    app.mount("/assets/plotly", Assets(directory=PLOTLY), name="plotly")
 
 
 def _index() -> HTMLResponse:
@@ -38,6 +38,6 @@ def _html() -> str:
         for view in sorted(FILES.glob("views/*.js"))
     }
     preloads = "\n".join(f'  <link rel="modulepreload" href="assets/dashboard/{path}">' for path in always[1:])
-    html = (FILES / "index.html").read_text(encoding="utf-8").replace("{plotly}", version("plotly"))
+    html = (FILES / "index.html").read_text(encoding="utf-8").replace("{plotly}", version_of(PLOTLY))
     html = html.replace("{names}", json.dumps(PROPER)).replace("{modules}", json.dumps(views))
     return html.replace("  <!-- preloads -->", preloads)

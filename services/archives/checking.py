@@ -19,9 +19,14 @@ from pydantic import (
     create_model,
 )
 
+from gaplab.schemas.base import Count, Priority
+from gaplab.schemas.measurements import MOST_VALUES, Safety, Table
 from gaplab.schemas.mistakes import sentence
+from gaplab.schemas.provenance import Provenance
+from gaplab.schemas.traces import Hash, TraceRead
 from gaplab.services.archives.columns import ADDED, EXPERIMENT, Row, columns_of
-from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.core.errors import InvalidArchive, InvalidSpec
+from gaplab.services.core.nesting import refuse_too_deep
 from gaplab.services.store.tables import Column, Kind
 
 LONGEST_LINE = 8 * 2**20
@@ -32,11 +37,24 @@ GREATEST, GREATEST_LARGE = 2**30, 2**48
 
 _ID = r"^[A-Za-z0-9]{1,64}$"
 _IDS = {"id", "study_id", "experiment_id", EXPERIMENT}
-_MAY_BE_NEGATIVE = {"precedence"}
+
+_AS_READ: dict[tuple[str, str], Any] = {
+    ("experiment", "precedence"): Priority,
+    ("experiment", "max_parallel"): Annotated[Count, Field(le=10_000)],
+    ("provenance", "facts"): Provenance,
+    ("request", "safety"): Safety,
+    ("answer", "values"): Annotated[list[FiniteFloat], Field(min_length=1, max_length=MOST_VALUES)],
+    ("answer", "readings"): tuple[Table, ...],
+    ("answer", "attachments"): tuple[Hash, ...],
+    ("answer", "traces"): tuple[TraceRead, ...],
+    ("answer", "doubts"): tuple[str, ...],
+    ("branch", "steps"): tuple[dict[str, object], ...],
+}
+"""What later reads a column, if the database permits more. `consistency` checks specs, which may lack parameters."""
 
 _Moment = Annotated[
     AwareDatetime,
-    Field(strict=False, ge=datetime(1970, 1, 1, tzinfo=UTC), lt=datetime(9000, 1, 1, tzinfo=UTC)),
+    Field(ge=datetime(1970, 1, 1, tzinfo=UTC), lt=datetime(9000, 1, 1, tzinfo=UTC)),
     AfterValidator(lambda moment: moment.astimezone(UTC)),
 ]
 _TYPES: dict[Kind, Any] = {
@@ -61,6 +79,7 @@ def checked(table: str, file: Path, count: int) -> Iterator[Row]:
         InvalidArchive: a row or the number of rows is invalid; the message names the first invalid row and column.
     """
     model, number = _model(table), 0
+    nested = [column.name for column in columns_of(table) if column.kind is Kind.NESTED]
     with file.open(encoding="ascii", errors="surrogateescape") as lines:
         for number, line in enumerate(_lines(lines, table), 1):
             if number > count:
@@ -70,10 +89,10 @@ def checked(table: str, file: Path, count: int) -> Iterator[Row]:
             if unknown := sorted(set(row) - set(model.model_fields)):
                 _refuse(place, f"has columns that this version of gaplab does not know: {', '.join(unknown)[:200]}")
             try:
-                found = model.model_validate(row)
+                found = model.model_validate_json(line)
             except ValidationError as error:
                 _refuse(f"{place},", first_error(error))
-            yield dict(found)
+            yield dict(found) | {name: row.get(name) for name in nested}
     if number != count:
         _refuse(table, f"has {number} rows; the manifest states {count}")
 
@@ -96,6 +115,9 @@ def _row(line: str, place: str) -> Row:
         row = json.loads(line)
         text = json.dumps(row, ensure_ascii=False, allow_nan=False)  # fails for nan and infinity
         text.encode()  # fails for half of a surrogate pair
+        refuse_too_deep(row)
+    except InvalidSpec as error:
+        _refuse(f"{place},", str(error)[:300])
     except (ValueError, RecursionError):
         _refuse(place, "is not JSON in ASCII, or has a number or a text that cannot be stored")
     if not isinstance(row, dict) or "\\u0000" in text:
@@ -108,16 +130,16 @@ def _model(table: str) -> type[BaseModel]:
     """Return the pydantic model of a row: every column is required but those added later, others are not permitted."""
     added = ADDED.get(table, frozenset())
     fields: dict[str, Any] = {
-        column.name: (_type(column) | None if column.nullable else _type(column), None if column.name in added else ...)
+        column.name: (type_ | None if column.nullable else type_, None if column.name in added else ...)
         for column in columns_of(table)
+        for type_ in [_AS_READ.get((table, column.name)) or _type(column)]
     }
     return create_model(table, __config__=ConfigDict(extra="forbid", strict=True), **fields)
 
 
 def _type(column: Column) -> Any:  # noqa: ANN401 - a type, as pydantic takes it
     if column.kind is Kind.WHOLE:
-        greatest = GREATEST_LARGE if column.large else GREATEST
-        return Annotated[int, Field(ge=-greatest if column.name in _MAY_BE_NEGATIVE else 0, le=greatest)]
+        return Annotated[int, Field(ge=0, le=GREATEST_LARGE if column.large else GREATEST)]
     if column.choices:
         return Literal[column.choices]
     if column.kind is Kind.TEXT:

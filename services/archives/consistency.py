@@ -1,6 +1,6 @@
 """Checks that the rows of an archive belong together, and that this installation can show its experiments."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from pydantic import ValidationError
 
@@ -11,16 +11,19 @@ from gaplab.schemas.spec import Schedule
 from gaplab.services.archives.columns import EXPERIMENT, REPETITION, Row
 from gaplab.services.archives.opening import OpenedArchive
 from gaplab.services.core import robot_library
-from gaplab.services.core.errors import InvalidArchive, InvalidSpec
+from gaplab.services.core.errors import InvalidArchive, InvalidSpec, Violation
+from gaplab.services.core.measured_values import genome_violations, readings_violations
 from gaplab.services.core.robot_files import read_robot_file
 from gaplab.services.core.robot_library import IMPORTED, label_of
 from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.core.types import Probed
 from gaplab.services.specs.resolution import takes_samples
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries import attachments, attempts, logs, provenance
 from gaplab.services.store.queries.experiments import get_experiments, repetitions_of
@@ -32,7 +35,7 @@ MOST_EXPERIMENTS = 1_000
 
 
 def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
-    """Return the rows of the experiments by their ids in the archive, with checked specs.
+    """Return the rows of the experiments by their ids in the archive, with checked specs, and the robot of a bench.
 
     Raises:
         InvalidArchive: a spec is invalid, or the archive has other experiments than its manifest states.
@@ -42,7 +45,8 @@ def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
     for row in opened.rows("experiment"):
         if len(experiments) == MOST_EXPERIMENTS:
             raise InvalidArchive(f"it has more than {MOST_EXPERIMENTS} experiments")
-        experiments[row["id"]] = row | {"spec": _checked_spec(row)}
+        spec = _checked_spec(row)
+        experiments[row["id"]] = row | {"spec": spec, "robot": _on_a_bench(row["id"], spec)}
     study = manifest.id if manifest.kind == "study" else None
     studies = [row["id"] for row in opened.rows("study")]
     if studies != ([study] if study else []) or {row["study_id"] for row in experiments.values()} - {study}:
@@ -78,8 +82,6 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
     if table == "provenance":
         _check_provenance(row)
         return
-    if table == "answer" and not _is_list_of_texts(row["attachments"]):
-        raise InvalidArchive(f"the attachments of answer {row['id']!r} are no list of hashes")
     owner = experiments.get(owner_of(table, row))
     number = row.get(REPETITION, row["number"] if table == "repetition" else 0)
     iteration = row.get("iteration", row["number"] if table == "iteration" else 0)
@@ -90,6 +92,28 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
         or (table == "simulator" and len(row["parameters"]) != len(owner["spec"]["tunables"]))
     ):
         raise InvalidArchive(f"a row of {table} does not fit its experiment: {str(row)[:200]}")
+    if owner["robot"] is not None and (wrong := [*_moves_it_wrongly(table, row, owner["robot"])]):
+        raise InvalidArchive(f"a row of {table} does not fit its robot: {str(row)[:200]}: {InvalidSpec(wrong)}"[:600])
+
+
+def _on_a_bench(id_: str, spec: Row) -> Robot | None:
+    """Return the robot of an experiment on a bench; None if its reality is simulated."""
+    try:
+        return robot_of(spec_of(spec)) if spec["reality"]["kind"] == "physical" else None
+    except InvalidSpec as error:
+        raise InvalidArchive(f"the robot of experiment {id_!r} cannot be used here: {error}"[:600]) from error
+
+
+def _moves_it_wrongly(table: str, row: Row, robot: Robot) -> Iterator[Violation]:
+    """Yield what could not have been sent to the robot, or measured of it."""
+    for name in ("genome", "selected_genome", "transferred_genome"):
+        if row.get(name) is not None:
+            yield from genome_violations(row[name], robot.label, robot.space)
+    if table == "answer":
+        if row["readings"] is not None:
+            yield from readings_violations(row["readings"], row["values"] and len(row["values"]), robot.sensors)
+        if {each["attachment"] for each in row["traces"] or ()} - {*(row["attachments"] or ())}:
+            yield Violation("/traces", None, "each trace must be among the attachments of its answer")
 
 
 def owner_of(table: str, row: Row) -> str:
@@ -124,16 +148,8 @@ def _check_tags(table: str, row: Row) -> None:
         raise InvalidArchive(f"the tags of {table} {row['id']!r} are not as this service stores them")
 
 
-def _is_list_of_texts(value: object) -> bool:
-    return value is None or (isinstance(value, list) and all(isinstance(each, str) for each in value))
-
-
 def _check_provenance(row: Row) -> None:
-    try:
-        facts = Provenance.model_validate(row["facts"])
-    except ValidationError as error:
-        raise InvalidArchive(f"the facts of provenance {row['id']!r} are invalid") from error
-    if provenance.id_of(facts) != row["id"]:
+    if provenance.id_of(Provenance.model_validate(row["facts"])) != row["id"]:
         raise InvalidArchive(f"the facts of provenance {row['id']!r} belong to another id")
 
 

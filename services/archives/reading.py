@@ -3,10 +3,13 @@
 It is checked in a private database first, and then copied: SQLite has one writer, so the copy must be quick.
 
 An experiment that had not ended is CANCELLED on arrival, since its archive hides the parameters of reality. Where
-reality is a robot on a bench nothing is hidden, so it goes on. One that had ended arrives unchanged, to the last bit.
+reality is a robot on a bench nothing is hidden: it is admitted like a submission, arrives PAUSED, and goes on when a
+person resumes it. What it asked the robot for is withdrawn, and computed and forecast again here. An experiment that
+had ended arrives unchanged, to the last bit, but without forecasts.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -20,19 +23,24 @@ from gaplab.schemas.archives import ImportRead
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.measurements import RequestState
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, Row, columns_of
 from gaplab.services.archives.consistency import check_attachments, check_logs, check_row, checked_experiments, owner_of
 from gaplab.services.archives.opening import OpenedArchive, ParquetConverter, convert_apart, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import settle
-from gaplab.services.settings import Limits
-from gaplab.services.specs.rollouts import hardware_of
+from gaplab.services.experiments.submission import admit
+from gaplab.services.settings import Limits, variable_of
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.specs.rollouts import expected_rollouts, hardware_of
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import new_id
+from gaplab.services.store.queries.request_states import PENDING
 from gaplab.services.store.session import Session, Store, private_store
 
 _REQUEST_IDS = {"id", "request_id", "same_as", "replaces"}
@@ -65,18 +73,21 @@ class CheckedArchive:
 
 
 def import_archive(
-    store: Store, file: IO[bytes], *, most_rows: int | None = None, convert: ParquetConverter = convert_apart
+    store: Store, file: IO[bytes], admitted: Admission = FREELY, *, convert: ParquetConverter = convert_apart
 ) -> ImportRead:
     """Store the content of an archive under its own ids; ids that are taken are replaced.
 
     Args:
         store: database at the latest revision.
         file: seekable file, at its beginning.
-        most_rows: most rows of all tables together; left out: the default of the setting.
+        admitted: the sender and its limits; left out: those of rows and of the size of a spec, by default.
         convert: reads Parquet.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, too large or not an archive; nothing was stored.
+        InvalidSpec: what had not ended could not be submitted here.
+        CostUnconfirmed: its cost is above the limit, and the request does not confirm it.
+        LimitReached: too much work is in progress.
         Conflict: too many archives are being imported at the moment.
     """
     if not _SLOTS.acquire(blocking=False):
@@ -84,8 +95,9 @@ def import_archive(
     try:
         with store.reading() as session:
             now = moment(session)
-        with checked_archive(file, now, most_rows=most_rows, convert=convert) as checked:
-            return store.write(_copy, checked)
+        limits = admitted.limits or Limits()
+        with checked_archive(file, now, most_rows=limits.imported_rows, convert=convert) as checked:
+            return store.write(_copy, checked, _work_left(checked.experiments, limits), admitted)
     finally:
         _SLOTS.release()
 
@@ -122,8 +134,20 @@ def _check(session: Session, private: Store, opened: OpenedArchive, now: datetim
     return CheckedArchive(private, study, experiments, opened.attachments)
 
 
-def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
+def _work_left(experiments: Mapping[str, Row], limits: Limits) -> list[ResolvedSpec]:
+    """Return the specs of what goes on here, which could be submitted here; refuse one that is too long."""
+    most = 2 * limits.body_bytes  # a resolved spec may be twice as long as what was sent
+    for id_, row in experiments.items():
+        if (size := len(json.dumps(row["spec"], separators=(",", ":")))) > most:
+            permitted = f"{most:,} are permitted, twice {variable_of('body_bytes')}"
+            raise InvalidArchive(f"the spec of experiment {id_!r} has {size:,} bytes; {permitted}")
+    return [resolve_experiment(spec_of(row["spec"])) for row in experiments.values() if _goes_on(row)]
+
+
+def _copy(session: Session, checked: CheckedArchive, left: Sequence[ResolvedSpec], admitted: Admission) -> ImportRead:
     """Copy the rows of the private database into the service's, and begin the life of the experiments there."""
+    if left:
+        admit(session, left, admitted)
     studies = {checked.study} if checked.study else set()
     taken_studies = archives.taken_ids(session, StudyRow, studies)
     renamed = {old: new_id() for old in studies & taken_studies}
@@ -132,8 +156,9 @@ def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
     with checked.store.reading() as source:
         for table in EXPORTED:
             owners = [*studies] if table == "study" else list(ids)
+            sent = {"token_id": admitted.token} if table == "experiment" else {}
             rows = archives.read_rows(source, table, [column.name for column in columns_of(table)], owners)
-            _insert(session, table, (_renamed(checked, table, row, renamed, ids) for row in rows))
+            _insert(session, table, (_renamed(checked, table, row, renamed, ids) | sent for row in rows))
     archives.forget_deletions(session, [*studies - taken_studies, *ids.values()])
     for id_ in ids.values():
         note(session, EventKind.IMPORTED, id_)
@@ -143,7 +168,7 @@ def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
         experiments=tuple(ids.values()),
         renamed=renamed | {old: new for old, new in ids.items() if old != new},
         called_off=tuple(
-            ids[old] for old, row in checked.experiments.items() if not (State(row["state"]).ended or _is_physical(row))
+            ids[old] for old, row in checked.experiments.items() if not (State(row["state"]).ended or _goes_on(row))
         ),
     )
 
@@ -163,20 +188,20 @@ def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetim
         row["spec"] = experiments[row["id"]]["spec"]
     if table == "attachment":
         row["content"] = b""
-    goes_on = table not in _OF_NO_EXPERIMENT and _is_physical(experiments[owner_of(table, row)])
+    goes_on = table not in _OF_NO_EXPERIMENT and _goes_on(experiments[owner_of(table, row)])
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:
-        is_paused = row["state"] in {State.PAUSING, State.PAUSED}
-        resting = {"state": State.PAUSED if is_paused else State.QUEUED}  # none is claimed, and what waited asks again
+        resting = {"state": State.PAUSED if table == "experiment" else State.QUEUED}
         row |= resting if goes_on else {"state": State.CANCELLED, "ended_at": now}
     if table == "attempt" and row["ended_at"] is None:
         row |= {"ending": Ending.HANDED_BACK if goes_on else Ending.CANCELLED, "ended_at": now}
-    if table == "request" and row["state"] == RequestState.TAKEN:
-        row |= {"state": RequestState.OPEN}
+    if table == "request":
+        row |= {"safety": None}
+        row |= {"state": RequestState.WITHDRAWN, "ended_at": now} if row["state"] in PENDING else {}
     return row
 
 
-def _is_physical(experiment: Row) -> bool:
-    return bool(experiment["spec"]["reality"]["kind"] == "physical")
+def _goes_on(experiment: Row) -> bool:
+    return experiment["robot"] is not None and not State(experiment["state"]).ended
 
 
 def _renamed(
@@ -190,7 +215,9 @@ def _renamed(
     if table == "experiment":
         study = row["study_id"]
         row |= {"id": experiments[row["id"]], "study_id": studies.get(study, study)}
-        row["hardware"] = hardware_of(spec_of(row["spec"]))
+        spec, ended = spec_of(row["spec"]), State(row["state"]).ended
+        row |= {"hardware": hardware_of(spec), "paused_because": None if ended else "it was imported"}
+        row |= {} if ended else {"rollouts": expected_rollouts(spec)}
     for name in {EXPERIMENT, "experiment_id"} & set(row):
         before, row[name] = row[name], experiments[row[name]]
         if table in {"request", "answer"} and before != row[name]:

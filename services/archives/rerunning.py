@@ -8,8 +8,10 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import groupby
 from math import inf
 from multiprocessing import get_context
+from multiprocessing.util import Finalize
 from time import time
 from typing import IO, Any
 
@@ -22,6 +24,7 @@ from gaplab.services.core import robot_library
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins import folders
+from gaplab.services.plugins.external import imported_files
 from gaplab.services.running import provenance
 from gaplab.services.running.versions import provenance as provenance_here
 from gaplab.services.specs.shortening import experiment_spec, study_spec
@@ -124,27 +127,34 @@ def rerun_all(recorded: Sequence[Recorded], cores: int | None) -> Iterator[Repet
 
     A process that dies is the reason why its repetition is not computed, and ends no other one. A pool breaks with any
     of its processes, so the first repetition without a result is tried alone, and those after it in another pool.
+    Repetitions with other external plug-ins have other processes.
     """
-    left = deque(recorded)
-    while left:
-        with _pool(cores) as processes, suppress(BrokenProcessPool):
-            for result in processes.map(rerun, tuple(left)):
-                left.popleft()
-                yield result
-        if left:
-            yield _rerun_alone(left.popleft())
+    for plugins, some in groupby(recorded, lambda each: imported_files(each.spec)):
+        left = deque(some)
+        while left:
+            with _pool(cores, plugins) as processes, suppress(BrokenProcessPool):
+                for result in processes.map(rerun, tuple(left)):
+                    left.popleft()
+                    yield result
+            if left:
+                yield _rerun_alone(left.popleft(), plugins)
 
 
-def _rerun_alone(recorded: Recorded) -> RepetitionRerun:
+def _rerun_alone(recorded: Recorded, plugins: tuple[str, ...]) -> RepetitionRerun:
     try:
-        with _pool(1) as process:
+        with _pool(1, plugins) as process:
             return process.submit(rerun, recorded).result()
     except BrokenProcessPool:
         return result_of(recorded, "not computed", 0, "its process died: it was killed, or ran out of memory")
 
 
-def _pool(cores: int | None) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(cores, get_context("spawn"), folders.load)
+def _pool(cores: int | None, plugins: tuple[str, ...]) -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(cores, get_context("spawn"), _begin, (plugins,))
+
+
+def _begin(plugins: tuple[str, ...]) -> None:
+    folders.use(plugins)
+    Finalize(None, os._exit, (0,), exitpriority=0)  # no thread of a plug-in keeps the process
 
 
 def _recorded(session: Session, checked: CheckedArchive, part: Part) -> Iterator[Recorded]:

@@ -12,7 +12,6 @@ from gaplab.schemas.measurements import (
 from gaplab.schemas.traces import TraceRead, TracesRead
 from gaplab.services.bench.checking import check_attachments, check_values
 from gaplab.services.bench.doubts import doubts
-from gaplab.services.bench.taking import locked
 from gaplab.services.bench.views import view_answer
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.stored_specs import spec_of
@@ -66,12 +65,10 @@ def _answer(
     if traces is not None and traces.doubts and not spec.confirmed:
         raise Conflict(f"{'; '.join(traces.doubts)}. Look at the traces; if they are right, send `confirmed` with them")
     spec = spec if traces is None else _with_values(spec, traces)
-    row, repetition = locked(session, id_)
+    row, repetition = requests.locked(session, id_)
     experiment = session.get_one(ExperimentRow, repetition.experiment_id)
     check_values(spec_of(experiment.spec), spec.values, spec.readings, spec.unit)
     check_attachments(session, spec.attachments)
-    requests.expire(session, RequestRow.id == row.id)
-    session.refresh(row)
     answered = row.state in requests.ANSWERED
     counted = requests.counted_answer(session, row) if answered else None
     if row.state is RequestState.WITHDRAWN or (answered and counted is None):
@@ -80,7 +77,8 @@ def _answer(
     if counted is not None and _says_nothing_new(counted, spec):
         counted.doubts = None if spec.confirmed else counted.doubts
         return view_answer(counted)
-    counts = counted is None and (row.state is not RequestState.TAKEN or spec.take == row.takes)
+    latest = (spec.take or row.takes) >= row.takes if row.state is not RequestState.TAKEN else spec.take == row.takes
+    counts = counted is None and latest
     given = insert_answer(session, row, spec, AnswerState.COUNTED if counts else AnswerState.CONFLICT, token)
     if traces is not None:
         kept = set(TraceRead.model_fields)
@@ -122,9 +120,10 @@ def insert_answer(
 
 
 def settle_request(session: Session, row: RequestRow, given: AnswerRow) -> None:
-    """End a request with the answer that counts."""
+    """End a request with the answer that counts. If it is of another, the holder has the bench until he lets go."""
     to = RequestState.MEASURED if given.values is not None else RequestState.FAILED
-    become(session, row, to, held=None, unanswered=0, taken_until=None, ended_at=moment(session))
+    held = None if given.take == row.takes else row.held
+    become(session, row, to, held=held, unanswered=0, ended_at=moment(session))
 
 
 def note_answer(

@@ -15,7 +15,6 @@ from gaplab.services.bench.answering import insert_answer, note_answer, settle_r
 from gaplab.services.bench.checking import check_values
 from gaplab.services.bench.consequences import consequences, nothing_follows, recorded
 from gaplab.services.bench.rewriting import apply, ask_again
-from gaplab.services.bench.taking import locked
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.idempotency import Once, once
@@ -86,7 +85,7 @@ def decide(
 
 
 def _correct(session: Session, id_: str, spec: CorrectionSpec, token: str | None) -> Consequences:
-    row, request, repetition = _counted(session, id_, locked)
+    row, request, repetition = _counted(session, id_, requests.locked)
     spec = _with_readings(spec, row)
     _check(session, repetition, spec)
     found = consequences(session, request, repetition, "correct")
@@ -101,7 +100,7 @@ def _correct(session: Session, id_: str, spec: CorrectionSpec, token: str | None
 
 
 def _void(session: Session, id_: str, spec: VoidSpec) -> Consequences:
-    row, request, repetition = _counted(session, id_, locked)
+    row, request, repetition = _counted(session, id_, requests.locked)
     found = consequences(session, request, repetition, "void")
     judge(session, row, AnswerState.VOID, spec.reason)
     note_answer(session, EventKind.VOIDED, request, repetition, row, spec.operator)
@@ -116,7 +115,7 @@ def _void(session: Session, id_: str, spec: VoidSpec) -> Consequences:
 
 def _decide(session: Session, id_: str, spec: ConflictSpec) -> Consequences:
     row = requests.get_answer(session, id_)
-    request, repetition = locked(session, row.request_id)
+    request, repetition = requests.locked(session, row.request_id)
     session.refresh(row)
     found = _decided(session, row, request, repetition, spec)
     if row.state is AnswerState.COUNTED:

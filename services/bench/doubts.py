@@ -7,13 +7,20 @@ Source: gaplab.
 """
 
 from collections.abc import Iterator, Sequence
+from datetime import timedelta
 from statistics import median
 
-from gaplab.schemas.measurements import DoubtsRead, MeasurementSpec
-from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, RequestRow
+from sqlalchemy import select
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.measurements import AnswerState, DoubtsRead, MeasurementSpec, RequestState
+from gaplab.services.store.clock import moment
+from gaplab.services.store.models import AnswerRow, IterationRow, MeasurementRow, RepetitionRow, RequestRow
+from gaplab.services.store.queries.benches import spellings
 from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.queries.requests import get
+from gaplab.services.store.queries.requests import get, note_take
 from gaplab.services.store.session import Session, snapshot
+from gaplab.services.store.statements import storable
 
 OF_REPEATS = 10.0
 """How many times the median of the other repeats a value is, from which it is doubtful."""
@@ -47,6 +54,27 @@ def doubts(
     if values is None:
         return ()
     return (*_beside_repeats(values), *_beside_known(values, _largest_known(session, repetition, request)))
+
+
+def doubt_others(session: Session, request: RequestRow, take: int, moved_s: float, by: str) -> None:
+    """Let nothing count by itself that others measured of a bench in the last `moved_s`: this take moved its robot too.
+
+    Answers that count are doubtful. Takes end: answers of theirs are in conflict, and the bench is free once the holder
+    is silent.
+    """
+    why = storable(f"{by} had the robot too, and may have moved it")
+    since = moment(session) - timedelta(seconds=moved_s)
+    row, answer, of_bench = RequestRow, AnswerRow, RequestRow.bench.in_(spellings(session, request.bench))
+    taken = session.scalars(select(row).where(of_bench, row.state == RequestState.TAKEN).with_for_update()).all()
+    given = select(answer).join(row, row.id == answer.request_id).where(of_bench, answer.at >= since)
+    counted = session.scalars(given.where(answer.state == AnswerState.COUNTED, answer.failed.is_(None))).all()
+    others = [each for each in counted if (each.request_id, each.take) != (request.id, take)]
+    for measured in others:
+        measured.doubts = [*(measured.doubts or ()), why]
+    for each in taken:
+        note_take(session, each, EventKind.RELEASED, by=storable(by), reason=why)
+    for each in {request, *taken} if others or taken else ():
+        each.takes += 1  # fences the answers of earlier ones
 
 
 def _beside_repeats(values: Sequence[float]) -> Iterator[str]:

@@ -1,7 +1,5 @@
 """The motion of a controller as files that a robot's own software reads."""
 
-import csv
-import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -12,6 +10,7 @@ import yaml
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.controllers.actuation import middles
+from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.motions import Loop, Motion, open_loop
 from gaplab.services.core.robots.base import Robot
@@ -124,11 +123,8 @@ def _plain(motion: Motion, world: World) -> dict[str, Any]:
 
 def _csv(motion: Motion, world: World) -> str:
     """Return a line for the rest before time 0, one for each change of targets, and a last one at the end."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["time_s", *(f"{joint.name} ({_unit_of(joint)})" for joint in world.actuators)])
-    writer.writerows([time, *targets] for time, targets in _points(motion, world))
-    return text.getvalue()
+    header = ["time_s", *(f"{joint.name} ({_unit_of(joint)})" for joint in world.actuators)]
+    return csv_text(header, ([time, *targets] for time, targets in _points(motion, world)))
 
 
 def _ros2(motion: Motion, world: World) -> str:

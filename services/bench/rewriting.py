@@ -15,6 +15,7 @@ from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.running.waiting import step_of
 from gaplab.services.specs.measured import samples_of
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import (
     AnswerRow,
     ExperimentRow,
@@ -86,11 +87,14 @@ def _waits_for_nothing(session: Session, repetition: RepetitionRow) -> bool:
 def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) -> None:
     """Open a request again whose answer is void."""
     session.refresh(repetition)
+    spec = spec_of(session.get_one(ExperimentRow, repetition.experiment_id).spec)
     if repetition.state in (State.FAILED, State.CANCELLED):
         become(session, request, RequestState.WITHDRAWN)
+    elif request.safety is None and robot_of(spec).world.bodies:  # it was imported; a worker asks with a forecast
+        become(session, request, RequestState.WITHDRAWN)
+        move(session, RepetitionRow, RepetitionRow.id == repetition.id, State.QUEUED, losses=0)
     else:
-        fresh = dict.fromkeys(("branch", "ended_at", "held", "taken_until"))
-        become(session, request, RequestState.OPEN, unanswered=0, **fresh)
+        become(session, request, RequestState.OPEN, unanswered=0, branch=None, ended_at=None)
         of_it = RepetitionRow.id == repetition.id
         move(session, RepetitionRow, of_it, State.QUEUED, losses=0)
         move(session, RepetitionRow, of_it, State.WAITING)

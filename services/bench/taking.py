@@ -1,9 +1,10 @@
 """Takes of requests: one holder a bench at a time, who shows signs of life. Use cases raise StoreUnavailable."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 
-from sqlalchemy import ColumnElement, exists, select, tuple_
+from sqlalchemy import ColumnElement, exists, select, tuple_, update
 from sqlalchemy.exc import IntegrityError
 
 from gaplab.schemas.events import EventKind
@@ -17,16 +18,18 @@ from gaplab.schemas.measurements import (
     TakeSpec,
 )
 from gaplab.schemas.records import Page
+from gaplab.services.bench.doubts import doubt_others
 from gaplab.services.bench.views import view_requests
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import Admission
+from gaplab.services.running.leases import Silences
 from gaplab.services.store.clock import moment
 from gaplab.services.store.cursor import decode, encode
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests
-from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.experiments import get_experiment, lock
+from gaplab.services.store.queries.benches import key_of, spellings
+from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.queries.request_states import become
 from gaplab.services.store.session import Session, Store, snapshot, transaction
 from gaplab.services.store.statements import storable
@@ -70,7 +73,7 @@ def list_requests(
         of_it = select(repetition.id).where(repetition.experiment_id == storable(wanted.experiment))
         conditions.append(row.repetition_id.in_(of_it))
     if wanted.bench is not None:
-        conditions.append(row.bench == storable(wanted.bench))
+        conditions.append(row.bench.in_(spellings(session, wanted.bench)))
     if wanted.pending:
         resting = (
             exists()
@@ -124,14 +127,13 @@ def take(store: Store, id_: str, spec: TakeSpec, admitted: Admission) -> Once[Re
 
 
 def _take(session: Session, id_: str, spec: TakeSpec) -> RequestRead:
-    row, repetition = locked(session, id_)
-    requests.expire(session, RequestRow.bench == row.bench)
-    session.refresh(row)
+    row, repetition = requests.locked(session, id_)
     state = session.scalar(select(ExperimentRow.state).where(ExperimentRow.id == repetition.experiment_id))
     if state in _AT_REST:
         raise Conflict(f"experiment {repetition.experiment_id!r} is {state}: nothing is measured until it is resumed")
     _refuse_unless_open(row)
-    holder = session.scalars(select(RequestRow).where(RequestRow.held == row.bench)).first()
+    bench = key_of(row.bench)
+    holder = session.scalars(select(RequestRow).where(RequestRow.held == bench)).first()
     if holder is not None:
         msg = f"{holder.taken_by} has taken request {holder.id} of the bench {row.bench!r}; one is taken at a time"
         raise Conflict(msg)
@@ -139,14 +141,14 @@ def _take(session: Session, id_: str, spec: TakeSpec) -> RequestRead:
         session,
         row,
         RequestState.TAKEN,
-        held=row.bench,
+        held=bench,
         takes=row.takes + 1,
         taken_by=storable(spec.operator),
         lease_s=spec.lease_s,
         taken_until=moment(session) + timedelta(seconds=spec.lease_s),
     )
-    body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by}
-    note(session, EventKind.TAKEN, repetition.experiment_id, repetition.number, **body)
+    _fence_silent(session, bench)
+    requests.note_take(session, row, EventKind.TAKEN)
     return view_requests(session, [row])[0]
 
 
@@ -158,26 +160,28 @@ def heartbeat(session: Session, id_: str, holder: HolderSpec) -> RequestRead:
         NotFound: the request does not exist.
         Conflict: the take has ended; its answer is still welcome.
     """
-    row, _ = locked(session, id_)
-    _refuse_unless_held(session, row, holder)
+    row, _ = requests.locked(session, id_)
+    _refuse_unless_held(row, holder)
     row.taken_until = moment(session) + timedelta(seconds=row.lease_s or 0.0)
-    session.flush()
     return view_requests(session, [row])[0]
 
 
 @transaction
 def release(session: Session, id_: str, spec: ReleaseSpec) -> RequestRead:
-    """End a take without an answer: the request is open again. Its event says who ended it, and why.
+    """End a take without an answer: a request that is wanted is open again. Its event says who ended it, and why.
 
     Raises:
         NotFound: the request does not exist.
-        Conflict: the take has ended already.
+        Conflict: the take has ended already, and its holder does not say that the robot moved since.
     """
-    row, _ = locked(session, id_)
-    _refuse_unless_held(session, row, spec)
-    told = {"by": spec.operator, "reason": spec.reason}
-    requests.give_up(session, row, EventKind.RELEASED, **{name: storable(each) for name, each in told.items() if each})
-    session.flush()
+    row, _ = requests.locked(session, id_)
+    if row.held is not None and row.takes == spec.take:
+        told = {"by": spec.operator, "reason": spec.reason}
+        requests.give_up(session, row, EventKind.RELEASED, **{at: storable(each) for at, each in told.items() if each})
+    elif spec.moved_s is not None:
+        doubt_others(session, row, spec.take, spec.moved_s, spec.operator or "somebody else")
+    else:
+        _refuse_unless_held(row, spec)
     return view_requests(session, [row])[0]
 
 
@@ -189,32 +193,38 @@ def reopen(session: Session, id_: str) -> RequestRead:
         NotFound: it does not exist.
         Conflict: it is not stuck.
     """
-    row, _ = locked(session, id_)
-    requests.expire(session, RequestRow.id == row.id)
+    row, _ = requests.locked(session, id_)
     if row.state is not RequestState.STUCK:
         raise Conflict(f"request {row.id} is {row.state.value}, not stuck, so it need not be opened again")
     become(session, row, RequestState.OPEN, unanswered=0)
     return view_requests(session, [row])[0]
 
 
-def open_again(store: Store) -> int:
-    """Open the requests whose take has run out, and return their number; the supervisor calls it now and then."""
-    with store.reading() as session:
-        taken = session.scalar(select(RequestRow.id).where(RequestRow.state == RequestState.TAKEN).limit(1))
-    return store.write(requests.expire) if taken else 0
+def open_again(store: Store, silences: Silences[str]) -> int:
+    """Open the requests whose holder was silent for a whole lease, and return their number.
 
-
-def locked(session: Session, id_: str) -> tuple[RequestRow, RepetitionRow]:
-    """Return a request and its repetition, both as they are; their experiment is locked first.
-
-    Raises:
-        NotFound: the request does not exist.
+    A supervisor calls it now and then, with the silences that it has seen: no clock that is set ends a take.
     """
-    row, repetition = requests.get(session, id_)
-    lock(session, [repetition.experiment_id])
-    session.refresh(row, with_for_update=True)
-    session.refresh(repetition)
-    return row, repetition
+    row = RequestRow
+    with store.reading() as session:
+        taken = session.execute(select(row.id, row.taken_until, row.lease_s).where(row.held.is_not(None)))
+        silent = silences.longer_than_leases([(id_, until, lease or 0.0) for id_, until, lease in taken if until])
+    return store.write(_expire, silent) if silent else 0
+
+
+def _expire(session: Session, silent: Sequence[tuple[str, datetime]]) -> int:
+    still = RequestRow.held.is_not(None) & tuple_(RequestRow.id, RequestRow.taken_until).in_(silent)
+    expired = session.scalars(select(RequestRow).where(still).with_for_update()).all()
+    for each in expired:
+        requests.give_up(session, each, EventKind.TAKE_EXPIRED)
+    return len(expired)
+
+
+def _fence_silent(session: Session, bench: str) -> None:
+    """Let answers of takes that ended by silence not count by themselves: their holders may drive the robot on."""
+    row = RequestRow
+    silent = (row.unanswered > 0) & row.state.in_((RequestState.OPEN, RequestState.STUCK))
+    session.execute(update(row).where(row.bench.in_(spellings(session, bench)), silent).values(takes=row.takes + 1))
 
 
 def _refuse_unless_open(row: RequestRow) -> None:
@@ -228,9 +238,7 @@ def _refuse_unless_open(row: RequestRow) -> None:
     raise Conflict(f"request {row.id} cannot be taken: {why}")
 
 
-def _refuse_unless_held(session: Session, row: RequestRow, holder: HolderSpec) -> None:
-    requests.expire(session, RequestRow.id == row.id)
-    session.refresh(row)
+def _refuse_unless_held(row: RequestRow, holder: HolderSpec) -> None:
     if row.state is not RequestState.TAKEN or row.takes != holder.take:
         ended = f"take {holder.take} of request {row.id} has ended"
         by = f"; {row.taken_by} has taken it since" if row.state is RequestState.TAKEN else f": it is {row.state.value}"

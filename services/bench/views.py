@@ -1,7 +1,6 @@
 """Requests and answers as people see them."""
 
 from collections.abc import Sequence
-from datetime import datetime
 
 from sqlalchemy import select
 
@@ -20,16 +19,16 @@ from gaplab.services.core.safety import expected
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.store.clock import moment
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests
+from gaplab.services.store.queries.benches import key_of
 from gaplab.services.store.session import Session
 
 READINGS = "The experiment tunes on readings: send a trace of the base for each repeat, or let a driver return them."
 
 
 def view_requests(session: Session, rows: Sequence[RequestRow]) -> tuple[RequestRead, ...]:
-    """Return requests with their answers; a take that has run out counts as open again."""
+    """Return requests with their answers."""
     repetition, experiment = RepetitionRow, ExperimentRow
     ids = {row.repetition_id for row in rows}
     owners = {
@@ -41,10 +40,10 @@ def view_requests(session: Session, rows: Sequence[RequestRow]) -> tuple[Request
         )
     }
     answers = requests.answers_of(session, {row.same_as or row.id for row in rows})
-    held = set(session.scalars(select(RequestRow.held).where(RequestRow.held.in_({row.bench for row in rows}))))
-    at = moment(session)
+    benches = {row.bench: key_of(row.bench) for row in rows}
+    held = set(session.scalars(select(RequestRow.held).where(RequestRow.held.in_(benches.values()))))
     return tuple(
-        _view(row, owners[row.repetition_id], answers.get(row.same_as or row.id, ()), row.bench in held, at)
+        _view(row, owners[row.repetition_id], answers.get(row.same_as or row.id, ()), benches[row.bench] in held)
         for row in rows
     )
 
@@ -54,16 +53,12 @@ def _view(
     owner: tuple[int, ExperimentRow],
     answers: Sequence[AnswerRow],
     held: bool,
-    at: datetime,
 ) -> RequestRead:
     number, experiment = owner
-    spec, state, unanswered = spec_of(experiment.spec), row.state, row.unanswered
+    spec = spec_of(experiment.spec)
     robot, safety = robot_of(spec), None if row.safety is None else Safety.model_validate(row.safety)
     needs = needs_readings(discrepancy_of(experiment.spec), robot.sensors)
-    if requests.is_expired(row, at):
-        unanswered += 1
-        state = RequestState.STUCK if unanswered >= requests.MOST_UNANSWERED else RequestState.OPEN
-    taken = state is RequestState.TAKEN
+    taken = row.state is RequestState.TAKEN
     return RequestRead(
         id=row.id,
         experiment=experiment.id,
@@ -77,9 +72,9 @@ def _view(
         bench=row.bench,
         repeats=spec.reality.repeats,
         genome=tuple(row.genome),
-        state=state,
+        state=row.state,
         takes=row.takes,
-        unanswered=unanswered,
+        unanswered=row.unanswered,
         taken_by=row.taken_by if taken else None,
         taken_until=row.taken_until if taken else None,
         busy=held and not taken,

@@ -169,7 +169,7 @@ def check_file(file: Path) -> Iterator[CheckedPlugin]:
     if path.parent in others:
         external_plugins.set_folders(others)
     else:
-        external_plugins.set_folders((path.parent, *others), only=path.name.removesuffix(".py"))
+        external_plugins.set_folders((path.parent, *others), only={path.name.removesuffix(".py")})
     found = False
     for kind, registry in REGISTRIES.items():
         own = [plugin for plugin in registry.values() if (external_plugins.file_of(plugin) or "").startswith(module)]

@@ -47,8 +47,8 @@ class Recorder(Protocol):
         """Return how many genomes to simulate in the next call, in this number of simulators; at least 1."""
         ...
 
-    def record(self, answers: Sequence[Answer], rollouts: int) -> None:
-        """Record the answers of that call, and how many rollouts it had."""
+    def record(self, answers: Sequence[Answer], rollouts: int, budget: int) -> None:
+        """Record the answers of that call, how many rollouts it had, and how many the step may have."""
         ...
 
 
@@ -79,6 +79,7 @@ class Answers:
         periods: FloatArray = NO_READINGS,
     ) -> None:
         self.periods = periods
+        self.budget = 0  # rollouts that the step was given
         self._simulate = simulate
         self._with_readings = sense
         self._batch_size = batch_size
@@ -127,20 +128,20 @@ class Answers:
         """Return whether the robot has sensors."""
         return self._with_readings is not None
 
-    def cost_of(self, budget: int) -> Cost:
-        """Return the cost of the step so far; `budget` is the number of rollouts that it was given."""
-        return Cost(self._rollouts, self._failures, budget - self._rollouts)
+    @property
+    def cost(self) -> Cost:
+        """Return the cost of the step so far."""
+        return Cost(self._rollouts, self._failures, self.budget - self._rollouts)
 
-    def cost_within(self, budget: int, source: str) -> Cost:
+    def cost_within_budget(self, source: str) -> Cost:
         """Return the same; `source` says whose budget it is.
 
         Raises:
             PluginBroken: the step took more rollouts.
         """
-        cost = self.cost_of(budget)
-        if cost.saved < 0:
-            raise PluginBroken(f"{source} took {cost.rollouts} rollouts; permitted: at most {budget}")
-        return cost
+        if self.cost.saved < 0:
+            raise PluginBroken(f"{source} took {self._rollouts} rollouts; permitted: at most {self.budget}")
+        return self.cost
 
     def _fetched(
         self, genomes: Genomes, blocks: list[Parameters], keys: list[list[bytes]], following: Following
@@ -179,7 +180,7 @@ class Answers:
             rows = compute(genomes[done : done + count], parameters)
             answers = list(zip(keys[done : done + count], rows, strict=True))
             if self._recorder:
-                self._recorder.record(answers, len(rows) * len(parameters))
+                self._recorder.record(answers, len(rows) * len(parameters), self.budget)
             yield from answers
             done += count
 

@@ -2,7 +2,7 @@
 
     GaplabError
     ├── InvalidSpec          a spec or request is invalid; has every violation with its place
-    │   ├── CostUnconfirmed      the cost is above the limit, and not confirmed
+    │   ├── CostUnconfirmed      the cost is above the limit, or a name unlikely, and not confirmed
     │   └── InvalidRobotFile     a robot file cannot be stored
     ├── NotFound             no such study, experiment or plug-in
     ├── Conflict             the current state forbids the request
@@ -36,6 +36,7 @@ Diverged physics is not an error: its fitness is nan, which never wins.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -72,10 +73,10 @@ class Violation:
 
 
 class InvalidSpec(GaplabError):
-    """A spec that cannot run, with all its violations."""
+    """A spec that cannot run, with its first hundred violations."""
 
     def __init__(self, violations: Iterable[Violation]) -> None:
-        self.violations = tuple(violations)
+        self.violations = tuple(islice(violations, 100))
         super().__init__("; ".join(f"{each.pointer or '/'}: {each.message}" for each in self.violations))
 
 
@@ -84,7 +85,7 @@ class InvalidRobotFile(InvalidSpec):
 
 
 class CostUnconfirmed(InvalidSpec):
-    """The cost is above the limit, and the request does not confirm it."""
+    """The cost is above the limit, or a name is unlikely, and the request does not confirm it."""
 
 
 class NotFound(GaplabError):

@@ -4,7 +4,7 @@ A module that cannot be imported and a class that is no valid plug-in stop nothi
 """
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module, invalidate_caches
@@ -64,29 +64,40 @@ class _Package(ModuleType):
     """The package of external plug-ins.
 
     Attributes:
-        only: name of the only module that is imported, from the first folder; None: all are imported, from all.
+        only: names of the modules that are imported, each from its first folder; None: all are imported, from all.
     """
 
-    def __init__(self, folders: tuple[Path, ...], only: str | None) -> None:
+    def __init__(self, folders: tuple[Path, ...], only: frozenset[str] | None) -> None:
         super().__init__(PACKAGE, "External plug-ins.")
         self.__path__ = [str(folder) for folder in folders]
         self.only = only
 
 
-def set_folders(folders: tuple[Path, ...], only: str | None = None) -> None:
+def set_folders(folders: tuple[Path, ...], only: Collection[str] | None = None) -> None:
     """Set the plug-in folders; their modules are imported again when they are next needed.
 
     Args:
         folders: the folders.
-        only: name of a module of the first folder; the others are imported only if this one imports them.
+        only: names of modules; the others are imported only if these import them. Left out: all are.
     """
     for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
         del sys.modules[name]
-    sys.modules[PACKAGE] = _Package(folders, only)
+    sys.modules[PACKAGE] = _Package(folders, None if only is None else frozenset(only))
     if _Finder not in sys.meta_path:
         sys.meta_path.insert(0, _Finder)
     _load.cache_clear()
     invalidate_caches()
+
+
+def import_again() -> None:
+    """Let the same modules be imported again when they are next needed."""
+    set_folders(named_folders(), chosen())
+
+
+def chosen() -> frozenset[str] | None:
+    """Return the names of the only modules that are imported, but for what they import; None if all are."""
+    found = package()
+    return found.only if isinstance(found, _Package) else None
 
 
 def package() -> ModuleType | None:
@@ -142,9 +153,10 @@ def file_of(plugin: type) -> str | None:
 def _load(package: ModuleType | None) -> Loaded:
     only = package.only if isinstance(package, _Package) else None
     modules, unusable = list[ModuleType](), list[Unusable]()
-    for name, paths in sorted(_places(only).items()):
+    for name, paths in sorted(_places().items()):
         try:
-            modules += _imported(name, paths)
+            if only is None or name in only:
+                modules += _imported(name, paths if only is None else paths[:1])
         except PluginBroken as error:
             file = f"{name}/__init__.py" if paths[0].name == "__init__.py" else f"{name}.py"
             unusable += from_file(paths[0], file, str(error))
@@ -153,14 +165,13 @@ def _load(package: ModuleType | None) -> Loaded:
     return Loaded(tuple(modules), tuple(unusable))
 
 
-def _places(only: str | None) -> dict[str, list[Path]]:
-    """Return the files of each module to import, by its name; without `only`, a name may be in several folders."""
+def _places() -> dict[str, list[Path]]:
+    """Return the files of each module by its name, which may be in several folders."""
     places: dict[str, list[Path]] = {}
-    for folder in folders() if only is None else folders()[:1]:
+    for folder in folders():
         for info in iter_modules([str(folder)]):
-            if only in {None, info.name}:
-                file = folder / info.name / "__init__.py" if info.ispkg else folder / f"{info.name}.py"
-                places.setdefault(info.name, []).append(file)
+            file = folder / info.name / "__init__.py" if info.ispkg else folder / f"{info.name}.py"
+            places.setdefault(info.name, []).append(file)
     return places
 
 

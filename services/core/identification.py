@@ -9,6 +9,7 @@ Source: gaplab.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 from gaplab.schemas.misfit import Identification, MisfitPoint, TunableDistribution, TunableVerdict
 from gaplab.services.core.misfit import OFTEN
@@ -29,6 +30,21 @@ OVERFITTED = 2.0
 """Error on held-out samples, over that on the samples tuned on, from which simulators are overfitted."""
 
 
+class Doubt(Enum):
+    """Why agreement may not be truth, in words."""
+
+    WRONG = "for no simulator reproduces the samples"
+    SOME = "for the samples raise some doubt about the model"
+    UNTESTED = "for nothing tells noise from a wrong model"
+
+
+HELPS = {
+    Doubt.WRONG: "a tunable for what the model lacks",
+    Doubt.SOME: "more samples, or a tunable for what the model lacks",
+    Doubt.UNTESTED: "repeats of a measurement, or the discrepancy readings",
+}
+
+
 @dataclass(frozen=True)
 class Means:
     """What an experiment has not used, which may help.
@@ -43,7 +59,7 @@ class Means:
 
 
 def verdicts(
-    points: Sequence[MisfitPoint], samples: Sequence[float], means: Means, *, unreproduced: bool = False
+    points: Sequence[MisfitPoint], samples: Sequence[float], means: Means, doubt: Doubt | None = None
 ) -> tuple[TunableVerdict, ...]:
     """Return the verdict on each tunable at the latest iteration; none before the first sample.
 
@@ -52,7 +68,7 @@ def verdicts(
         samples: number of samples that each was tuned on, with those from before the experiment; a mean over
             repetitions.
         means: what the experiment has not used.
-        unreproduced: whether no simulator reproduces the samples.
+        doubt: about the model; None without any.
     """
     tuned = [(point.tunables, count) for point, count in zip(points, samples, strict=True) if point.error.n]
     if not tuned:
@@ -61,7 +77,7 @@ def verdicts(
     earlier = [tunables for tunables, count in tuned if 2 * count <= most]
     halves = earlier[-1] if earlier else [None] * len(latest)
     told = tuple(_verdict(now, then, most, means) for now, then in zip(latest, halves, strict=True))
-    return tuple(map(_doubted, told)) if unreproduced else told
+    return told if doubt is None else tuple(_doubted(each, doubt) for each in told)
 
 
 def overfitting(point: MisfitPoint, unit: str) -> str:
@@ -97,12 +113,13 @@ def _verdict(
     )
 
 
-def _doubted(found: TunableVerdict) -> TunableVerdict:
-    if found.verdict not in {Identification.IDENTIFIED, Identification.PARTLY}:
+def _doubted(found: TunableVerdict, doubt: Doubt) -> TunableVerdict:
+    doubted = {Identification.IDENTIFIED, *([Identification.PARTLY] if doubt is Doubt.WRONG else [])}
+    if found.verdict not in doubted:
         return found
-    sentence = found.sentence.replace(found.verdict.value, "doubtful, for no simulator reproduces the samples", 1)
-    helps = ("a tunable for what the model lacks",)
-    return found.model_copy(update={"verdict": Identification.DOUBTFUL, "sentence": sentence, "helps": helps})
+    verdict = Identification.DOUBTFUL if doubt is Doubt.WRONG else Identification.PARTLY
+    sentence = found.sentence.replace(found.verdict.value, f"{verdict.value}, {doubt.value}", 1)
+    return found.model_copy(update={"verdict": verdict, "sentence": sentence, "helps": (HELPS[doubt],)})
 
 
 def _judged(left: float | None) -> Identification:

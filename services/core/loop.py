@@ -180,7 +180,7 @@ def _belief(setting: Setting, history: History) -> Belief:
 
 
 def _search(setting: Setting, belief: Belief, answers: Answers, given: Allowance, rng: Generator) -> ControllerSearch:
-    optimizer = setting.controller_optimizer or setting.optimizer
+    optimizer, answers.budget = setting.controller_optimizer or setting.optimizer, given.rollouts
     return ControllerSearch(setting.strategy.name, optimizer, belief, answers, given, rng)
 
 
@@ -194,7 +194,7 @@ def _select(setting: Setting, history: History, iteration: int, answers: Answers
     search = _search(setting, belief, answers, allowance, setting.stream(iteration, "search"))
     selected = strategy.select(belief, search, setting.stream(iteration, "select"))
     genome = setting.genomes.check(selected, f"strategy {strategy.name!r}")
-    return Selected(iteration, genome, answers.cost_of(allowance.rollouts))
+    return Selected(iteration, genome, answers.cost)
 
 
 def _tune(setting: Setting, history: History, iteration: int, answers: Answers) -> Tuned:
@@ -208,12 +208,12 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
         return Tuned(iteration, history.simulators)
     seen, unseen = split(history.samples, setting.held_out)
     evaluations = setting.budget.simulator_evaluations // setting.tuner.divisor(len(seen))
-    ensemble, budget = strategy.ensemble, evaluations * len(seen) + len(unseen)
+    ensemble, answers.budget = strategy.ensemble, evaluations * len(seen) + len(unseen)
     if _keeps(setting, history):
-        return Tuned(iteration, history.simulators, Cost(saved=budget))
+        return Tuned(iteration, history.simulators, answers.cost)
     samples, tests = learnable(strategy.lessons(seen)), learnable(unseen)
     if not samples:
-        return Tuned(iteration, _drawn(setting, iteration), Cost(saved=budget))
+        return Tuned(iteration, _drawn(setting, iteration), answers.cost)
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
     misfit = Misfit(answers, samples, setting.discrepancy, setting.reading_times_s)
     task = TuningTask(misfit, setting.parameters, optimizer, ensemble, evaluations, history.simulators)
@@ -224,7 +224,7 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     found = tuple(sound(simulator, setting.parameters, source) for simulator in found)
     if tests:
         found = tested(found, Misfit(answers, tests, setting.discrepancy, setting.reading_times_s))
-    cost = answers.cost_within(budget, source)  # without those of the next line
+    cost = answers.cost_within_budget(source)  # without those of the next line
     return Tuned(iteration, fitted(found, misfit, setting.parameters, setting.stream(iteration, "fit")), cost)
 
 
@@ -238,7 +238,7 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
     search = _search(setting, belief, answers, allowance, setting.stream(iteration, "transfer"))
     transferred = strategy.transfer(belief, search, setting.stream(iteration, "transfer draws"))
     genome = setting.genomes.check(transferred, f"strategy {strategy.name!r}")
-    return Transferred(iteration, genome, search.score_of(genome), answers.cost_of(allowance.rollouts))
+    return Transferred(iteration, genome, search.score_of(genome), answers.cost)
 
 
 def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -> Probed:

@@ -10,7 +10,7 @@ from gaplab.services.core.space import Space
 
 def sample_violations(sample: KnownSample, robot: Robot) -> Iterator[Violation]:
     """Yield what is wrong with a sample from before an experiment."""
-    yield from _genome_violations(sample.genome, robot.label, robot.space)
+    yield from genome_violations(sample.genome, robot.label, robot.space)
     yield from unit_violations(robot.label, sample.unit, robot.unit)
     if sample.readings is not None:
         yield from readings_violations(sample.readings, len(sample.values), robot.sensors)
@@ -47,7 +47,8 @@ def readings_violations(tables: Sequence[Table], repeats: int | None, sensors: S
                 break
 
 
-def _genome_violations(genome: Sequence[float], robot: str, space: Space) -> Iterator[Violation]:
+def genome_violations(genome: Sequence[float], robot: str, space: Space) -> Iterator[Violation]:
+    """Yield that a genome has another size than the robot's, and each gene beyond its bounds."""
     if len(genome) != space.size:
         message = f"a controller of the {robot} has {space.size} genes, not {len(genome)}"
         yield Violation("/genome", f"{len(genome)} numbers", message, f"exactly {space.size} numbers")

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gaplab.schemas.curves import from_before
 from gaplab.schemas.misfit import Distribution, MisfitPoint, TunableDistribution
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.discrepancies.base import Discrepancy
@@ -102,20 +103,21 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
     )
 
 
-def remarks(points: Sequence[MisfitPoint], unit: str, error_unit: str | None = None) -> tuple[str, ...]:
+def remarks(points: Sequence[MisfitPoint], unit: str, error_unit: str | None = None, known: int = 0) -> tuple[str, ...]:
     """Return the latest point that has an error in sentences; none before the first sample.
 
     Args:
         points: misfit of each iteration.
         unit: unit of fitness.
         error_unit: unit of errors; by default that of fitness.
+        known: number of samples from before the experiment.
     """
     with_error = [each for each in points if each.error.n]
     if not with_error:
         return ()
     last, first = with_error[-1], points[0]
     stuck = [sentence for each in last.tunables for sentence in _stuck(each)]
-    return (_remaining(last, unit if error_unit is None else error_unit), *_gaps(first, last, unit), *stuck)
+    return (_remaining(last, unit if error_unit is None else error_unit, known), *_gaps(first, last, unit), *stuck)
 
 
 def _tunable_distribution(
@@ -155,11 +157,12 @@ def _distribution(values: Sequence[float] | FloatArray) -> Distribution:
     )
 
 
-def _remaining(point: MisfitPoint, unit: str) -> str:
+def _remaining(point: MisfitPoint, unit: str, known: int) -> str:
     error = point.error
     deviation = f"SD {error.sd:.2g}, " if error.sd is not None else ""
+    counted = f"{_many(point.iteration, 'real-world evaluation')}{from_before(known)}"
     return (
-        f"at {_many(point.iteration, 'real-world evaluation')} the best simulators err by {error.mean:.2g} {unit} "
+        f"at {counted} the best simulators err by {error.mean:.2g} {unit} "
         f"a sample ({deviation}{error.least:.2g} to {error.greatest:.2g} over {_many(error.n, 'repetition')})"
     )
 

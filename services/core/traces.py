@@ -8,6 +8,7 @@ Source: gaplab.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -47,12 +48,15 @@ class Trace:
     positions_m: FloatArray
     orientations: FloatArray
 
+    @cached_property
+    def _turns(self) -> "scipy.spatial.transform.Slerp":
+        transform = scipy.spatial.transform
+        return transform.Slerp(self.times_s, transform.Rotation.from_quat(self.orientations))
+
     def at(self, times_s: FloatArray) -> Trajectory:
         """Return the poses at times `(t,)` within the trace, interpolated."""
         position = [np.interp(times_s, self.times_s, column) for column in self.positions_m.T]
-        transform = scipy.spatial.transform
-        turns = transform.Slerp(self.times_s, transform.Rotation.from_quat(self.orientations))(times_s)
-        return Trajectory(times_s, np.stack(position, axis=-1), turns.as_quat())
+        return Trajectory(times_s, np.stack(position, axis=-1), self._turns(times_s).as_quat())
 
 
 @dataclass(frozen=True)

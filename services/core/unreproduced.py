@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.misfit import OFTEN, Tuning
-from gaplab.services.core.misspecification import SURPRISING
+from gaplab.services.core.identification import Doubt
+from gaplab.services.core.misfit import Tuning
+from gaplab.services.core.misspecification import CREDIBLE, SURPRISING
 from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.types import Fit
 
@@ -21,20 +22,35 @@ SHOWN = 2
 """Sensors that are named, those with the largest differences."""
 
 
+def surprise(tunings: Sequence[Tuning]) -> float | None:
+    """Return the surprise that at least half of the repetitions that know theirs reach; None if none knows."""
+    known = sorted(each.fit.surprise for each in tunings if each.fit is not None)
+    return known[(len(known) - 1) // 2] if known else None
+
+
+def doubt(tunings: Sequence[Tuning], *, simulated: bool) -> Doubt | None:
+    """Return the doubt about the model; None without any, and for a simulated reality that has no noise."""
+    found = surprise(tunings)
+    if found is None:
+        return None if simulated else Doubt.UNTESTED
+    if found <= SURPRISING:
+        return Doubt.WRONG
+    return Doubt.SOME if found <= CREDIBLE else None
+
+
 def unreproduced(tunings: Sequence[Tuning], sensors: Sensors | None, unit: str) -> str:
     """Return that no simulator reproduces the samples, with numbers; "" if one does, or nobody knows.
-
-    At least half of the repetitions that know must say so.
 
     Args:
         tunings: the latest tuning of each repetition.
         sensors: of the robot; None if they are not known.
         unit: of errors.
     """
+    found = surprise(tunings)
+    if found is None or found > SURPRISING:
+        return ""
     fits = [each.fit for each in tunings if each.fit is not None]
     said = sum(fit.surprise <= SURPRISING for fit in fits)
-    if not fits or said < OFTEN * len(fits):
-        return ""
     errors = [each.error for each in tunings if each.fit is not None]
     left = [each.expected for each in tunings if each.fit is not None]
     of = f"{said} of {len(fits)} repetitions say so" if len(fits) > 1 else "by one repetition"

@@ -11,11 +11,10 @@ from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.experiments.archiving import show_again
-from gaplab.services.experiments.estimates import check_cost
 from gaplab.services.experiments.lifecycle import get_permitting, get_study_permitting
-from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
+from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move, settle
-from gaplab.services.experiments.submission import extent_of
+from gaplab.services.experiments.submission import admit, extent_of
 from gaplab.services.experiments.views import view_experiments, view_studies
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
@@ -94,11 +93,9 @@ def _extend(session: Session, larger: Sequence[tuple[ExperimentRow, ResolvedSpec
     if not growing:
         return False
     specs = [spec for _, spec in growing]
-    check_extent(specs, admitted.limits)
     computed = tallies(session, [experiment.id for experiment, _ in growing]).values()
     done = sum(tally.rollouts_done + tally.rollouts_saved for tally in computed)
-    check_cost(session, specs, admitted, done=done)
-    check_load(session, specs, admitted, done=done)
+    admit(session, specs, admitted, done=done)
     for experiment, spec in growing:
         _grow(session, experiment, spec)
     return True

@@ -7,26 +7,28 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, common_count
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.curves import mean_and_deviation
+from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries.results import last_common, recorded_at
 
 
-def fitness_of(session: Session, experiments: Sequence[str]) -> dict[str, FitnessRead]:
+def fitness_of(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, FitnessRead]:
     """Return the point of each experiment's curve after the last common number of evaluations, if it has a mean."""
-    return points_at(session, last_common(session, experiments))
+    return points_at(session, last_common(session, [row.id for row in rows]), {row.id: row.known for row in rows})
 
 
-def points_at(session: Session, counts: Mapping[str, int]) -> dict[str, FitnessRead]:
+def points_at(session: Session, counts: Mapping[str, int], known: Mapping[str, int]) -> dict[str, FitnessRead]:
     """Return a point of each experiment's curve, if it has a mean.
 
     Args:
         session: session of a transaction.
-        counts: number of real-world evaluations by experiment.
+        counts: numbers of real-world evaluations, by experiment.
+        known: numbers of samples from before, by experiment.
     """
     points = {
         experiment: mean_and_deviation(frozen(values)) for experiment, values in recorded_at(session, counts).items()
     }
     return {
-        experiment: FitnessRead(evaluations=counts[experiment], n=n, mean=mean, sd=sd)
+        experiment: FitnessRead(evaluations=counts[experiment], known=known[experiment], n=n, mean=mean, sd=sd)
         for experiment, (n, mean, sd) in points.items()
         if mean is not None
     }
@@ -47,7 +49,7 @@ def best_of(session: Session, studies: Mapping[str, Sequence[ExperimentRead]]) -
     points = {each.id: each.fitness for found in rivals.values() for each in found if each.fitness}
     wanted = {each.id: counts[study] for study, found in rivals.items() for each in found if not each.level}
     elsewhere = {id_: count for id_, count in wanted.items() if points[id_].evaluations != count}
-    points |= points_at(session, elsewhere)
+    points |= points_at(session, elsewhere, {id_: point.known for id_, point in points.items()})
     return {
         study: _fittest(
             [(each, points[each.id]) for each in found if each.level or points[each.id].evaluations == counts[study]]

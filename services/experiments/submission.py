@@ -3,12 +3,13 @@
 All functions raise StoreUnavailable while the database cannot be used.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.experiments.bench_names import check_benches
 from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.estimates import check_cost
 from gaplab.services.experiments.idempotency import Once, once
@@ -38,17 +39,16 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
-        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
+        CostUnconfirmed: the cost is above the limit, or a bench nearly known, and the request does not confirm it.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's experiment was deleted.
     """
     resolved = resolved_here(store, spec, resolve_experiment)
-    check_extent([resolved], admitted.limits)
 
     def create(session: Session) -> ExperimentRead:
-        check_cost(session, [resolved], admitted)
-        check_load(session, [resolved], admitted)
+        check_benches(session, [resolved], admitted)
+        admit(session, [resolved], admitted)
         row = _insert(session, resolved, admitted)
         queue_for(session, [row])
         return view_experiments(session, [row])[0]
@@ -70,23 +70,35 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
-        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
+        CostUnconfirmed: the cost is above the limit, or a bench nearly known, and the request does not confirm it.
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's study was deleted.
     """
     resolved = resolved_here(store, spec, resolve_study)
-    check_extent(resolved, admitted.limits)
 
     def create(session: Session) -> StudyRead:
-        check_cost(session, resolved, admitted)
-        check_load(session, resolved, admitted)
+        check_benches(session, resolved, admitted)
+        admit(session, resolved, admitted)
         study = insert_study(session, spec.name or "study")
         rows = [_insert(session, each, admitted, study, position) for position, each in enumerate(resolved)]
         queue_for(session, rows)
         return view_studies(session, [study])[0]
 
     return _unless_deleted(store, once(store, admitted, spec, StudyRead, create), get_study)
+
+
+def admit(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
+    """Refuse work beyond the limits of its sender, in the transaction that stores it; `done` rollouts are completed.
+
+    Raises:
+        InvalidSpec: it is too large; the message names the limit.
+        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
+        LimitReached: too much work is in progress.
+    """
+    check_extent(specs, admitted.limits)
+    check_cost(session, specs, admitted, done=done)
+    check_load(session, specs, admitted, done=done)
 
 
 def _unless_deleted(store: Store, done: Once[R], get: Callable[[Session, str], object]) -> Once[R]:

@@ -118,7 +118,7 @@ def _view(
     found = _Findings(
         failures=reasons(session, ids),
         checks=summaries(session, rows),
-        fitness=fitness_of(session, ids),
+        fitness=fitness_of(session, rows),
         best=best_recorded(session, ids),
         doubts=doubtful(session, ids),
     )

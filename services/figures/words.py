@@ -5,6 +5,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from math import isfinite
 
+from gaplab.schemas.curves import from_before
+
 LONGEST = 60  # characters of a name in a figure
 TITLE = 200  # characters of a title, which may have several lines
 WIDE = 30.0  # ratio of the greatest to the least value from which their axis is logarithmic
@@ -61,6 +63,11 @@ def number_of(noun: str, *counts: int) -> str:
     least, most = min(counts), max(counts)
     span = f"{least}" if least == most else f"{least}\N{EN DASH}{most}"
     return f"{span}\N{NO-BREAK SPACE}{noun}{'' if least == most == 1 else 's'}"
+
+
+def evaluations(count: int, *known: int) -> str:
+    """Return `3 real-world evaluations (and 12 from before)`, given the samples from before each experiment."""
+    return number_of("real-world evaluation", count) + from_before(*known)
 
 
 def number(value: float | None, digits: int = 3) -> str:

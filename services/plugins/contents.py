@@ -96,6 +96,11 @@ def read() -> Contents:
     return Contents(digests, {top: tops if ANY in named else named & tops for top, named in imports.items()})
 
 
+def module_of(files: str) -> str:
+    """Return the module or package of the first file of a text that `text_of` returned."""
+    return _top(files.partition(" ")[0])
+
+
 def _files() -> Iterator[tuple[str, Path]]:
     for folder in folders():
         packages = sorted(path.parent for path in folder.glob("*/__init__.py"))

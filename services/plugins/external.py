@@ -3,12 +3,14 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.external_plugins import file_of
 from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.engines import engines
 from gaplab.services.plugins.contents import Contents
 from gaplab.services.plugins.watching import imported, present
 from gaplab.services.specs.registries import REGISTRIES as REGISTRIES
+from gaplab.services.specs.robots import Driven, installed_robot
 
 
 def external_plugins(contents: Contents | None = None) -> Mapping[str, str]:
@@ -28,14 +30,17 @@ def external_plugins(contents: Contents | None = None) -> Mapping[str, str]:
 
 
 def named_in(spec: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the plug-ins that a resolved spec names, or the spec of a sensitivity check, by kind and name."""
+    """Return the plug-ins that a resolved spec needs, or the spec of a sensitivity check, by kind and name.
+
+    Those are the ones that it names, and the usual controller and task of its robot.
+    """
     return tuple(dict.fromkeys(_named_in(spec)))
 
 
-def imported_files(spec: Mapping[str, Any]) -> str:
-    """Return the external plug-ins that a resolved spec names, with the hashes of the files that were imported."""
+def imported_files(spec: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the files of each external plug-in that a resolved spec names, with their hashes, as imported here."""
     found = external_plugins(imported.contents())
-    return "; ".join(f"{plugin}: {found[plugin]}" for plugin in named_in(spec) if plugin in found)
+    return tuple(found[plugin] for plugin in named_in(spec) if plugin in found)
 
 
 def unavailable(plugin: str) -> str | None:
@@ -64,5 +69,8 @@ def _named_in(spec: Mapping[str, Any]) -> Iterator[str]:
     reality = spec.get("reality") or {}
     if reality.get("engine"):
         yield f"engine {reality['engine']['name']}"
+    if robot := installed_robot(Driven(PluginRef.model_validate(spec["robot"]))):
+        usual = ("controller", robot.usual_controller), ("task", robot.usual_task)
+        yield from (f"{kind} {ref.name}" for kind, ref in usual if ref and not spec.get(kind))
     yield from (f"tunable {plain_name(ref['name'])}" for ref in spec["tunables"])
     yield from (f"tunable {plain_name(name)}" for name in reality.get("parameters", ()))

@@ -6,10 +6,12 @@ itself: services and supervisors at their start, Ray's processes before their fi
 
 import logging
 import os
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
 from gaplab.services.core import external_plugins
+from gaplab.services.plugins.contents import module_of
 from gaplab.services.plugins.external import REGISTRIES
 from gaplab.services.plugins.ignored import ignored_files
 from gaplab.services.plugins.watching import imported
@@ -30,6 +32,17 @@ def find() -> None:
     if folders:
         os.environ[VARIABLE] = os.pathsep.join(map(str, folders))
     external_plugins.set_folders(folders)
+
+
+def use(files: Iterable[str]) -> None:
+    """Import the modules of these files and no others, since a module may change gaplab for all that a process does.
+
+    Args:
+        files: those of each plug-in, the first its own, with their hashes, as `imported_files` has them.
+    """
+    find()
+    if external_plugins.chosen() != (modules := frozenset(map(module_of, files))):
+        external_plugins.set_folders(external_plugins.named_folders(), modules)
 
 
 @cache

@@ -64,26 +64,20 @@ class Imported:
             self._package = external_plugins.package()
         return self._contents
 
-    def renewed(self) -> Contents:
-        """Return the contents of the imported files, after another import if one was edited."""
-        if contents.read().digests != self.contents().digests:
-            external_plugins.set_folders(external_plugins.named_folders())
-        return self.contents()
-
 
 def _import() -> Contents:
     """Import the plug-ins, again if a file is edited meanwhile, and return what was imported.
 
     If they were imported before, their files may have been edited since, so they are imported again.
     """
-    if (named := external_plugins.named_folders()) and external_plugins.are_loaded():
-        external_plugins.set_folders(named)
+    if external_plugins.named_folders() and external_plugins.are_loaded():
+        external_plugins.import_again()
     for _ in range(TRIES):
         before = contents.read()
         external_plugins.loaded()
         if contents.read().digests == before.digests:
             break
-        external_plugins.set_folders(external_plugins.named_folders())
+        external_plugins.import_again()
     return before
 
 
@@ -102,6 +96,7 @@ def reload() -> bool:
     with _RELOADING:
         if contents.read().digests == imported.contents().digests:
             return False
-        imported.renewed()
+        external_plugins.import_again()
+        imported.contents()
     log.info("the plug-ins were imported again, since their files were changed")
     return True

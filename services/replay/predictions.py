@@ -8,7 +8,6 @@ import numpy as np
 
 from gaplab.schemas.replays import Prediction, Predictions
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.replay.sent_specs import SentSpec, received, sent
 from gaplab.services.specs.assembly import refuse_missing, simulation_of
@@ -64,12 +63,13 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
         every = replays.tuned_samples(session, row)
     samples = every[:MOST_KEPT]
     spec = spec_of(row.spec)
-    place = (row.id, imported_files(row.spec))
+    sent_spec = sent(spec)
+    place = (row.id, "; ".join(sent_spec.plugins))
     unknown = [each for each in samples if process.answers.get(_key(place, each)) is None]
     unknown.sort(key=lambda each: (each.iteration, each.repetition))
     if unknown:
         refuse_missing(spec)
-        pairs = process.call(predict, sent(spec), unknown[:MOST_AT_ONCE], seconds)
+        pairs = process.call(predict, sent_spec, unknown[:MOST_AT_ONCE], seconds, plugins=sent_spec.plugins)
         for sample, pair in zip(unknown, pairs, strict=False):
             process.answers.keep(_key(place, sample), pair, SIZE_BYTES)
     items = _items(place, samples, process.answers)
@@ -84,8 +84,6 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
 
 def predict(spec: SentSpec, samples: Sequence[TunedSample], seconds: float) -> list[Pair]:
     """Return the fitness of samples before and after tuning: of the first one, and of as many others as time permits.
-
-    It is computed with the plug-ins as their files are now.
 
     Args:
         spec: resolved spec.

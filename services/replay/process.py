@@ -63,7 +63,8 @@ class RolloutProcess:
     """A subprocess that executes one call at a time.
 
     It starts with the first call, and again after a crash or a timeout. It ends with its parent, even if that
-    is killed: the parent's end of the pipe closes, and the next read fails.
+    is killed: the parent's end of the pipe closes, and the next read fails. A call with other external plug-ins than
+    the one before gets another process.
 
     Args:
         longest_s: time limit of one call.
@@ -77,6 +78,7 @@ class RolloutProcess:
         self.answers = AnswerCache()
         self._longest_s = longest_s
         self._line = line or WaitingLine("replays and predictions")
+        self._plugins: tuple[str, ...] = ()
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._closed = False
@@ -87,12 +89,20 @@ class RolloutProcess:
         """Process id; None if no process is running."""
         return self._process.pid if self._process else None
 
-    def call(self, function: Callable[..., T], *arguments: Any) -> T:  # noqa: ANN401 - what the function takes
+    def call(
+        self,
+        function: Callable[..., T],
+        *arguments: Any,  # noqa: ANN401 - what the function takes
+        load: Callable[[], Any] | None = None,
+        plugins: tuple[str, ...] = (),
+    ) -> T:
         """Return `function(*arguments)`, computed in the subprocess.
 
         Args:
             function: defined at the top of a module, so that it can be pickled.
             arguments: values that can be pickled.
+            load: returns the last argument once it is the caller's turn, as those who wait shall hold nothing large.
+            plugins: files of the external plug-ins that it may import, with their hashes.
 
         Raises:
             EngineInterrupted: the process died or took too long, or `close` was called.
@@ -101,7 +111,10 @@ class RolloutProcess:
             RuntimeError: the function raised another error; the message quotes it.
         """
         with self._line.turn():
-            return self._call(function, arguments)
+            if plugins != self._plugins:
+                self._discard()
+                self._plugins = plugins
+            return self._call(function, (*arguments, load()) if load else arguments)
 
     def close(self) -> None:
         """Kill the process, even in the middle of a call; later calls are refused."""
@@ -146,7 +159,7 @@ class RolloutProcess:
             context = get_context("spawn")
             ours, theirs = context.Pipe()
             printed, output = context.Pipe(duplex=False)
-            process = context.Process(target=_serve, args=(theirs, output), name="rollouts", daemon=True)
+            process = context.Process(target=_serve, args=(theirs, output, self._plugins), name="rollouts", daemon=True)
             process.start()  # if this raises, the next call tries again
             theirs.close()
             output.close()
@@ -164,13 +177,13 @@ class RolloutProcess:
                     log.info("printed by a rollout: %s%s", kept.decode(errors="replace"), rest)
 
 
-def _serve(pipe: Connection, output: Connection) -> None:
+def _serve(pipe: Connection, output: Connection, plugins: tuple[str, ...]) -> None:
     """Execute calls until the other end of the pipe closes, and write what they print to `output`."""
     for descriptor in (1, 2):
         os.dup2(output.fileno(), descriptor)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which closes the pipe
     os.nice(NICENESS)
-    folders.find()
+    folders.use(plugins)
     with suppress(EOFError, OSError):
         while True:
             function, arguments = pipe.recv()
@@ -180,3 +193,4 @@ def _serve(pipe: Connection, output: Connection) -> None:
                 answer = (False, (type(error).__name__, brief(str(error))))
             print(end="", flush=True)  # noqa: T201 - what the call printed
             pipe.send(answer)
+    os._exit(0)  # no thread of a plug-in keeps it

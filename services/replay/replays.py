@@ -10,7 +10,6 @@ from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violati
 from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.hiding import hidden
-from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import LAST, ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.replay.sent_specs import sent
@@ -50,11 +49,11 @@ def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choic
         choice = _with_iteration(session, row, choice)
         _refuse_impossible(row, spec, choice)
         request = _request(session, row, spec, choice)
-    key: Key = ("replay", sha256(repr(request).encode()).hexdigest(), imported_files(row.spec))
+    key: Key = ("replay", sha256(repr(request).encode()).hexdigest())
     found: bytes | None = process.answers.get(key)
     if found is None:
         refuse_missing(spec, reality=request.known)
-        found = process.call(compute_replay, request)
+        found = process.call(compute_replay, request, plugins=request.spec.plugins)
         process.answers.keep(key, found, len(found))
     return found
 

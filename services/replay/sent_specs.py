@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core import robot_library
-from gaplab.services.plugins.watching import imported
+from gaplab.services.plugins.external import imported_files
 
 
 class SentSpec(NamedTuple):
@@ -13,19 +13,21 @@ class SentSpec(NamedTuple):
     Attributes:
         text: the spec, as JSON.
         robots: texts of robot files.
+        plugins: files of each external plug-in that it names, with their hashes.
     """
 
     text: str
     robots: tuple[str, ...]
+    plugins: tuple[str, ...]
 
 
 def sent(spec: ResolvedSpec) -> SentSpec:
     """Return a spec to be sent."""
-    return SentSpec(spec.model_dump_json(), robot_library.needed_by(spec.robot))
+    plugins = imported_files(spec.model_dump(mode="json"))
+    return SentSpec(spec.model_dump_json(), robot_library.needed_by(spec.robot), plugins)
 
 
 def received(spec: SentSpec) -> ResolvedSpec:
-    """Return the spec that was sent, in a process that has the plug-ins as their files are now."""
-    imported.renewed()
+    """Return the spec that was sent, in a process that has imported its plug-ins and no others."""
     robot_library.learn(spec.robots)
     return ResolvedSpec.model_validate_json(spec.text)

@@ -1,6 +1,6 @@
 """Evaluation of traces: fitness and readings of a physical robot, computed by its code from its recorded motion."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 
 import numpy as np
@@ -23,8 +23,8 @@ from gaplab.services.replay.sent_specs import SentSpec, received, sent
 from gaplab.services.specs.assembly import simulation_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
-from gaplab.services.store.models import AttachmentRow, ExperimentRow
-from gaplab.services.store.queries import replays, requests
+from gaplab.services.store.models import ExperimentRow
+from gaplab.services.store.queries import attachments, replays, requests
 from gaplab.services.store.session import Session, Store
 
 FRAMES_PER_S = 50
@@ -41,7 +41,7 @@ def evaluate_traces(
 
     Args:
         store: the store.
-        process: process that computes the expected motion.
+        process: process that reads them, and computes the expected motion.
         request: id of the request.
         spec: the traces.
         answer: whether they answer the request, which takes a trace of each repeat.
@@ -58,18 +58,48 @@ def evaluate_traces(
         row, repetition = requests.get(session, request)
         experiment = session.get_one(ExperimentRow, repetition.experiment_id)
         resolved = spec_of(experiment.spec)
-        robot = robot_of(resolved)
-        refuse_other_bodies(robot.world)
-        tables = _tables(session, spec, resolved.reality.repeats, answer=answer)
+        refuse_other_bodies(robot_of(resolved).world)
+        _check(session, spec, resolved.reality.repeats, answer=answer)
         tuned = row.iteration - (row.kind is MeasurementKind.SAMPLE)
         simulators = replays.tuned_parameters(session, experiment.id, repetition.number, tuned)
         genome = tuple(row.genome)
     if not simulators:
         raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
-    traces = [read_trace(*table) for table in tables]
-    times_s, poses, _ = process.call(expected_motion, sent(resolved), genome, tuple(simulators[0]))
-    expected = Trace(times_s, poses[:, :3], poses[:, 3:])
-    return evaluated(robot, frozen(genome), traces, expected, spec)
+    sent_spec = sent(resolved)
+    asked = sent_spec, genome, tuple(simulators[0]), spec
+    found = process.call(said_by_files, *asked, load=lambda: _contents(store, spec.traces), plugins=sent_spec.plugins)
+    if not isinstance(found, TracesRead):
+        raise InvalidSpec(found)
+    return found
+
+
+def said_by_files(
+    sent_spec: SentSpec,
+    genes: Sequence[float],
+    parameters: Sequence[float],
+    spec: TracesSpec,
+    files: Mapping[str, bytes],
+) -> TracesRead | tuple[Violation, ...]:
+    """Return what traces say about a genome, beside the motion in a simulator of a spec; or what is wrong with them.
+
+    Args:
+        sent_spec: of the experiment.
+        genes: the genome.
+        parameters: of the simulator.
+        spec: the traces.
+        files: contents by hash; each is read once, however often the spec names it.
+    """
+    robot = robot_of(received(sent_spec))
+    try:
+        read = {
+            digest: read_trace(files[digest].decode("utf-8", "replace"), f"/traces/{spec.traces.index(digest)}")
+            for digest in dict.fromkeys(spec.traces)
+        }
+        times_s, poses, _ = expected_motion(sent_spec, genes, parameters)
+        expected = Trace(times_s, poses[:, :3], poses[:, 3:])
+        return evaluated(robot, frozen(genes), [read[digest] for digest in spec.traces], expected, spec)
+    except InvalidSpec as error:
+        return error.violations
 
 
 def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec: MeasurementSpec) -> TracesRead | None:
@@ -111,26 +141,32 @@ def refuse_other_bodies(world: World) -> None:
         raise InvalidSpec([Violation("/traces", None, message)])
 
 
-def _tables(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) -> list[tuple[str, str]]:
-    """Return the text and the pointer of each trace."""
-    violations = []
+def _check(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) -> None:
+    """Refuse traces that are not stored, another number of them than of repeats, and another number of lags.
+
+    Raises:
+        InvalidSpec: with every violation.
+    """
+    stored = attachments.present(session, spec.traces)
+    violations = [
+        Violation(f"/traces/{place}", digest, "no attachment with this hash is stored; send the file first")
+        for place, digest in enumerate(spec.traces)
+        if digest not in stored
+    ]
     if len(spec.traces) > repeats or (answer and len(spec.traces) < repeats):
         message = f"an answer has one trace for each repeat: {repeats}, not {len(spec.traces)}"
         violations.append(Violation("/traces", f"traces: {len(spec.traces)}", message, f"exactly {repeats}"))
     if spec.lags_s is not None and len(spec.lags_s) != len(spec.traces):
         message = f"there is one lag for each trace: {len(spec.traces)}, not {len(spec.lags_s)}"
         violations.append(Violation("/lags_s", f"lags: {len(spec.lags_s)}", message, f"exactly {len(spec.traces)}"))
-    found = []
-    for place, digest in enumerate(spec.traces):
-        row, pointer = session.get(AttachmentRow, digest), f"/traces/{place}"
-        if row is None:
-            message = "no attachment with this hash is stored; send the file first"
-            violations.append(Violation(pointer, digest, message))
-        else:
-            found.append((row.content.decode("utf-8", "replace"), pointer))
     if violations:
         raise InvalidSpec(violations)
-    return found
+
+
+def _contents(store: Store, traces: Sequence[str]) -> dict[str, bytes]:
+    """Return the contents of stored traces by hash."""
+    with store.reading() as session:
+        return {digest: attachments.content_of(session, digest) for digest in set(traces)}
 
 
 def evaluated(

@@ -49,7 +49,7 @@ def _verdict(verdict: VerdictRead) -> tuple[Block, ...]:
 def _differences(facts: Facts) -> tuple[Block, ...]:
     if not facts.at_last:
         return (Paragraph("There is nothing to compare yet."),)
-    last = f"after {number_of('real-world evaluation', facts.verdict.evaluations or 0)}"
+    last = facts.at_last[0].where
     cautions = tuple(dict.fromkeys(pair.caution for pair in facts.at_last if pair.caution))
     return (
         compared.summaries(facts, facts.at_last, f"Fitness {last}"),
@@ -62,10 +62,9 @@ def _differences(facts: Facts) -> tuple[Block, ...]:
 
 
 def _over_all(facts: Facts) -> tuple[Block, ...]:
-    numbers = "1 to " + number_of("real-world evaluation", facts.verdict.evaluations or 0)
     return (
-        compared.tests(facts, facts.over_all, f"The mean of each repetition over {numbers}"),
-        compared.pooled(facts, facts.over_all, f"The paper's test: the same pairs, pooled over {numbers}"),
+        compared.tests(facts, facts.over_all, f"The {facts.over_all[0].where}"),
+        compared.pooled(facts, facts.over_all, "The paper's test: the same pairs, pooled over these numbers"),
         Paragraph(f"The last table is {POOLED}. The verdict does not use it.", note=True),
     )
 

@@ -64,7 +64,7 @@ def is_equivalent(pair: Comparison) -> bool:
 
 def _judged(name: str, curve: Curve, experiment: ExperimentRead, count: int | None) -> Judged:
     last = None if curve.level or experiment.fitness is None else experiment.fitness.evaluations
-    end = None if last is None else curve_end(recorded_of(curve), last)
+    end = curve_end(recorded_of(curve), last) if last else None
     at = 0 if curve.level else count
     point = next((point for point in curve.points if point.evaluations == at and point.mean is not None), None)
     return Judged(name, curve, end, point)

@@ -1,5 +1,6 @@
 """The page of an outcome: what a person prints and pins beside the robot."""
 
+from gaplab.schemas.curves import from_before
 from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.words import number, number_of, spoken, titled, with_unit
@@ -30,7 +31,7 @@ def outcome_report(outcome: ExperimentOutcome) -> Report:
         id=experiment.id,
         title=titled(experiment.name, experiment.strategy, 200),
         subtitle=f"Experiment {experiment.id}: {robot}, simulated in {spoken(outcome.spec.engine.name)}, "
-        f"{number_of('measurement', len(outcome.measured))}",
+        f"{number_of('measurement', len(outcome.measured))}{from_before(len(outcome.spec.reality.samples))}",
         headline=outcome.facts.verdict.headline,
         sections=tuple(sections),
     )

@@ -7,7 +7,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.reports import Trend, TrendRead
 from gaplab.services.core.trends import FEWEST_REPETITIONS, CurveEnd
-from gaplab.services.figures.words import number_of
+from gaplab.services.figures.words import evaluations, number_of
 from gaplab.services.reports.judged import SIGNIFICANT, Judged, differs, is_equivalent
 
 
@@ -18,7 +18,7 @@ def unreproduced(told: Mapping[str, str], names: Mapping[str, str]) -> Iterator[
         yield f"{begin}{sentence[1:]}."
 
 
-def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], count: int | None) -> Iterator[str]:
+def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], where: str) -> Iterator[str]:
     """Yield who is ahead, in one sentence."""
     ids = {one.curve.experiment for one in learned}
     compared = [pair for pair in pairs if {pair.first, pair.second} <= ids and pair.trusted.p_holm is not None]
@@ -28,30 +28,29 @@ def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], count: int 
         yield f"Fewer than {FEWEST_REPETITIONS} repetitions are too few to compare strategies."
         return
     differing = sum(map(differs, compared))
-    where = f"at {number_of('real-world evaluation', count or 0)}"
+    ahead = f"at {where}; {learned[0].name} has the highest mean."
     if compared and all(map(is_equivalent, compared)):
-        yield f"No difference between strategies {_within(compared)} {where}; {learned[0].name} has the highest mean."
+        yield f"No difference between strategies {_within(compared)} {ahead}"
     elif not differing:
-        yield f"No strategy is shown to differ from another {where}; {learned[0].name} has the highest mean."
+        yield f"No strategy is shown to differ from another {ahead}"
     else:
         told = (
             f"{differing} of {number_of('pair', len(compared))} of strategies"
             if len(compared) > 1
             else "The strategies"
         )
-        yield f"{told} differ {where}; {learned[0].name} has the highest mean."
+        yield f"{told} differ {ahead}"
 
 
 def ranking(
-    learned: Sequence[Judged], pairs: Sequence[Comparison], names: Mapping[str, str], count: int | None
+    learned: Sequence[Judged], pairs: Sequence[Comparison], names: Mapping[str, str], where: str
 ) -> Iterator[str]:
     """Yield what the highest mean is, and from which strategies it differs."""
     if not learned:
         return
     best = learned[0]
-    where = f"After {number_of('real-world evaluation', count or 0)}"
     told = f"{best.name} has the highest mean," if len(learned) > 1 else f"the mean of {best.name} is"
-    yield f"{where}, {told} {_with_interval(best)}."
+    yield f"After {where}, {told} {_with_interval(best)}."
     ids = {one.curve.experiment for one in learned}
     own = [
         pair
@@ -127,7 +126,7 @@ def spread(learned: Sequence[Judged]) -> Iterator[str]:
 def end_of_curve(one: Judged, end: CurveEnd) -> str:
     """Return what the end of a curve says, with its numbers."""
     if end.trend is Trend.TOO_FEW or end.gain is None:
-        counts = f"{number_of('repetition', end.n)} at {number_of('real-world evaluation', end.last)}"
+        counts = f"{number_of('repetition', end.n)} at {evaluations(end.last, one.curve.known)}"
         return f"{one.name}: {counts} are too few to say whether it still rises."
     gain = f"{end.gain:+.3f} {one.curve.unit}, 95 % interval {end.lower:+.3f} to {end.upper:+.3f}"
     words = {

@@ -3,6 +3,7 @@
 import io
 import json
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from importlib.metadata import version
 from typing import Any, TypeAlias
 from zipfile import ZipFile
@@ -13,6 +14,7 @@ from gaplab.schemas.records import SampleRead
 from gaplab.services.bench import motions
 from gaplab.services.core import robot_library, trace_tables
 from gaplab.services.core.arrays import frozen, known
+from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.replay.process import RolloutProcess
@@ -23,7 +25,7 @@ from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
 from gaplab.services.reports.outcome_page import MOST_SHOWN, outcome_report, verdict_sentences
 from gaplab.services.reports.plain_mujoco import plain_motion, tuned_mjcf
 from gaplab.services.reports.reproduction import spec_text, submitted
-from gaplab.services.results.files import csv_text, entry_of
+from gaplab.services.results.files import entry_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Store
@@ -117,13 +119,14 @@ def _expected(outcome: ExperimentOutcome, process: RolloutProcess) -> Iterator[t
         return
     spec, fitness, apart_m = sent(outcome.spec), dict[str, float | None](), dict[str, float | None]()
     parameters = tuple(outcome.simulators[0].parameters[ref.name] for ref in outcome.spec.tunables)
-    tuned = process.call(tuned_mjcf, spec, parameters, f"Tuned by gaplab: experiment {outcome.experiment.id}.")
+    call = partial(process.call, plugins=spec.plugins)
+    tuned = call(tuned_mjcf, spec, parameters, f"Tuned by gaplab: experiment {outcome.experiment.id}.")
     yield from (("tuned.xml", text) for text in [tuned] if text)
     for each in outcome.measured[:MOST_SHOWN]:
         name = f"{each.repetition}-{each.iteration}-{each.kind.value}"
         try:
-            times_s, poses, expected = process.call(expected_motion, spec, each.genome, parameters)
-            plain_m = process.call(plain_motion, spec, parameters, each.genome, times_s) if tuned else None
+            times_s, poses, expected = call(expected_motion, spec, each.genome, parameters)
+            plain_m = call(plain_motion, spec, parameters, each.genome, times_s) if tuned else None
         except GaplabError:
             return
         if plain_m is not None:

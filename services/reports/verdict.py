@@ -8,6 +8,7 @@ from gaplab.schemas.curves import Curve
 from gaplab.schemas.records import ExperimentRead, common_count
 from gaplab.schemas.reports import Trend, TrendRead, VerdictRead
 from gaplab.services.core.trends import FEWEST_EVALUATIONS, FEWEST_REPETITIONS, SMALL, CurveEnd
+from gaplab.services.figures.words import evaluations
 from gaplab.services.reports import sentences
 from gaplab.services.reports.judged import SIGNIFICANT, Judged, judged_curves
 
@@ -29,7 +30,8 @@ RULES = (
     f"rising or falling if the interval of the gain over the last {FEWEST_EVALUATIONS} evaluations is above or below "
     "0. Otherwise more repetitions would tell.",
     "No simulator is said to reproduce the samples if at least half of the repetitions are surprised: of 40 plausible "
-    "simulators that play reality with the noise of the measurements, fewer than two leave as much error after tuning.",
+    "simulators that play reality with the noise of the measurements, fewer than two leave as much error after tuning. "
+    "Up to a fifth, no tunable is called identified.",
     f"Nothing is said of a curve with fewer than {FEWEST_REPETITIONS} repetitions or {FEWEST_EVALUATIONS} evaluations.",
 )
 
@@ -50,21 +52,22 @@ def judge(
     """
     count = common_count(experiments)
     judged = judged_curves(curves, experiments, count)
+    where = evaluations(count or 0, *(curve.known for curve in curves if not curve.level))
     learned = [one for one in judged if not one.curve.direct and one.point]
     learned.sort(key=lambda one: one.mean, reverse=True)
     names = {one.curve.experiment: one.name for one in judged}
     trends = tuple(_trend(one, one.end) for one in judged if one.end is not None)
     told = [
-        *sentences.ranking(learned, pairs, names, count),
+        *sentences.ranking(learned, pairs, names, where),
         *sentences.share_of_direct(learned, judged, pairs),
         *(trend.sentence for trend in trends),
         *sentences.spread(learned),
         *sentences.incomplete(experiments, names),
     ]
     wrong = sentences.unreproduced(unreproduced, names)
-    headline = [*wrong, *sentences.standing(learned, pairs, count), *sentences.continuing(trends)]
+    headline = [*wrong, *sentences.standing(learned, pairs, where), *sentences.continuing(trends)]
     return VerdictRead(
-        headline=" ".join(headline) or NOTHING,
+        headline=" ".join(headline or (told[:1] if learned else [])) or NOTHING,
         sentences=tuple(told),
         trends=trends,
         evaluations=count,

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from gaplab.schemas.comparison_columns import COLUMNS, UNPAIRED, row, shown_tests
 from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
-from gaplab.services.results.files import csv_text
+from gaplab.services.core.csv_tables import csv_text
 
 NAMES = {
     "student": "Student",
@@ -57,7 +57,7 @@ def _pairs(comparisons: Sequence[Comparison], unit: str) -> str:
         for pair in comparisons
     ]
     caption = [
-        f"{comparisons[0].fitness.words}{_units(unit)}, {_where(comparisons[0])}: differences with 90\\,\\% intervals",
+        f"{_what(comparisons[0], unit)}: differences with 90\\,\\% intervals",
         "Cohen's $d$",
         "$P(>)$, the probability that a repetition of the first is fitter, with its 95\\,\\% interval",
         "two-sided $p$-values, in brackets with Holm's correction over all pairs",
@@ -76,7 +76,7 @@ def _experiments(comparisons: Sequence[Comparison], unit: str) -> str:
         [_name(name), str(one.n), _estimate(one.mean), _estimate(one.interquartile_mean), _plain(one.sd)]
         for name, one in found.values()
     ]
-    caption = f"{comparisons[0].fitness.words}{_units(unit)}, {_where(comparisons[0])}, with 95\\,\\% intervals"
+    caption = f"{_what(comparisons[0], unit)}, with 95\\,\\% intervals"
     return _table(caption, ["Experiment", "$n$", "Mean", "Interquartile mean", "SD"], rows)
 
 
@@ -113,15 +113,8 @@ def escaped(text: str) -> str:
     return "".join(_SPECIAL.get(sign, sign) for sign in re.sub(r"\s+", " ", text))
 
 
-def _where(pair: Comparison) -> str:
-    first, last = pair.from_evaluations, pair.to_evaluations
-    if first == last:
-        return f"after {first} real-world evaluation{'' if first == 1 else 's'}"
-    return f"mean of each repetition over {first} to {last} real-world evaluations"
-
-
-def _units(unit: str) -> str:
-    return f" in {escaped(unit)}" if unit else ""
+def _what(pair: Comparison, unit: str) -> str:
+    return escaped(f"{pair.fitness.words}{f' in {unit}' if unit else ''}, {pair.where}")
 
 
 def _name(name: str) -> str:

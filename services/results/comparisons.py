@@ -15,10 +15,12 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.fitness import fitness_of
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments
+from gaplab.services.figures.words import evaluations
 from gaplab.services.results.curves import values_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments
+from gaplab.services.store.queries.benches import key_of
 from gaplab.services.store.session import Session, Store
 
 MOST_WITH_INTERVALS = 20
@@ -80,23 +82,27 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
         raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
     compared = [_compared(row, values[row.id]) for row in rows]
     if to_evaluations is not None:
-        _check_the_end(compared, to_evaluations)
+        _check_the_end(rows, compared, to_evaluations)
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
     pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
     by_id = {row.id: row for row in rows}
+    told = {"fitness": fitness, "where": _where(first, final, rows)}
     warned = (tuple(warnings(by_id[pair.first], by_id[pair.second], concealed)) for pair in pairs)
-    return tuple(
-        pair.model_copy(update={"warnings": each, "fitness": fitness}) for pair, each in zip(pairs, warned, strict=True)
-    )
+    return tuple(pair.model_copy(update={"warnings": each, **told}) for pair, each in zip(pairs, warned, strict=True))
 
 
-def _check_the_end(compared: Sequence[Compared], last: int) -> None:
+def _where(first: int, last: int, rows: Sequence[ExperimentRow]) -> str:
+    counted = evaluations(last, *(row.known for row in rows if row.tunes))
+    return f"after {counted}" if first == last else f"mean of each repetition over {first} to {counted}"
+
+
+def _check_the_end(rows: Sequence[ExperimentRow], compared: Sequence[Compared], last: int) -> None:
     """Refuse a last number of evaluations that no experiment with samples has: nothing would be compared.
 
     Raises:
         InvalidSpec: it is beyond all of them.
     """
-    counts = [each.recorded.shape[1] for each in compared if not each.level]
+    counts = [row.iterations for row, each in zip(rows, compared, strict=True) if not each.level]
     most = max(1, *counts) - 1 if counts else last
     if last > most:
         message = f"no experiment has {last} real-world evaluations; permitted: 0 to {most}"
@@ -121,7 +127,7 @@ def _in_units(session: Session, rows: Sequence[ExperimentRow], margin: Margin) -
         return margin.value
     studies = {row.study_id for row in rows if row.study_id is not None}
     baselines = _direct(rows) or _direct(experiments.experiments_of(session, sorted(studies)))
-    means = [point.mean for point in fitness_of(session, [row.id for row in baselines]).values()]
+    means = [point.mean for point in fitness_of(session, baselines).values()]
     if len(baselines) != 1 or len(means) != 1 or means[0] <= 0:
         message = (
             "a margin as a share of direct needs one direct baseline with a fitness above 0 among the experiments or "
@@ -160,7 +166,8 @@ def _both(first: str, second: str) -> str:
 
 
 def _setup(spec: ResolvedSpec) -> tuple[object, ...]:
-    return spec.reality.kind, spec.reality.engine, spec.reality.bench, sorted(spec.reality.parameters)
+    bench = key_of(spec.reality.bench or "")
+    return spec.reality.kind, spec.reality.engine, bench, sorted(spec.reality.parameters)
 
 
 def _reality(spec: ResolvedSpec) -> tuple[object, ...]:

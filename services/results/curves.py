@@ -7,13 +7,13 @@ import numpy as np
 from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.curves import best_of_searches, curve_points
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.results.files import csv_text
 from gaplab.services.specs.resolution import is_direct
 from gaplab.services.specs.robots import unit
 from gaplab.services.store.models import ExperimentRow
-from gaplab.services.store.queries import experiments, results
+from gaplab.services.store.queries import experiments, progress, results
 from gaplab.services.store.session import Session, Store
 
 COLUMNS = ("experiment", "name", "strategy", "repetition", "evaluations", "fitness")
@@ -89,7 +89,7 @@ def curves_csv(curves: Sequence[Curve]) -> str:
 def values_of(
     session: Session, ids: Sequence[str], fitness: Fitness = Fitness.RECORDED
 ) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
-    """Return experiments, and the fitness of each: `(repetitions, iterations + 1)`, nan if missing.
+    """Return experiments, and the fitness of each: `(repetitions, k)`, nan if missing, up to the last iteration done.
 
     A failed controller is never the best. Where one was not measured, there is no best from there on: others had more
     chances.
@@ -102,7 +102,8 @@ def values_of(
     found = (
         results.recorded(session, ids) if recorded else results.measured_fitness(session, ids, MeasurementKind.PROBE)
     )
-    values = {row.id: np.full((row.spec["repetitions"], row.iterations), np.nan) for row in rows}
+    done = progress.most_done(session, ids)  # not those of the spec, which may be a stranger's
+    values = {row.id: np.full((row.spec["repetitions"], max(1, done[row.id])), np.nan) for row in rows}
     for experiment, repetition, iteration, value in found:
         values[experiment][repetition, iteration] = -np.inf if value is None else value
     if fitness is Fitness.EQUAL_CHANCES:
@@ -122,6 +123,7 @@ def _curve(row: ExperimentRow, values: FloatArray, fitness: Fitness) -> Curve:
         fitness=fitness,
         direct=direct,
         level=not row.tunes,
+        known=row.known,
         points=curve_points(values),
         best_of=best_of_searches(values[:, 0]) if direct else (),
     )

@@ -11,6 +11,7 @@ import numpy as np
 from gaplab.schemas.misfit import Distribution, MisfitRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.identification import Means, overfitting, verdicts
@@ -19,8 +20,7 @@ from gaplab.services.core.repeats import pooled_variance
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
-from gaplab.services.core.unreproduced import unreproduced
-from gaplab.services.results.files import csv_text
+from gaplab.services.core.unreproduced import doubt, unreproduced
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import installed_robot, unit
@@ -49,28 +49,29 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     posteriors = {place: _deviations(*found) for place, found in members.items()}
     by_iteration: dict[int, list[Tuning]] = defaultdict(list)
     for best in simulators:
-        posterior = posteriors.get((best.repetition, best.iteration))
-        by_iteration[best.iteration].append(_tuning(best, measured, posterior, row.spec["tunables"], discrepancy))
+        by_iteration[best.iteration].append(_tuning(best, measured, posteriors, row.spec["tunables"], discrepancy))
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, by_iteration[iteration], names, parameters_of(spec.tunables))
-        for iteration in range(row.iterations if takes_samples(spec) else 0)
-        if by_iteration[iteration]
+        for iteration in sorted(by_iteration if takes_samples(spec) else ())
     )
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
+    told = remarks(points, unit(spec), error_unit, row.known)
     unseen = overfitting(points[-1], error_unit) if points else ""
-    wrong = _unreproduced(row.id, robot, by_iteration[points[-1].iteration], error_unit) if points else ""
+    latest = by_iteration[points[-1].iteration] if points else []
+    wrong = _unreproduced(row.id, robot, latest, error_unit)
+    doubted = doubt(latest, simulated=spec.reality.kind == "simulated")
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
         error_unit=error_unit,
         points=points,
-        remarks=tuple(filter(None, [wrong, _known(measured), *remarks(points, unit(spec), error_unit), unseen])),
+        remarks=tuple(filter(None, [wrong, _known(measured), *told, unseen])),
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
-        verdicts=verdicts(points, samples, _means(spec, robot), unreproduced=bool(wrong)),
+        verdicts=verdicts(points, samples, _means(spec, robot), doubted),
     )
 
 
@@ -102,7 +103,7 @@ def misfit_csv(found: MisfitRead) -> str:
 def _tuning(
     best: BestSimulator,
     measured: MeasuredIterations,
-    posterior: FloatArray | None,
+    posteriors: Mapping[tuple[int, int], FloatArray | None],
     tunables: Sequence[Mapping[str, Any]],
     discrepancy: Discrepancy,
 ) -> Tuning:
@@ -116,7 +117,7 @@ def _tuning(
         held_out_error=nan if best.held_out_error is None else best.held_out_error,
         held_out=measured.tested_until(*place),
         interval=tunings.intervals(best.parameters, best.lower, best.upper, best.fit, tunables),
-        posterior=posterior,
+        posterior=posteriors.get(place),
         discrepancy=discrepancy,
         fit=best.fit,
     )

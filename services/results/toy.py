@@ -16,6 +16,7 @@ from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.experiments import hiding
 from gaplab.services.figures.words import titled
 from gaplab.services.specs.assembly import reality_of, simulation_of
+from gaplab.services.specs.measured import samples_of
 from gaplab.services.specs.resolution import is_direct
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import ExperimentRow
@@ -30,13 +31,14 @@ MOST_ROWS = 100_000
 
 @dataclass(frozen=True)
 class _Stored:
-    """The stored part of a repetition; `transferred` has the requested iterations."""
+    """The stored part of a repetition; samples from before are of iteration 0, `transferred` is of those requested."""
 
     row: ExperimentRow
     spec: ResolvedSpec
     robot: Robot
     shown: bool
     measured: tuple[SampleRead, ...]
+    samples: tuple[ToySample, ...]
     simulators: tuple[SimulatorRead, ...]
     transferred: dict[int, MeasuredController | None]
 
@@ -71,6 +73,8 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
     _refuse_outside("repetition", [repetition], row.spec["repetitions"])
     _refuse_outside("iteration", iterations, row.iterations)
     measured = results.page_of_samples(session, row.id, repetition=repetition, kind=None, limit=MOST_ROWS, cursor=None)
+    earlier = samples_of(spec)[: row.known]
+    taken = [each for each in measured if each.kind is MeasurementKind.SAMPLE]
     page = results.page_of_simulators(session, row, repetition=repetition, iteration=None, limit=MOST_ROWS, cursor=None)
     simulators = () if is_direct(spec) else page
     wanted = iterations or [max((each.iteration for each in simulators), default=0)]
@@ -82,6 +86,10 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
         and row.id not in hiding.hidden(session, [row])
         and None not in row.spec["reality"]["parameters"].values(),
         measured=measured,
+        samples=(
+            *(ToySample(iteration=0, gene=each.genome[0], fitness=each.fitness) for each in earlier),
+            *(ToySample(iteration=each.iteration, gene=each.genome[0], fitness=each.fitness) for each in taken),
+        ),
         simulators=simulators,
         transferred={
             each: replays.measured_controller(session, row.id, repetition, each, MeasurementKind.PROBE)
@@ -114,6 +122,7 @@ def _limits(found: _Stored, truth: FloatArray | None, genes: FloatArray) -> tupl
     best = _approximations(found, [each for each in found.simulators if each.rank == 0], genes)
     values = [*best.ravel().tolist(), *([] if truth is None else truth.tolist())]
     values += [each.fitness for each in found.measured if each.fitness is not None]
+    values += [each.fitness for each in found.samples if each.fitness is not None]
     there = [each for each in values if np.isfinite(each)] or [0.0, 1.0]
     return min(there), max(there)
 
@@ -128,7 +137,7 @@ def _toy(
 ) -> ToyIteration:
     simulators = [each for each in found.simulators if each.iteration == iteration]
     transfer = found.transferred[iteration]
-    samples = [each for each in found.measured if each.kind is MeasurementKind.SAMPLE and each.iteration <= iteration]
+    samples = tuple(each for each in found.samples if each.iteration <= iteration)
     best = simulators[0] if simulators and samples else None
     return ToyIteration(
         experiment=found.row.id,
@@ -142,9 +151,7 @@ def _toy(
         squared_error=best and best.squared_error,
         squares=discrepancy_of(found.row.spec).squares,
         error=best and best.error,
-        samples=tuple(
-            ToySample(iteration=each.iteration, gene=each.genome[0], fitness=each.fitness) for each in samples
-        ),
+        samples=samples,
         transfer=transfer and ToyTransfer(gene=transfer.genome[0], simulated=transfer.simulated, real=transfer.real),
         limits=limits,
     )

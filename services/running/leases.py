@@ -7,7 +7,7 @@ answer, and drops the work. Work that was lost is queued again, and fails after 
 All use cases raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from time import monotonic
@@ -24,12 +24,14 @@ from gaplab.services.store.models import LeasedRow
 from gaplab.services.store.session import Store
 from gaplab.services.store.statements import storable
 
+K = TypeVar("K", bound=Hashable)
 
-class Silences:
+
+class Silences(Generic[K]):
     """The heartbeats that one supervisor has seen, and since when each has stayed the same.
 
     A time in the database says too little about hardware: if somebody sets the database's clock, every lease seems to
-    have expired, and a second worker would move a robot that the first still moves. So a supervisor waits until a
+    have expired, and a second holder would move a robot that the first still moves. So a supervisor waits until a
     heartbeat has not changed for a whole lease of its own monotonic clock.
 
     Args:
@@ -38,19 +40,21 @@ class Silences:
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
         self._clock = clock
-        self._since: dict[int, tuple[datetime, float]] = {}
+        self._since: dict[tuple[K, datetime], float] = {}
 
-    def longer_than(self, seconds: float, beats: Mapping[int, datetime]) -> dict[int, datetime]:
-        """Return the heartbeats that have stayed the same for longer than this.
+    def forget(self) -> None:
+        """Begin anew, as after a time in which nobody could give a sign of life."""
+        self._since = {}
+
+    def longer_than_leases(self, held: Sequence[tuple[K, datetime, float]]) -> list[tuple[K, datetime]]:
+        """Return the ids and heartbeats of what was not heard of for a whole lease.
 
         Args:
-            seconds: of this process's clock.
-            beats: time of the last heartbeat by repetition; repetitions that are missing are forgotten.
+            held: id, time of the last heartbeat and seconds of the lease of each; others are forgotten.
         """
         present = self._clock()
-        unchanged = {id_: since for id_, since in self._since.items() if since[0] == beats.get(id_)}
-        self._since = {id_: unchanged.get(id_, (beat, present)) for id_, beat in beats.items()}
-        return {id_: beat for id_, (beat, since) in self._since.items() if present - since > seconds}
+        self._since = {(id_, beat): self._since.get((id_, beat), present) for id_, beat, _ in held}
+        return [(id_, beat) for id_, beat, lease_s in held if present - self._since[id_, beat] > lease_s]
 
 
 STALE_AFTER_S = 30.0
@@ -133,7 +137,7 @@ class Leases(Generic[L]):
         return len(store.write(self._hand_back, (self.table.owner == owner) & self.table.id.not_in(ids)))
 
     def requeue_lost(
-        self, store: Store, *, stale_after_s: float = STALE_AFTER_S, silences: Silences | None = None
+        self, store: Store, *, stale_after_s: float = STALE_AFTER_S, silences: Silences[int] | None = None
     ) -> int:
         """Queue work again whose holder was silent for too long, and return the number of rows.
 
@@ -208,14 +212,14 @@ class Leases(Generic[L]):
         values = {"owner": None, "attempts": self.table.attempts - 1}
         return self.end(session, which, Change(State.QUEUED, Ending.HANDED_BACK, values=values))
 
-    def _requeue_lost(self, session: Session, stale_after_s: float, silences: Silences | None) -> list[Any]:
+    def _requeue_lost(self, session: Session, stale_after_s: float, silences: Silences[int] | None) -> list[Any]:
         beat, present, patience = self.table.heartbeat_at, moment(session), timedelta(seconds=stale_after_s)
         silent, ahead = beat < present - patience, beat > present + patience
         if silences is not None:
             drives = self.drives()
-            held = session.execute(select(self.table.id, beat).where(drives, beat.is_not(None)))
-            quiet = silences.longer_than(stale_after_s, dict(held.all()))
-            silent = (~drives & silent) | (drives & tuple_(self.table.id, beat).in_(quiet.items()))
+            held = session.execute(select(self.table.id, beat).where(drives, beat.is_not(None))).all()
+            quiet = silences.longer_than_leases([(id_, at, stale_after_s) for id_, at in held])
+            silent = (~drives & silent) | (drives & tuple_(self.table.id, beat).in_(quiet))
             ahead = ~drives & ahead
         self.free_lost(session, silent | ahead)
         lost = self.lose(session, silent, f"its worker was not heard of for {stale_after_s:g} s")

@@ -1,7 +1,7 @@
 """Assembly: from a resolved spec to the simulation and the reality of its repetitions."""
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cache, partial
+from functools import lru_cache, partial
 from types import ModuleType
 
 import numpy as np
@@ -31,6 +31,9 @@ from gaplab.services.specs.measured import samples_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.rollouts import hardware_of
 from gaplab.services.specs.simulation import Simulation
+
+WARM_ENGINES = 4
+"""Most engines that a process keeps; each keeps worlds, of 34 MB each in Bullet. A repetition has two at most."""
 
 
 class HiddenReality:
@@ -184,7 +187,7 @@ def engine_of(ref: PluginRef) -> Engine:
     return _warm_engine(external_plugins.package(), ref.model_dump_json())
 
 
-@cache
+@lru_cache(maxsize=WARM_ENGINES)
 def _warm_engine(_package: ModuleType | None, ref: str) -> Engine:
     return engines.create(PluginRef.model_validate_json(ref))
 

@@ -1,7 +1,7 @@
 """The simulation of a robot on an engine, in worlds that tunables edit."""
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -28,9 +28,8 @@ class Simulation:
     def __init__(self, robot: Robot, engine: Engine, edits: Sequence[Tunable]) -> None:
         self._robot = robot
         self._engine = engine
-        self._edits = tuple(edits)
-        self._order = sorted(range(len(self._edits)), key=lambda place: self._edits[place].order)
-        self._world = lru_cache(maxsize=WORLDS_KEPT)(self._edited)
+        edited = partial(_edited, robot.world, sorted(enumerate(edits), key=lambda placed: placed[1].order))
+        self._world = lru_cache(maxsize=WORLDS_KEPT)(edited)  # it does not refer to this object, and ends with it
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed.
@@ -84,12 +83,6 @@ class Simulation:
         """Return the world of a simulator `(p,)`."""
         return self._world(tuple(parameters.tolist()))
 
-    def _edited(self, values: tuple[float, ...]) -> World:
-        world = self._robot.world
-        for place in self._order:
-            world = self._edits[place].edit(world, values[place])
-        return world
-
     def _rollouts(self, genomes: Genomes, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
         """Return the trajectories `(n, m, ...)`; the worlds of one noise are simulated together."""
         noises = {world.noise: None for world in worlds}
@@ -108,6 +101,12 @@ class Simulation:
             np.stack([each.positions_m for each in columns], axis=1),
             np.stack([each.orientations for each in columns], axis=1),
         )
+
+
+def _edited(world: World, edits: Sequence[tuple[int, Tunable]], values: tuple[float, ...]) -> World:
+    for place, edit in edits:
+        world = edit.edit(world, values[place])
+    return world
 
 
 def _disturbed(world: World, motions: Sequence[Motion | Loop], genomes: Genomes) -> Sequence[Motion | Loop]:

@@ -19,12 +19,15 @@ class Checkpoint:
         part: number of the checkpoint within the step, from 0.
         answers: answers, packed by `gaplab.services.core.answers`.
         seconds: seconds of work that they took.
+        rollouts, budget: rollouts of the step so far, and those that it was given.
     """
 
     step: int
     part: int
     answers: bytes
     seconds: float
+    rollouts: int = 0
+    budget: int = 0
 
 
 @dataclass(frozen=True)

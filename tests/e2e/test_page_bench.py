@@ -2,14 +2,12 @@
 
 import re
 from contextlib import suppress
-from datetime import timedelta
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Error, expect
-from sqlalchemy import update
 
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
@@ -18,11 +16,9 @@ from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.experiments.submission import submit_experiment
-from gaplab.services.store.clock import moment as moment_of
-from gaplab.services.store.models import RequestRow
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
-from tests.integration.test_bench import bench, compute, finish
+from tests.integration.test_bench import bench, compute, fall_silent, finish
 from tests.integration.test_bench_http import traces_of
 
 PHONE = {"width": 390, "height": 844}
@@ -295,7 +291,7 @@ def test_conflicts_are_decided_stuck_requests_opened_and_refusals_shown(visit: A
     (stuck,) = waiting(written, experiment)
     for _ in range(5):
         taking.take(written, stuck.id, TakeSpec(operator="robot 7", lease_s=1.0), FREELY)
-        expire(written)
+        fall_silent(written)
 
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
     page.get_by_role("heading", name="Conflicts to decide").wait_for()
@@ -320,14 +316,6 @@ def test_conflicts_are_decided_stuck_requests_opened_and_refusals_shown(visit: A
     assert waiting(written, experiment)[0].state == "open"
 
 
-def expire(store: Store) -> None:
-    """Let the takes run out that are held now."""
-    with store.transaction() as session:
-        before = moment_of(session) - timedelta(hours=1)
-        session.execute(update(RequestRow).where(RequestRow.held.is_not(None)).values(taken_until=before))
-    taking.open_again(store)
-
-
 @pytest.mark.release
 @pytest.mark.parametrize("mode", ["light", "dark", "phone"])
 def test_the_bench_and_its_experiment_are_accessible(visit: Any, api: Any, written: Store, mode: str) -> None:
@@ -350,11 +338,16 @@ def test_the_bench_and_its_experiment_are_accessible(visit: Any, api: Any, writt
 
 @pytest.mark.release
 def test_an_experiment_shows_repeats_history_and_closed_branches(visit: Any, api: Any, written: Store) -> None:
-    experiment = submit_experiment(written, bench(name="told", reality={"bench": "told", "repeats": 2}))
+    known = [{"genome": [0.3], "values": [0.31, 0.33]}]
+    reality = {"bench": "told", "repeats": 2, "samples": known}
+    experiment = submit_experiment(written, bench(name="told", reality=reality))
     finish(written, lambda genome: genome[0])
     page = visit(f"{api.url}/#/experiments/{experiment.id}?tab=samples")
     page.locator(".state-now .completed").wait_for()
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
+    expect(page.locator("dl.facts")).to_contain_text("after 2 real-world evaluations (and 1 from before)")
+    earlier = page.get_by_role("tabpanel").locator("tbody tr").first
+    expect(earlier).to_have_text("all–sample from before0.31, 0.330.32✓ measured––")
     page.get_by_role("button", name="Correct… sample of iteration 1, repetition 0").click()
     dialog = page.get_by_role("dialog")
     expect(dialog).to_contain_text("will be computed again")

@@ -222,6 +222,21 @@ def test_a_body_that_is_no_json_or_no_object_or_breaks_parsers_is_refused(api: T
     assert kinds[1] == ["not-json"] * 3
 
 
+def test_a_body_that_nests_too_deep_is_refused_with_the_place_and_the_limit(api: TestClient) -> None:
+    def nested(levels: int) -> str:
+        return json.dumps(LEAST).replace('"simulated_fit"', '{"name": "random", "options": {"x": %s1%s}}') % (
+            "[" * levels,
+            "]" * levels,
+        )
+
+    deep, deeper = (api.post("/experiments", content=nested(levels), headers=JSON) for levels in (29, 900))
+    robot = api.post("/robots", content=f'{{"world": {"[" * 900}{"]" * 900}}}', headers=JSON)
+
+    assert only_error(deep)["pointer"] == "/strategy/options/x"
+    assert only_error(deeper)["pointer"] == "/strategy/options/x" + "/0" * 29
+    assert only_error(deeper)["permitted"] == only_error(robot)["permitted"] == "at most 32 levels"
+
+
 def test_a_body_without_its_content_type_is_refused_with_the_header_that_it_needs(api: TestClient) -> None:
     answer = api.post("/experiments", content=json.dumps(LEAST), headers={"content-type": "text/plain"})
 

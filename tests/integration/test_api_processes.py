@@ -38,6 +38,9 @@ def alive(pid: int) -> bool:
         return False
 
 
+LINGERING = "from threading import Event, Thread\n\nThread(target=Event().wait).start()\n"
+
+
 def serve(environment: dict[str, str], *arguments: str) -> "subprocess.Popen[str]":
     return subprocess.Popen(
         [sys.executable, "-m", "gaplab", "serve", *arguments],
@@ -64,7 +67,36 @@ def port() -> int:
     return free_port()
 
 
-@pytest.mark.parametrize("how", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.release)])
+@pytest.mark.parametrize(
+    ("arguments", "ready"),
+    [
+        (("gaplab", "serve", "--no-workers"), "gaplab serves on"),
+        (("gaplab.api",), "warning"),
+        pytest.param(("gaplab.workers", "serve"), "ready for", marks=pytest.mark.release),
+    ],
+)
+def test_a_thread_of_a_plug_in_keeps_no_process(
+    tmp_path: Path, sqlite_url: str, port: int, arguments: tuple[str, ...], ready: str
+) -> None:
+    (tmp_path / "lingering.py").write_text(LINGERING)
+    (tmp_path / "unused.txt").touch()  # which is warned of
+    environment = {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_PLUGINS": str(tmp_path), "GAPLAB_PORT": str(port)}
+    command = [sys.executable, "-m", *arguments]
+    with subprocess.Popen(command, env=os.environ | environment, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert any(ready in line for line in process.stderr)
+        process.terminate()
+
+        try:
+            assert process.wait(LONGEST_S) == 0
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize(
+    "how",
+    [signal.SIGHUP, *(pytest.param(each, marks=pytest.mark.release) for each in (signal.SIGTERM, signal.SIGINT))],
+)
 def test_a_service_migrates_its_database_answers_and_ends_in_order(
     tmp_path: Path, port: int, how: signal.Signals
 ) -> None:

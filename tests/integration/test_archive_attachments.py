@@ -1,6 +1,7 @@
 """Files beside measurements go with the archive of the answers that name them, and come back with it."""
 
 import json
+import re
 import zipfile
 from hashlib import sha256
 from io import BytesIO
@@ -17,11 +18,13 @@ from gaplab.services.bench import attachments
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.experiments.deletion import Deleter, delete_experiment
 from gaplab.services.experiments.listing import list_experiments
+from gaplab.services.experiments.reading import read_experiment
 from gaplab.services.experiments.submission import submit_experiment, submit_study
+from gaplab.services.settings import Limits, variable_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.session import Store
 from tests.archiving import exported, imported
-from tests.integration.test_archives_bad import packed
+from tests.integration.test_archives_bad import packed, set_in, with_table
 from tests.integration.test_bench import bench, compute, measure, pending
 
 PHOTO, TRACE = b"\xff\xd8 a photograph" * 9_000, b"time_s,x\n0,1\n"
@@ -150,7 +153,10 @@ def test_a_file_without_a_row_or_a_row_without_a_file_is_refused(sqlite_store: S
 def test_a_file_that_no_answer_names_is_refused(sqlite_store: Store, good: dict[str, bytes]) -> None:
     (answer,) = map(json.loads, good["answer.jsonl"].splitlines())
 
-    for names, what in (([sha256(TRACE).hexdigest()], "no answer names"), ([{}], "no list of hashes")):
+    for names, what in (
+        ([sha256(TRACE).hexdigest()], "no answer names"),
+        ([{}], "answer, row 1, attachments/0: item 0 of attachments must be text"),
+    ):
         changed = json.dumps(answer | {"attachments": names}).encode() + b"\n"
         refused(sqlite_store, packed(good | {"answer.jsonl": changed}), what)
 
@@ -185,3 +191,55 @@ def test_an_archive_with_photographs_is_let_in_over_http(store: Store) -> None:
 
         assert (gone, answer.status_code) == (404, 201)
         assert api.get(f"/attachments/{photo}").content == PHOTO
+
+
+def changed(members: dict[str, bytes], table: str, **values: Any) -> bytes:
+    """An archive with other values in the first row of a table."""
+    if f"{table}.parquet" in members:
+        return packed(with_table(members, table, lambda rows: set_in(rows, 0, **values)))  # type: ignore[no-any-return]
+    first, *others = members[f"{table}.jsonl"].splitlines()
+    lines = [json.dumps(json.loads(first) | values).encode(), *others, b""]
+    return packed(members | {f"{table}.jsonl": b"\n".join(lines)})  # type: ignore[no-any-return]
+
+
+BAD: list[tuple[str, dict[str, Any], str]] = [
+    ("request", {"safety": [1, 2]}, "request, row 1, safety: safety must be an object"),
+    ("request", {"safety": {"failed": 0}}, "request, row 1, safety/simulators: simulators is missing"),
+    ("request", {"genome": [0.5, 0.5]}, "/genome: a controller of the toy_function has 1 genes, not 2"),
+    ("request", {"genome": [500.0]}, "/genome/0: gene 0 must be from 0 to 1, not 500"),
+    ("measurement", {"genome": [500.0]}, "/genome/0: gene 0 must be from 0 to 1, not 500"),
+    ("iteration", {"transferred_genome": [-0.1]}, "/genome/0: gene 0 must be from 0 to 1, not -0.1"),
+    ("answer", {"values": []}, "answer, row 1, values: values must have at least 1 item"),
+    ("answer", {"readings": [[0.1]]}, "answer, row 1, readings/0/0: item 0 of readings must be a list"),
+    ("answer", {"readings": [[[0.1]]]}, "/readings/0: repeat 0 has 1 rows, and the sensors are read at 0 times"),
+    ("answer", {"traces": [{"x": 1}]}, "answer, row 1, traces/0/attachment: attachment is missing"),
+    ("answer", {"traces": [{"attachment": "ab" * 32, "lag_s": 0.0}]}, "each trace must be among the attachments"),
+    ("answer", {"doubts": [1]}, "answer, row 1, doubts/0: item 0 of doubts must be text"),
+    ("experiment", {"precedence": -(2**30)}, "experiment, row 1, precedence: precedence must be at least -10"),
+    ("experiment", {"max_parallel": 0}, "experiment, row 1, max_parallel: max_parallel must be at least 1"),
+]
+
+
+def test_whatever_a_request_later_reads_is_checked_when_it_arrives(sqlite_store: Store, good: dict[str, bytes]) -> None:
+    for table, values, what in BAD:
+        refused(sqlite_store, changed(good, table, **values), re.escape(what))
+
+
+def test_what_goes_on_here_stays_within_the_limits_of_a_submission(sqlite_store: Store, other: Store) -> None:
+    experiment = submit_experiment(sqlite_store, bench(repetitions=2, budget={"controller_evaluations": 10**7})).id
+    members = members_of(exported(export_experiment(sqlite_store, experiment)))
+    archive = changed(members, "experiment", rollouts=2**47)
+    expected = read_experiment(sqlite_store, experiment).progress.rollouts
+
+    refused = {
+        name: TestClient(create_app(other, limits=Limits(**{name: 1}))).post("/import", content=archive)  # type: ignore[arg-type]
+        for name in ("iterations", "repetitions", "unconfirmed_core_hours", "rollouts_per_token")
+    }
+    api = TestClient(create_app(other, limits=Limits(unconfirmed_core_hours=1, experiments=1)))
+    let_in = api.post("/import?confirm_cost=true", content=archive)
+    full = api.post("/import?confirm_cost=true", content=archive)
+
+    assert [each.status_code for each in (*refused.values(), let_in, full)] == [422, 422, 422, 429, 201, 429]
+    for name, answer in refused.items():
+        assert variable_of(name) in answer.json()["detail"]
+    assert read_experiment(other, experiment).progress.rollouts == expected

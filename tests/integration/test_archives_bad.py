@@ -245,6 +245,11 @@ BOUNDED = {"name": "static_friction", "lower": 0.0, "upper": 1.0}
 PARTS = ("name", "iterations", "repetitions", "robot", "engine", "tunables", "tuner", "optimizer", "budget", "seed")
 
 
+NESTED = json.loads("[" * 900 + "]" * 900)
+DEEP = "experiment, row 1, /spec/strategy/options/x/0/0/0/0/0"
+LONG = "bytes; 2,000,000 are permitted, twice GAPLAB_MAX_BODY_BYTES"
+
+
 def without(part: Any) -> Any:
     return lambda spec: {name: value for name, value in spec.items() if name != part}
 
@@ -295,6 +300,8 @@ EXPERIMENTS: list[tuple[dict[str, Any], str]] = [
     ),
     ({"spec": in_spec(reality=None)}, "not a spec"),
     ({"spec_version": 99}, "version 99"),
+    ({"spec": in_spec(strategy={"name": "random", "options": {"x": NESTED}})}, DEEP),
+    ({"spec": in_spec(strategy={"name": "simulated_fit", "options": {"x": "x" * 2_000_000}})}, LONG),
 ]
 
 

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
+from plotly.offline import get_plotlyjs_version
 
 from gaplab.api.app import create_app
 from gaplab.api.http.assets import modules_of, version_of
 from gaplab.api.routes.dashboard import FILES
 from gaplab.schemas.spec import StudySpec
+from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.plugins.catalogue import catalogue
 from gaplab.services.specs.resolution import resolve_study
 from gaplab.services.store.session import Store
+from tests.figures import FIGURES
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PRESETS = {each["name"]: each["spec"] for each in json.loads((FILES / "presets.json").read_text())}
@@ -25,9 +28,8 @@ def api(sqlite_store: Store) -> TestClient:
 
 
 def test_plotly_is_sent_compressed_under_an_address_that_is_kept_for_good(api: TestClient) -> None:
-    (path,) = {
-        f"/assets/plotly/plotly.min.js?v={each}" for each in api.get("/").text.split('data-plotly="')[1].split('"')[:1]
-    }
+    version = api.get("/").text.split('data-plotly="')[1].split('"')[0]
+    path = f"/assets/plotly/plotly-basic.min.js?v={version}"
 
     packed = api.get(path, headers={"accept-encoding": "gzip"})
     plain = api.get(path, headers={"accept-encoding": "identity"})
@@ -38,6 +40,16 @@ def test_plotly_is_sent_compressed_under_an_address_that_is_kept_for_good(api: T
     assert int(packed.headers["content-length"]) < int(plain.headers["content-length"]) / 2
     assert "immutable" in packed.headers["cache-control"]
     assert packed.headers["content-security-policy"].startswith("default-src 'none'")
+
+
+def test_the_page_loads_as_much_of_plotly_as_figures_use_in_the_version_that_notebooks_have(api: TestClient) -> None:
+    (script,) = re.findall(r"assets/plotly/[\w.-]+", api.get("/assets/dashboard/lib/plot.js").text)
+
+    sent = api.get(script).text
+
+    assert len(sent) < 1_500_000  # a browser compiles five in seconds
+    assert f"(basic - minified) v{get_plotlyjs_version()}" in sent[:100]
+    assert {each["type"] for figure in FIGURES for each in chart(figure)["data"]} == {"scatter", "bar"}
 
 
 def test_a_module_that_has_not_changed_is_not_sent_again(api: TestClient) -> None:

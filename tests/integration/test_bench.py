@@ -30,16 +30,19 @@ from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.deletion import Deleter, delete_experiment
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.reading import list_samples, read_experiment
+from gaplab.services.experiments.states import settle
 from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.reports.content import verdict_on
 from gaplab.services.reports.outcome import outcome_of
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
+from gaplab.services.running.leases import Silences
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.lease import Pulse
 from gaplab.services.store.models import AttachmentRow, IterationRow, RepetitionRow, RequestRow
+from gaplab.services.store.queries import requests
 from gaplab.services.store.queries.costs import work_of
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
@@ -93,6 +96,12 @@ def truth(spec: ExperimentSpec) -> Callable[[Any], float]:
 def measure(store: Store, request: Any, *values: float, **changes: Any) -> Any:
     spec = MeasurementSpec(values=values, operator="Ada", **changes)
     return answering.answer(store, request.id, spec, FREELY).answer
+
+
+def fall_silent(store: Store) -> int:
+    """End the takes that are held, as a supervisor does that hears nothing for their whole lease."""
+    silences = Silences[str](iter([0.0, 1e9]).__next__)
+    return [taking.open_again(store, silences) for _ in range(2)][-1]
 
 
 def finish(store: Store, fitness: Callable[[Any], float]) -> list[Any]:
@@ -188,21 +197,71 @@ def test_a_take_has_one_holder_and_a_bench_one_take(store: Store) -> None:
 
 @pytest.mark.dialects
 @pytest.mark.parametrize("by_s", [-3600, 3600])
-def test_a_take_ends_with_its_lease_also_if_the_clock_was_set(store: Store, by_s: float) -> None:
-    """`taken_until` in the past is over; so is one that no heartbeat could have set."""
-    submit_experiment(store, bench())
+def test_a_take_ends_by_silence_and_a_clock_that_was_set_ends_none(store: Store, by_s: float) -> None:
+    submit_experiment(store, bench(repetitions=2))
     compute(store)
-    (request,) = pending(store)
-    for count in range(1, 6):
-        taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
-        with store.transaction() as session:
+    request, other = pending(store)
+    time = [0.0]
+    silences = Silences[str](lambda: time[0])
+    for state in ("open", "open", "open", "open", "stuck"):
+        take = taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY).answer.takes
+        assert taking.open_again(store, silences) == 0
+        with store.transaction() as session:  # the heartbeat was given by the clock before it was set
             until = session.get_one(RequestRow, request.id).taken_until
             assert until is not None
             session.execute(update(RequestRow).values(taken_until=until + timedelta(seconds=by_s)))
-        assert pending(store)[0].state == ("open" if count < 5 else "stuck")
+        with pytest.raises(Conflict, match="one is taken at a time"):
+            taking.take(store, other.id, TakeSpec(operator="Bo"), FREELY)
+        for _ in range(2):
+            assert taking.open_again(store, silences) == 0
+            time[0] += 599.0
+            assert taking.open_again(store, silences) == 0
+            assert taking.heartbeat(store, request.id, HolderSpec(take=take)).state == "taken"
+        assert taking.open_again(store, silences) == 0
+        time[0] += 601.0
+        restarted = Silences[str](lambda: time[0])
+        assert (taking.open_again(store, restarted), taking.open_again(store, silences)) == (0, 1)
+        assert pending(store)[0].state == state
     with pytest.raises(Conflict, match="5 times in a row"):
         taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
     assert taking.reopen(store, request.id).state == "open"
+
+
+@pytest.mark.dialects
+@pytest.mark.parametrize("taken_since", [False, True])
+def test_an_answer_of_a_take_that_ended_by_silence_counts_unless_another_took_the_bench_since(
+    store: Store, taken_since: bool
+) -> None:
+    submit_experiment(store, bench(repetitions=2))
+    compute(store)
+    hers, his = pending(store)
+    taking.take(store, hers.id, TakeSpec(operator="Ada"), FREELY)
+    assert fall_silent(store) == 1
+    if taken_since:
+        taking.take(store, his.id, TakeSpec(operator="Bo"), FREELY)
+        taking.release(store, his.id, ReleaseSpec(take=1))
+
+    late = measure(store, hers, 0.3, take=1)
+
+    assert late.state == ("conflict" if taken_since else "counted")
+    if taken_since:
+        again = taking.take(store, hers.id, TakeSpec(operator="Bo"), FREELY).answer
+        assert measure(store, hers, 0.5, take=again.takes).state == "counted"
+
+
+@pytest.mark.dialects
+def test_a_bench_is_one_however_its_name_is_spaced_and_capitalised(store: Store) -> None:
+    for name in ("The table", " the  TABLE "):
+        submit_experiment(store, bench(reality={"bench": name}))
+        compute(store)
+    first, second = pending(store)
+    taking.take(store, first.id, TakeSpec(operator="Ada"), FREELY)
+
+    with pytest.raises(Conflict, match="one is taken at a time"):
+        taking.take(store, second.id, TakeSpec(operator="Bo"), FREELY)
+
+    found = taking.list_requests(store, RequestFilter(bench="THE TABLE")).items
+    assert [(each.bench, each.busy) for each in found] == [("The table", False), ("The table", True)]
 
 
 def test_no_take_ends_while_its_request_is_answered(postgres_store: Store) -> None:
@@ -212,7 +271,7 @@ def test_no_take_ends_while_its_request_is_answered(postgres_store: Store) -> No
     (request,) = pending(postgres_store)
     seen = select(RequestRow.id).with_for_update(skip_locked=True)
     with postgres_store.transaction() as session, postgres_store.transaction() as another:
-        taking.locked(session, request.id)
+        requests.locked(session, request.id)
         assert another.scalars(seen).all() == []
     with postgres_store.transaction() as session:
         assert session.scalars(seen).all() == [request.id]
@@ -497,6 +556,31 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
     assert [taking.none_will_follow(store, each) for each in (*waiting_for, RequestFilter())] == [False, True, False]
 
 
+@pytest.mark.dialects
+def test_a_bench_stays_taken_until_its_holder_has_let_go_or_is_silent(store: Store) -> None:
+    """Also if the request is wanted no more, or somebody else's answer counts: a driver may still move the robot."""
+    first, second, third = (submit_experiment(store, bench(reality={"bench": "table"})) for _ in range(3))
+    compute(store)
+    one, two, three = pending(store)
+    for request, experiment in ((one, first), (two, second)):
+        taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
+        if request is one:
+            lifecycle.ask_experiment(store, experiment.id, Verb.CANCEL)
+        else:
+            other = measure(store, request, 0.3)
+            corrections.decide(store, other.id, ConflictSpec(counts="this", reason="Ada's phone is dead"), FREELY)
+        with pytest.raises(Conflict, match="take 1 of request"):
+            taking.heartbeat(store, request.id, HolderSpec(take=1))
+        with pytest.raises(Conflict, match="one is taken at a time"):
+            taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY)
+        if request is one:
+            assert taking.release(store, request.id, ReleaseSpec(take=1)).state == "withdrawn"
+        else:
+            assert fall_silent(store) == 1
+
+    assert taking.take(store, three.id, TakeSpec(operator="Bo"), FREELY).answer.experiment == third.id
+
+
 def test_known_samples_tune_the_first_simulators(store: Store) -> None:
     spec = bench()
     real = truth(spec)
@@ -617,9 +701,14 @@ def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) 
         there = imported(other, archive)
     assert there.called_off == ()
     first, second = (read_experiment(other, id_) for id_ in (experiment.id, there.experiments[0]))
-    assert (first.state, second.state) == (State.QUEUED, State.QUEUED)
     for each in (first, second):
+        assert (each.state, each.reasons) == (State.PAUSED, ("it was imported",))
         assert len(list_branches(other, each.id)) == 1
+        asked = taking.list_requests(other, RequestFilter(experiment=each.id, pending=False)).items
+        assert [request.state for request in asked] == ["measured", "measured", "withdrawn", "withdrawn"]
+    assert compute(other) == 0
+    for each in (first, second):
+        lifecycle.ask_experiment(other, each.id, Verb.RESUME)
     finish(other, real)
     finish(store, real)
     (expected,) = log_of(store, experiment)
@@ -723,16 +812,16 @@ def test_fifty_operators_at_once_get_one_request_each_or_none(store: Store) -> N
 
 @pytest.mark.dialects
 @pytest.mark.parametrize("claimed", [False, True])
-def test_an_answer_counts_also_while_a_repetition_is_on_its_way_to_the_request(
-    store: Store, other: Store, claimed: bool
-) -> None:
+def test_an_answer_counts_also_while_a_repetition_is_on_its_way_to_the_request(store: Store, claimed: bool) -> None:
     experiment = submit_experiment(store, bench())
     compute(store)
-    imported(other, exported(export_experiment(store, experiment.id)))
-    claims = execution.claim(other, "slow", 1) if claimed else ()
-    assert measure(other, pending(other)[0], 0.5).state == "counted"
+    with store.transaction() as session:  # as earlier versions imported it
+        session.execute(update(RepetitionRow).values(state=State.QUEUED))
+        settle(session, [experiment.id], State.QUEUED)
+    claims = execution.claim(store, "slow", 1) if claimed else ()
+    assert measure(store, pending(store)[0], 0.5).state == "counted"
     for claim in claims:
         items = [each for each in recorded(setting(claim.spec, 0), claim.log, ()) if not isinstance(each, Pulse)]
-        assert execution.record_all(other, [(claim, items)]) == ()
-    compute(other)
-    assert [each.iteration for each in pending(other)] == [1]
+        assert execution.record_all(store, [(claim, items)]) == ()
+    compute(store)
+    assert [each.iteration for each in pending(store)] == [1]

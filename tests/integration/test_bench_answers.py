@@ -6,10 +6,17 @@ import pytest
 
 from gaplab.schemas.corrections import ConflictSpec
 from gaplab.schemas.measurements import MeasurementSpec, ReleaseSpec, TakeSpec
+from gaplab.schemas.traces import TracesRead, TracesSpec
 from gaplab.services.bench import answering, corrections, taking
+from gaplab.services.core.errors import LimitReached
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.replay.process import RolloutProcess
+from gaplab.services.replay.sent_specs import sent as sent_spec
+from gaplab.services.replay.traces import evaluate_traces, said_by_files
 from gaplab.services.store.session import Store
+from gaplab.services.waiting_line import WaitingLine
 from tests.integration.test_bench import bench, compute, pending, sent, undecided
 
 ROBOT = '''
@@ -130,3 +137,35 @@ def test_an_answer_after_the_end_of_the_latest_take_is_of_its_holder(store: Stor
     late = given(store, request_, take=1, values=(0.4,))
 
     assert (late.operator, late.state) == ("Ada", "counted")
+
+
+class Opened(dict[str, bytes]):
+    """Files that say how often each was opened."""
+
+    def __init__(self, files: dict[str, bytes]) -> None:
+        super().__init__(files)
+        self.opened: list[str] = []
+
+    def __getitem__(self, name: str) -> bytes:
+        self.opened.append(name)
+        return super().__getitem__(name)
+
+
+def test_a_trace_is_read_once_and_in_the_line_of_rollouts(store: Store) -> None:
+    experiment = submit_experiment(store, bench(reality={"repeats": 3}))
+    compute(store)
+    (request,) = pending(store)
+    trace = b"time_s,x,y,z,qx,qy,qz,qw\n3,0,0,0,0,0,0,1\n5,1,0,0,0,0,0,1\n"
+    files, asked = Opened({"a" * 64: trace, "b" * 64: trace}), TracesSpec(traces=("a" * 64, "b" * 64, "a" * 64))
+    line = WaitingLine("replays", longest_s=0.0)
+    rollouts = RolloutProcess(line=line)
+
+    spec = spec_of(experiment.spec)
+    said = said_by_files(sent_spec(spec), request.genome, [0.5] * len(spec.tunables), asked, files)
+    with line.turn(), pytest.raises(LimitReached):
+        evaluate_traces(store, rollouts, request.id, TracesSpec(traces=(sent(store, "no trace"),)))
+
+    assert isinstance(said, TracesRead)
+    assert said.values == (0.5, 0.5, 0.5)
+    assert sorted(files.opened) == ["a" * 64, "b" * 64]
+    assert rollouts.pid is None

@@ -15,15 +15,18 @@ import gaplab
 from gaplab import Client, InvalidSamples, ServiceError, ServiceUnreachable
 from gaplab.api.clients import driving
 from gaplab.api.clients.journal import Journal
+from gaplab.api.clients.takes import TakeLost
 from gaplab.schemas.access import Role
-from gaplab.schemas.measurements import RequestRead
+from gaplab.schemas.measurements import RequestRead, TakeSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services import access
+from gaplab.services.bench import taking
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.experiments.limits import FREELY
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
 from tests.experiments import toy
-from tests.integration.test_bench import compute, truth
+from tests.integration.test_bench import compute, fall_silent, truth
 from tests.integration.test_bench_safety import ask
 from tests.integration.test_client import InProcess
 from tests.waiting import wait_until
@@ -122,11 +125,29 @@ def test_a_driver_that_died_after_a_repeat_goes_on_with_the_next(client: Client,
 
 
 @pytest.mark.usefixtures("computing")
+def test_repeats_from_before_a_void_do_not_count(client: Client, tmp_path: Path) -> None:
+    experiment, known = submitted(client, repeats=3), []
+    for value in (0.25, 0.5):
+        for request in client.requests(experiment.id, journal=tmp_path / "journal"):
+            request.note(value)
+            break  # the driver ends
+        if value == 0.25:
+            answer = client.bench.answer(request.id, [0.1, 0.1, 0.1], operator="Ada")
+            client.bench.void(answer.id, reason="the floor was wet")
+    for request in client.requests(experiment.id, journal=tmp_path / "journal"):
+        known = request.known
+        break
+
+    assert known == [(0.5, None)]
+
+
+@pytest.mark.usefixtures("computing")
 def test_an_answer_in_the_journal_is_sent_when_the_driver_starts_again(client: Client, tmp_path: Path) -> None:
     submitted(client)
     (request,) = client.bench.pending(wait_s=60)
     with Journal(tmp_path / "journal") as journal:
         journal.answer(request.id, {"values": [0.5]})
+    assert (tmp_path / "journal").stat().st_mode & 0o777 == 0o600
     for following in client.requests(journal=tmp_path / "journal"):
         assert following.id != request.id
         break
@@ -173,6 +194,45 @@ def test_a_driver_finds_an_open_request_behind_a_page_of_those_of_a_busy_bench(
     assert found.request.experiment == free.id
     assert len(client.bench.pending()) == 53
     busy.close()
+
+
+def test_an_answer_that_no_service_knows_stays_in_the_journal(client: Client, store: Store, tmp_path: Path) -> None:
+    experiment = submitted(client)
+    compute(store)
+    with Journal(tmp_path / "journal") as journal:
+        journal.answer("of-a-newer-database", {"values": [0.5]})
+
+    loop = client.requests(experiment.id, journal=tmp_path / "journal")
+    assert next(loop).request.experiment == experiment.id
+    loop.close()  # type: ignore[attr-defined]
+
+    with Journal(tmp_path / "journal") as journal:
+        assert [request for request, _, _ in journal.unsent()] == ["of-a-newer-database"]
+
+
+def test_lines_of_a_journal_that_cannot_be_used_are_kept_beside_it_and_told_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file, beside = tmp_path / "journal", tmp_path / "journal.unreadable"
+    with Journal(file) as journal:
+        journal.repeat("r", 0.5)
+    wrong = [
+        b"\xff\x00",
+        b'{"request": "r", "answer": {}}',
+        b"[1]",
+        b"[" * 100_000,
+        b'{"request": "r", "repeat": 1e999}',
+    ]
+    with file.open("ab") as lines:
+        lines.write(b"\n".join([*wrong, b'{"sent": ["r"]}', b'{"request": "half']))
+
+    for _ in range(2):
+        with Journal(file) as journal:
+            journal.repeat("r", 0.25)
+
+    assert journal.repeats("r") == [(0.5, None), (0.25, None), (0.25, None)]
+    assert beside.read_bytes().splitlines() == [*wrong, b'{"sent": ["r"]}', b'{"request": "half']
+    assert caplog.text.count("a line of the journal cannot be used") == 7
 
 
 @pytest.mark.parametrize("status", [401, 403])
@@ -352,6 +412,30 @@ def test_the_take_of_a_dead_phone_is_ended_by_somebody_else_with_the_reason(clie
     assert {"by": "Bea", "operator": "Ada", "reason": "her phone is dead"}.items() <= event.body.items()
     late = client.bench.answer(request.id, [0.4], take=taken.takes)
     assert (late.state, late.operator) == ("counted", "Ada")
+
+
+def test_what_two_programs_measured_at_once_does_not_count_by_itself(client: Client, store: Store) -> None:
+    experiment = client.submit(SPEC | {"reality": REALITY, "repetitions": 3})
+    compute(store)
+    loop = client.requests(experiment.id)
+    task = next(loop)
+    task.note(0.1)
+    fall_silent(store)
+    _, second, third = client.bench.pending(experiment.id)
+    for each in (second, third):
+        taking.take(store, each.id, TakeSpec(operator="Bo"), FREELY)
+        if each is second:
+            counted = client.bench.answer(each.id, [0.5], take=1)
+    with pytest.raises(TakeLost, match="take 1 of request"):
+        task.take.ask()
+
+    mine = task.tell(0.4)
+
+    other = client.bench.answer(third.id, [0.3], take=1)
+    assert (mine.state, other.state) == ("conflict", "conflict")
+    (doubt,) = client.bench.request(second.id).answers[0].doubts
+    assert (counted.doubts, "had the robot too, and may have moved it" in doubt) == ((), True)
+    loop.close()  # type: ignore[attr-defined]
 
 
 def test_readings_of_numpy_are_stored_with_null_where_a_sensor_failed(

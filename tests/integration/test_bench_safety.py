@@ -6,18 +6,22 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.corrections import VoidSpec
+from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.measurements import AnswerState, MeasurementSpec
 from gaplab.schemas.records import MeasurementKind
+from gaplab.services.archives import export_experiment
 from gaplab.services.bench import answering, corrections, taking
 from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Probed, Selected, Simulator, Step, Transferred, Tuned
+from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Claim, Requested
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
+from tests.archiving import exported, imported
 from tests.experiments import toy
 
 GENOME = frozen(np.full(24, 0.5))
@@ -104,3 +108,24 @@ def test_a_controller_is_offered_with_its_forecast(store: Store, beyond: str, to
         and {name: tuple(value) if isinstance(value, list) else value for name, value in told.items() if value}
         | {"failed": 0}
     )
+
+
+def test_a_forecast_is_made_here_and_never_imported(store: Store, other: Store) -> None:
+    experiment = submit(store, "warn")
+    ask(store, safety=safety())
+    archives = [exported(export_experiment(store, experiment))]
+    (request,) = requests_of(store, experiment)
+    answering.answer(store, request.id, MeasurementSpec(values=(0.4,), operator="Ada"), FREELY)
+    archives.append(exported(export_experiment(store, experiment)))
+
+    open_, answered = (imported(other, each).experiments[0] for each in archives)
+    (withdrawn,), (measured,) = requests_of(other, open_), requests_of(other, answered)
+    corrections.void(other, measured.answers[0].id, VoidSpec(reason="the floor was wet"), FREELY)
+    (again,) = requests_of(other, answered)
+
+    assert (withdrawn.state, measured.state, again.state) == ("withdrawn", "measured", "withdrawn")
+    assert withdrawn.safety is measured.safety is again.safety is None
+    assert request.safety is not None
+    for each in (open_, answered):
+        lifecycle.ask_experiment(other, each, Verb.RESUME)
+    assert {claim.experiment_id for claim in execution.claim(other, "here", 9)} == {open_, answered}

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaplab.api.clients.progress.text import counts
 from gaplab.schemas.lifecycle import State, Verb
+from gaplab.schemas.records import Progress
 from gaplab.services.core.answers import unpack
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
@@ -17,7 +19,8 @@ from gaplab.services.experiments.lifecycle import ask_experiment
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint
 from gaplab.services.running.leases import MAX_LOSSES
-from gaplab.services.store.lease import Failure
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.lease import Failure, Pulse
 from gaplab.services.store.models import CheckpointRow
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import StepRecorder, recorded
@@ -233,3 +236,24 @@ def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(sto
     states = [(each.state, each.attempts) for each in reading.list_repetitions(store, submitted.id)]
     assert states == [(State.RUNNING, 1), (State.QUEUED, 0), (State.RUNNING, 1)]
     assert execution.heartbeat(store, [known, others]) == (known, others)
+
+
+@pytest.mark.dialects
+def test_progress_tells_how_far_a_tuning_has_come(store: Store) -> None:
+    spec = toy(repetitions=1, iterations=1)
+    submitted = submission.submit_experiment(store, spec)
+    (claim,) = execution.claim(store, "me", 1)
+    seen: list[Progress] = []
+
+    for each in recorded(setting(claim.spec, claim.number), (), (), 0.0):
+        if not isinstance(each, Pulse):
+            execution.record_all(store, [(claim, [each])])
+            seen.append(reading.read_experiment(store, submitted.id).progress)
+
+    tuning = [(step, progress) for progress in seen for step in progress.steps if step.kind == "tuning"]
+    assert {(step.repetition, step.iteration, step.budget) for step, _ in tuning} == {(0, 1, tuning[0][0].budget)}
+    assert 0 < tuning[0][0].rollouts < tuning[-1][0].rollouts <= tuning[0][0].budget
+    assert f"; tuning 1: {100 * tuning[1][0].rollouts // tuning[1][0].budget} %" in counts(tuning[1][1])
+    done = [progress.rollouts_done + progress.rollouts_saved for progress in seen]
+    assert done == sorted(done)
+    assert (done[-1], seen[-1].steps) == (seen[-1].rollouts, ())

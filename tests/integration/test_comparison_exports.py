@@ -98,7 +98,7 @@ def test_latex_prints_names_as_they_are_and_rounds_p_as_papers_do() -> None:
         lower=-0.5, upper=0.0, improvement=estimate, shared_streams=False, streams="", n_paired=0,
         trusted=Trusted(test="welch"), paired_t=Test(),
         wilcoxon=Test(), brown_forsythe=test, summary_first=summary, summary_second=summary,
-        equivalence=equivalence,
+        equivalence=equivalence, where="mean of each repetition over 3 to 5 real-world evaluations",
     )  # fmt: skip
 
     table = comparisons_latex([pair], "m/s")

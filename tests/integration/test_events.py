@@ -9,7 +9,6 @@ from collections.abc import AsyncIterator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from datetime import timedelta
 from itertools import count
 from typing import Any
 
@@ -48,15 +47,14 @@ from gaplab.services.running import execution, provenance, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.running.versions import provenance as own
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.store.clock import moment
 from gaplab.services.store.lease import Failure
-from gaplab.services.store.models import EventCounterRow, EventRow, RequestRow
+from gaplab.services.store.models import EventCounterRow, EventRow
 from gaplab.services.store.queries.events import note, write
 from gaplab.services.store.queries.experiments import insert_experiment
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, some_log, toy
 from tests.integration import test_bench_safety
-from tests.integration.test_bench import compute, measure
+from tests.integration.test_bench import bench, compute, fall_silent, measure
 from tests.waiting import wait_until
 
 DEADLINE_S = 180
@@ -132,9 +130,7 @@ def on_a_bench(store: Store) -> None:
         taken = taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY).answer
         if taken.takes == 1:
             taking.release(store, request.id, ReleaseSpec(take=1))
-    with store.transaction() as session:
-        session.execute(update(RequestRow).values(taken_until=moment(session) - timedelta(seconds=1)))
-    assert taking.open_again(store) == 1
+    assert fall_silent(store) == 1
     measure(store, request, 0.4)
     other = measure(store, request, 0.3)
     corrections.decide(store, other.id, ConflictSpec(counts="this", reason="the first was another"), FREELY)
@@ -586,6 +582,27 @@ def test_a_poll_may_wait_for_what_comes(sqlite_store: Store) -> None:
     assert nothing["last"] == 2
 
 
+def test_who_waits_for_a_request_looks_at_the_database_when_something_happened(sqlite_store: Store) -> None:
+    id_ = submission.submit_experiment(sqlite_store, bench()).id
+    with (
+        served(sqlite_store) as (url, feed),
+        httpx2.Client(base_url=url, timeout=DEADLINE_S) as http,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        answer = pool.submit(http.get, "/requests?wait_s=60")
+        wait_until(lambda: feed.open == 1)
+        compute(sqlite_store)
+        (request,) = answer.result(DEADLINE_S).json()["items"]
+        taking.take(sqlite_store, request["id"], TakeSpec(operator="o"), FREELY)
+        never = pool.submit(http.get, f"/requests?experiment={id_}&conflicts=true&wait_s=60")
+        wait_until(lambda: feed.open == 1)
+        cancel(sqlite_store, id_)
+        ended = never.result(DEADLINE_S).json()
+
+    assert request["experiment"] == id_
+    assert ended["items"] == []
+
+
 def test_events_of_a_study_are_those_of_its_experiments(sqlite_store: Store) -> None:
     from gaplab.schemas.spec import StudySpec
 
@@ -679,6 +696,26 @@ def test_a_download_is_broken_off_when_its_token_is_revoked(sqlite_store: Store)
         access.revoke_token(sqlite_store, token.token.id)
         with pytest.raises(httpx2.RemoteProtocolError):
             list(parts)
+
+
+@pytest.mark.usefixtures("rechecked")
+def test_a_write_under_way_is_answered_by_its_result_also_when_its_token_is_revoked(sqlite_store: Store) -> None:
+    token = access.create_token(sqlite_store, Role.RUNNER)
+    app, begun = create_app(sqlite_store), threading.Event()
+
+    @app.post("/long")
+    def long() -> str:
+        begun.set()
+        time.sleep(10 * http_access.RECHECK_S)
+        return "written"
+
+    headers = {"Authorization": f"Bearer {token.secret}"}
+    with serving(app) as url, ThreadPoolExecutor(1) as pool:
+        answer = pool.submit(httpx2.post, f"{url}/long", headers=headers, timeout=DEADLINE_S)
+        assert begun.wait(DEADLINE_S)
+        access.revoke_token(sqlite_store, token.token.id)
+
+    assert (answer.result().status_code, answer.result().json()) == (200, "written")
 
 
 def test_a_number_beyond_the_latest_event_is_refused_with_both(store: Store) -> None:

@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 import ray
+from ray._raylet import GcsClient  # type: ignore[attr-defined]
+from ray.autoscaler.v2.sdk import get_cluster_resource_state
 from ray.cluster_utils import Cluster
 
 from gaplab.arithmetic import FIXED
@@ -83,6 +85,28 @@ def ran_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(task, "run", noted)
     return lambda: [path.name for path in sorted(tmp_path.glob("?" * 56), key=lambda path: path.stat().st_mtime_ns)]
+
+
+@pytest.mark.parametrize("joined", [0], indirect=True)
+def test_without_cores_what_waits_is_a_demand_that_an_autoscaler_sees_and_runs_once_a_node_joins(
+    joined: Any, head: Any, sqlite_store: Store
+) -> None:
+    experiment = submission.submit_experiment(sqlite_store, toy()).id
+    supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions)
+    gcs = GcsClient(address=head.address)
+
+    run(supervisor, sqlite_store, experiment, until=lambda: demanded(gcs))
+    with by_hand():
+        head.add_node(**NODE)
+    run(supervisor, sqlite_store, experiment)
+
+    assert stored(sqlite_store, experiment) == expected(toy())
+
+
+def demanded(gcs: Any) -> Any:
+    """What the autoscaler of a cluster is told that tasks wait for."""
+    waiting = get_cluster_resource_state(gcs).pending_resource_requests
+    return [dict(each.request.resources_bundle) for each in waiting if each.count]
 
 
 @pytest.mark.parametrize("joined", [2, 4], indirect=True)

@@ -1,6 +1,8 @@
 """External plug-ins that are edited or broken while experiments name them: those wait, and others go on."""
 
 import pickle
+import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +21,32 @@ from gaplab.services.experiments import checks, reading, submission
 from gaplab.services.plugins import watching
 from gaplab.services.plugins.watching import FolderWatch
 from gaplab.services.running import execution, provenance, sensitivity, versions
+from gaplab.services.settings import Settings
 from gaplab.services.specs import blame
 from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.workers import nodes
+from gaplab.workers.cluster import cluster
 from gaplab.workers.plugins import FIRST_S, LONGEST_S, Plugins
+from gaplab.workers.supervisor import Supervisor
 from tests.experiments import some_log, toy
 from tests.fakes import CAREFUL
+from tests.integration import test_workers
 
 EDITED = CAREFUL.replace("the middle", "the very middle")
 TYPO = CAREFUL.replace("rng):", "rng:")
 WHY = "careful.py cannot be imported: SyntaxError: '(' was never closed (careful.py, line 15)"
+CHANGING = """
+
+import os
+
+from gaplab.services.core.robots.toy_function import ToyFunction
+
+if os.environ.get("CHANGES_GAPLAB"):
+    true_fitness = ToyFunction.fitness
+    ToyFunction.fitness = lambda self, seen: 2 * true_fitness(self, seen)
+"""
 SLIPPERY = """
 from gaplab.services.core.robots.toy_function import ToyFunction
 
@@ -72,7 +88,9 @@ def expected(strategy: str = "careful") -> Any:
     return Plugins(versions.versions()).expected(resolve_experiment(toy(strategy=strategy)))
 
 
-def test_a_new_process_is_refused_for_an_edit_of_a_plug_in_that_the_spec_names_alone(put: Any) -> None:
+def test_a_new_process_is_refused_for_an_edit_of_a_plug_in_that_the_spec_names_and_does_not_import_it(
+    put: Any,
+) -> None:
     home = put(careful=CAREFUL, brave=CAREFUL.replace("careful", "brave"))
     wanted, others = expected(), expected("random")
     nodes.check_here(wanted)
@@ -81,37 +99,76 @@ def test_a_new_process_is_refused_for_an_edit_of_a_plug_in_that_the_spec_names_a
     nodes.check_here(wanted)
 
     (home / "careful.py").write_text(EDITED)
-    nodes.check_here(wanted)  # this process has imported what the supervisor has
     put()
     nodes.check_here(others)
-
     with pytest.raises(PluginDiffers) as refused:
         nodes.check_here(wanted)
+
+    assert "gaplab_plugins.careful" not in sys.modules
     assert set(refused.value.differences) == {"strategy careful"}
     assert wanted["plug-in strategy careful"] in str(refused.value)
     assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)
 
 
-def test_a_process_that_cannot_import_a_named_plug_in_says_why(put: Any) -> None:
-    home = put(careful=CAREFUL)
+def test_a_process_that_cannot_import_a_named_plug_in_says_why(
+    put: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "of_the_head.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    put(careful=f"{CAREFUL}\nimport of_the_head\n")
     wanted = expected()
-    (home / "careful.py").write_text(TYPO)
+    (tmp_path / "of_the_head.py").unlink()
+    del sys.modules["of_the_head"]
     put()
 
-    with pytest.raises(PluginDiffers, match="SyntaxError"):
+    with pytest.raises(PluginDiffers, match="No module named 'of_the_head'"):
         nodes.check_here(wanted)
 
 
-def test_a_process_imports_edited_files_again_when_the_supervisor_has_the_new_ones(put: Any) -> None:
+def test_a_process_imports_what_the_spec_needs_alone(put: Any) -> None:
+    brave = CAREFUL.replace("careful", "brave")
+    put(careful=f"from gaplab_plugins import _shared\n{CAREFUL}", brave=brave, _shared="")
+    wanted = expected()
+    put()
+
+    nodes.check_here(wanted)
+
+    assert ("careful" in strategies, "brave" in strategies) == (True, False)
+    assert "gaplab_plugins._shared" in sys.modules
+    assert "gaplab_plugins.brave" not in sys.modules
+
+
+def test_each_version_of_the_named_plug_ins_has_processes_of_its_own_and_without_any_all_share_theirs(put: Any) -> None:
     home = put(careful=CAREFUL)
-    nodes.check_here(expected())
-    before = strategies["careful"]
+    before = nodes.process_for(expected())
+    (home / "other.py").write_text(CAREFUL.replace("careful", "brave"))
+    watching.reload()
+    beside = nodes.process_for(expected())
     (home / "careful.py").write_text(EDITED)
+    watching.reload()
 
-    nodes.check_here(expected())
+    assert before == beside != nodes.process_for(expected())
+    assert nodes.process_for(expected("random")) == {}
 
-    assert strategies["careful"] is not before
-    assert strategies["careful"].describe().summary == "Stays in the very middle."
+
+def test_a_plug_in_that_changes_gaplab_changes_no_number_of_specs_that_do_not_name_it(
+    put: Any, sqlite_store: Store, shared_ray: ExitStack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shared_ray.close()
+    monkeypatch.setenv("GAPLAB_PLUGINS", str(put(careful=CAREFUL + CHANGING)))
+    assert "careful" in strategies  # this process has imported it
+    monkeypatch.setenv("CHANGES_GAPLAB", "in the processes of Ray")
+    with cluster(Settings(workers=1)) as joined:
+        monkeypatch.delenv("CHANGES_GAPLAB")
+        supervisor = Supervisor(sqlite_store, lambda: 1, joined.versions)
+        changed, plain = (toy(strategy=each, repetitions=1) for each in ("careful", "simulated_fit"))
+        ids = [submission.submit_experiment(sqlite_store, spec).id for spec in (changed, plain)]
+        for each in ids:
+            test_workers.run(supervisor, sqlite_store, each)
+
+    ended = [test_workers.stored(sqlite_store, each) for each in ids]
+    assert ended[0] != test_workers.expected(changed)
+    assert ended[1] == test_workers.expected(plain)
 
 
 def test_files_that_were_edited_between_their_import_and_the_first_look_are_imported_again(put: Any) -> None:

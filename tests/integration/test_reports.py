@@ -57,12 +57,17 @@ def test_the_curve_of_direct_is_one_point_at_zero(store: Store) -> None:
     assert [(point.evaluations, point.values) for point in found.points] == [(0, (1.0, 2.0))]
 
 
-def test_a_curve_without_results_has_empty_points(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+def test_a_curve_is_as_long_as_what_was_computed_and_not_as_the_spec_asks_for(store: Store) -> None:
+    experiment = submission.submit_experiment(store, toy(iterations=1_000)).id
+    before = curves.curve(store, experiment)
+    (claim,) = execution.claim(store, "me", 1)
+    for step in some_log(1):
+        assert execution.record(store, claim, step)
 
-    found = curves.curve(store, experiment)
+    after = curves.curve(store, experiment)
 
-    assert [(point.n, point.mean) for point in found.points] == [(0, None)] * 3
+    assert [(point.n, point.mean) for point in before.points] == [(0, None)]
+    assert [(point.n, point.mean) for point in after.points] == [(1, 1.0), (1, 2.0)]
 
 
 def test_a_failed_measurement_is_no_value_of_the_curve(store: Store) -> None:

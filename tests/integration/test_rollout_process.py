@@ -15,8 +15,11 @@ from typing import Any
 import pytest
 
 from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
+from gaplab.services.core.external_plugins import file_of
+from gaplab.services.core.strategies import strategies
 from gaplab.services.replay.process import MOST_OUTPUT, NICENESS, AnswerCache, RolloutProcess
 from gaplab.services.waiting_line import WaitingLine
+from tests.fakes import CAREFUL
 from tests.waiting import wait_until
 
 DEADLINE_S = 120.0
@@ -45,6 +48,26 @@ def test_calls_are_executed_by_one_subprocess_of_lower_priority(rollouts: Any) -
 
     assert first == second == rollouts.pid != os.getpid()
     assert os.getpriority(os.PRIO_PROCESS, first) == min(19, os.nice(0) + NICENESS)
+
+
+def test_a_process_imports_the_plug_ins_of_its_calls_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("careful", "brave"):
+        (tmp_path / f"{name}.py").write_text(CAREFUL.replace("careful", name))
+    monkeypatch.setenv("GAPLAB_PLUGINS", str(tmp_path))
+    rollouts = RolloutProcess()
+    named = [(), ("careful.py 1",), ("careful.py 1",), ("careful.py 2",), ()]
+
+    found = [rollouts.call(_external_strategies, plugins=plugins) for plugins in named]
+
+    assert [names for _, names in found] == [[], ["careful"], ["careful"], ["careful"], []]
+    first, second, third, fourth, fifth = (pid for pid, _ in found)
+    assert second == third
+    assert len({first, second, fourth, fifth}) == 4
+    rollouts.close()
+
+
+def _external_strategies() -> tuple[int, list[str]]:
+    return os.getpid(), [name for name, each in strategies.items() if file_of(each)]
 
 
 def test_a_process_that_was_killed_is_replaced(rollouts: Any) -> None:

@@ -58,6 +58,19 @@ class Dies(ToyFunction):
     def motion(self, genome):
         os.kill(os.getpid(), signal.SIGKILL)
 """
+LINGERING = """
+from multiprocessing import parent_process
+from threading import Event, Thread
+
+from gaplab.services.core.robots.toy_function import ToyFunction
+
+if parent_process():
+    Thread(target=Event().wait).start()
+
+
+class Lingering(ToyFunction):
+    name = "lingering"
+"""
 SMALL = {"strategies": ["simulated_fit", "direct"], "robot": "toy_function", "budget": "smoke", "seed": 2**63}
 
 
@@ -269,6 +282,16 @@ def test_a_process_that_dies_is_the_reason_of_its_repetition_and_ends_no_other(
 
     assert [(each.outcome, each.repetition) for each in found] == [("same", 0), ("not computed", 0), ("different", 1)]
     assert found[1].reason == "its process died: it was killed, or ran out of memory"
+
+
+def test_a_thread_of_a_plug_in_keeps_no_process_that_recomputes(
+    put: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GAPLAB_PLUGINS", str(put(lingering=LINGERING)))
+    spec = resolve_experiment(toy(robot="lingering"))
+    whole = Recorded("x", "x", 0, spec.model_dump(mode="json"), tuple(repetition(setting(spec, 0))))
+
+    assert [each.outcome for each in rerun_all([whole], cores=1)] == ["same"]
 
 
 def test_zeros_of_both_signs_differ_and_nan_is_nan() -> None:

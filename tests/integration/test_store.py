@@ -1,5 +1,6 @@
 """What the store promises about transactions and trouble."""
 
+import os
 import subprocess
 import sys
 import traceback
@@ -20,6 +21,8 @@ from gaplab.services.store.engine import parse
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.session import Store
 from tests.experiments import same, some_log, toy
+
+OPEN_FILES = Path("/proc/self/fd")
 
 
 class Killed(Exception):
@@ -276,6 +279,18 @@ def test_a_file_that_is_no_database_is_unavailable(tmp_path: Path) -> None:
 def test_a_url_of_no_known_database_is_refused(url: Any) -> None:
     with pytest.raises(StoreUnavailable):
         Store(url)
+
+
+@pytest.mark.skipif(not OPEN_FILES.exists(), reason="only Linux tells which files a process has open")
+def test_a_sort_in_sqlite_needs_no_folder_for_temporary_files(sqlite_store: Store) -> None:
+    numbers = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 100000) "
+
+    with sqlite_store.reading() as session:
+        rows = session.execute(text(f"{numbers} SELECT hex(randomblob(50)) AS each FROM n ORDER BY each"))
+        rows.fetchone()
+        opened = [os.readlink(each) for each in OPEN_FILES.iterdir() if os.path.lexists(each)]
+
+    assert not [name for name in opened if "etilqs" in name]  # as SQLite calls its temporary files
 
 
 def test_sqlite_is_set_to_lose_nothing(sqlite_store: Store) -> None:

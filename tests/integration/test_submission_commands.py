@@ -2,7 +2,8 @@
 
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pexpect
 import pytest
@@ -13,9 +14,10 @@ from gaplab.api.clients.confirmation import NotSubmitted, confirm, duration, sen
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.services.experiments import listing
+from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
-from tests.integration.test_bench import compute
+from tests.integration.test_bench import bench, compute, measure, pending
 
 SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
 
@@ -42,21 +44,30 @@ def test_a_dry_run_prints_the_complete_spec_and_submits_nothing(gaplab: Gaplab, 
     assert json.loads(document.out)["specs"] == [json.loads(text.out)]
 
 
-def test_further_tunables_are_tried_on_the_samples_of_an_experiment(gaplab: Gaplab, sqlite_store: Store) -> None:
-    spec = SMALL | {"tunables": ["static_friction", "dynamic_friction"], "repetitions": 1}
-    id = gaplab("submit", "-", stdin=json.dumps(spec)).out.strip()
-    compute(sqlite_store)
+@contextmanager
+def working(store: Store) -> Iterator[None]:
+    """A supervisor beside what is done meanwhile."""
     ended = threading.Event()
 
     def work() -> None:
         while not ended.wait(0.1):
-            compute(sqlite_store)
+            compute(store)
 
     worker = threading.Thread(target=work)
     worker.start()
-    said = gaplab("try-tunables", id, "restitution", "mass", "--json")
-    ended.set()
-    worker.join()
+    try:
+        yield
+    finally:
+        ended.set()
+        worker.join()
+
+
+def test_further_tunables_are_tried_on_the_samples_of_an_experiment(gaplab: Gaplab, sqlite_store: Store) -> None:
+    spec = SMALL | {"tunables": ["static_friction", "dynamic_friction"], "repetitions": 1}
+    id = gaplab("submit", "-", stdin=json.dumps(spec)).out.strip()
+    compute(sqlite_store)
+    with working(sqlite_store):
+        said = gaplab("try-tunables", id, "restitution", "mass", "--json")
 
     assert said.code == 0, said.err
     assert "mass is not tried: " in said.err
@@ -65,6 +76,26 @@ def test_further_tunables_are_tried_on_the_samples_of_an_experiment(gaplab: Gapl
         ("restitution", "search", "m/s"),
     ]
     assert all(each["error"] >= 0 for each in json.loads(said.out))
+
+
+@pytest.mark.release
+def test_further_tunables_are_tried_on_readings_of_a_robot_on_a_bench(gaplab: Gaplab, sqlite_store: Store) -> None:
+    changes = {"robot": "quadruped", "engine": "mujoco", "iterations": 1, "discrepancy": "readings"}
+    id = submit_experiment(sqlite_store, bench(**changes, reality={"repeats": 2, "limits": {"tilt": 2.0}})).id
+    compute(sqlite_store)
+    readings = tuple((((None, *([0.01] * 4)),) * 10) for _ in range(2))
+    while asked := pending(sqlite_store):
+        measure(sqlite_store, asked[0], 0.4, 0.5, readings=readings)
+        compute(sqlite_store)
+    with working(sqlite_store):
+        said = gaplab("try-tunables", id, "mass", "kp", "--json")
+
+    tried = {each["added"]: each for each in json.loads(said.out)}
+    assert "kp is not tried: " in said.err
+    assert {name: each["unit"] for name, each in tried.items()} == {"nothing": "× noise", "mass": "× noise"}
+    assert all(each["error"] > 0 for each in tried.values())
+    told = gaplab("show", tried["mass"]["experiment"]).out
+    assert "samples from before the experiment: 3 tuned on" in told
 
 
 def test_a_program_without_a_terminal_is_not_asked(gaplab: Gaplab, sqlite_store: Store) -> None:

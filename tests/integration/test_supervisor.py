@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event
@@ -15,20 +16,27 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from ray._common.utils import try_to_create_directory
 from sqlalchemy import select
 
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
-from gaplab.services.core.errors import RayGone, StoreChanged
+from gaplab.schemas.measurements import TakeSpec
+from gaplab.services.bench import taking
+from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged
 from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments.limits import FREELY
 from gaplab.services.running import execution
+from gaplab.services.running.leases import Silences
+from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
 from gaplab.workers import watch
 from gaplab.workers.ray_folder import PREFIX, ray_folder
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import toy
+from tests.integration.test_bench import bench, compute, pending
 from tests.waiting import wait_until
-from tests.without_ray import Here
+from tests.without_ray import Here, Stop
 
 DEADLINE_S = 180
 
@@ -85,13 +93,30 @@ def test_a_ray_that_answers_no_more_or_lost_a_part_is_told_from_one_that_works(m
         watched.cores()
 
 
+def test_a_supervisor_that_waits_for_the_database_says_so_with_its_signs_of_life(sqlite_url: str) -> None:
+    file = Path(sqlite_url.removeprefix("sqlite:///"))
+    heard, told = os.pipe()
+    aside = file.rename(file.with_suffix(".aside"))
+    with Store(sqlite_url) as store, os.fdopen(heard) as lines, os.fdopen(told, "w"):
+        here = Here(store)
+        here.serve(Stop(2), PulsePipe(told))  # type: ignore[arg-type]
+        aside.rename(file)
+        here.serve(Stop(2), PulsePipe(told))  # type: ignore[arg-type]
+        os.write(told, b"end\n")
+        found = list(iter(lines.readline, "end\n"))
+
+    (first, second, *_, last) = (each for each in found if each.startswith("."))
+    assert (first, last) == (".\n", ".\n")
+    assert "the database cannot be used now" in second
+
+
 def test_ray_keeps_its_files_where_only_their_owner_looks_and_removes_them(tmp_path: Path) -> None:
-    with ray_folder() as folder:
-        (folder / "session").mkdir()
-        mode = folder.stat().st_mode & 0o777
+    with ray_folder() as place:
+        try_to_create_directory(place)  # as Ray does
+        mode = place.parent.stat().st_mode & 0o777
 
     assert mode == 0o700
-    assert not folder.exists()
+    assert not place.parent.exists()
 
 
 def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start() -> None:
@@ -102,7 +127,8 @@ def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start()
             folder.mkdir()
             (folder / "lock").touch()
         os.utime(left, (0, 0))
-        with ray_folder(parent) as held:
+        with ray_folder(parent) as place:
+            held = place.parent
             os.utime(held, (0, 0))
             with ray_folder(parent):
                 found = sorted(parent.iterdir())
@@ -111,9 +137,14 @@ def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start()
     assert {held, starting} <= set(found)
 
 
+def test_a_folder_that_ray_cannot_have_is_told_with_the_remedy() -> None:
+    with pytest.raises(ClusterUnusable, match=r"let RAY_TMPDIR name one .*: .*No such file"):
+        ray_folder(Path("/no/such")).__enter__()
+
+
 def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path) -> None:
-    with ray_folder(tmp_path / ("long" * 20)) as folder:
-        assert folder.parent == Path("/tmp")
+    with ray_folder(tmp_path / ("long" * 20)) as place:
+        assert place.parent.parent == Path("/tmp")
 
 
 @pytest.mark.parametrize("how", ["migrated", "replaced", "restored in place"])
@@ -197,6 +228,35 @@ def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_
 
     assert still_held == (claim,)
     assert execution.heartbeat(store, [claim]) == ()
+
+
+def test_a_time_in_which_nobody_could_show_a_sign_of_life_ends_no_take(
+    sqlite_store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    submission.submit_experiment(sqlite_store, bench())
+    compute(sqlite_store)
+    (request,) = pending(sqlite_store)
+    taking.take(sqlite_store, request.id, TakeSpec(operator="Ada"), FREELY)
+    clock, stop = [0.0], Event()
+    supervisor = Supervisor(sqlite_store, lambda: 0, lease_s=0.0)
+    supervisor._takes = Silences(lambda: clock[0])
+    supervisor.step()
+    assert sqlite_store.file is not None
+    aside = sqlite_store.file.rename(sqlite_store.file.with_suffix(".aside"))
+    with ThreadPoolExecutor() as pool:
+        served = pool.submit(supervisor.serve, stop)
+        wait_until(lambda: "waiting: " in caplog.text)
+        stop.set()
+        served.result()
+    aside.rename(sqlite_store.file)
+
+    clock[0] = 3600.0
+    supervisor.step()
+    after = pending(sqlite_store)[0].state
+    clock[0] += 601.0
+    supervisor.step()
+
+    assert (after, pending(sqlite_store)[0].state) == ("taken", "open")
 
 
 def test_what_has_begun_is_never_handed_back_for_what_is_more_urgent(sqlite_store: Store) -> None:

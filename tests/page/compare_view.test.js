@@ -60,7 +60,7 @@ const TEST = { p: 0.5, p_holm: 0.5 };
 const ESTIMATE = { value: 1, lower: null, upper: null };
 const SUMMARY = { n: 2, mean: ESTIMATE, interquartile_mean: ESTIMATE, sd: 1 };
 const PAIR = {
-  first: "a", second: "b", n_first: 2, n_second: 2, difference: 0, effect_size: 0, lower: null, upper: null, improvement: ESTIMATE,
+  first: "a", second: "b", where: "after 1 real-world evaluation (and 12 from before)", n_first: 2, n_second: 2, difference: 0, effect_size: 0, lower: null, upper: null, improvement: ESTIMATE,
   shared_streams: false, streams: "apart", summary_first: SUMMARY, summary_second: SUMMARY, trusted: TEST, student: TEST, welch: TEST, mann_whitney: TEST, brown_forsythe: TEST,
 };
 
@@ -134,7 +134,7 @@ test("tests that come late are shown unless the reader has chosen others, and an
   assert.match(part.element.textContent, /It broke/);
   serving(() => [200, [PAIR]]);
   await loading.load();
-  assert.match(part.element.textContent, /after 1 real-world evaluation/);
+  assert.match(part.element.textContent, /The row against the column, after 1 real-world evaluation \(and 12 from before\)/);
 });
 
 /** Return the field of a chooser with its list of three matches, and what was chosen. */

@@ -7,6 +7,7 @@ const { actions, refusal } = await import("../../api/dashboard/views/experiment/
 const { pastEvents } = await import("../../api/dashboard/views/experiment/event_list.js");
 const { eventText } = await import("../../api/dashboard/views/experiment/event_words.js");
 const { stepText } = await import("../../api/dashboard/views/experiment/branches.js");
+const { measurements } = await import("../../api/dashboard/views/experiment/measurements.js");
 const { waitingText } = await import("../../api/dashboard/views/experiment/waiting.js");
 const { lastIteration } = await import("../../api/dashboard/views/replay.js");
 const { gathered } = await import("../../api/dashboard/views/study/head.js");
@@ -71,6 +72,30 @@ test("an edit names its tags, if the event has them", () => {
   assert.equal(edited({ fields: ["tags"], add_tags: ["a_b"], remove_tags: ["wet"], of_study: true }), "Its study was edited: added the tag a_b; removed the tag wet");
   assert.equal(edited({ fields: ["tags"], tags: ["gait"] }), "Edited: set the tag gait");
   assert.deepEqual([edited({ fields: ["name", "remove_tags"] }), edited({ fields: ["tags"], add_tags: [], remove_tags: [] })], ["Edited: name, remove tags", "Edited: tags"]);
+});
+
+test("samples from before are the first measurements, and on the first page alone", async () => {
+  const request = { id: "r", repetition: 0, iteration: 1, kind: "sample", unit: "m/s", answers: [], branch: null, state: "withdrawn" };
+  const pages = [[[], null], [[request], "more"], [[{ ...request, id: "s" }], null]];
+  globalThis.fetch = () => {
+    const [items, next] = pages.shift();
+    return Promise.resolve(new Response(JSON.stringify({ items, next })));
+  };
+  const samples = [{ values: [0.2, 0.4] }, ...Array(60).fill({ values: [0.5] })];
+  let load = null;
+  const page = { id: "e", signal: new AbortController().signal, experiment: { spec: { reality: { samples } } }, unit: () => "m/s", sections: { add: (_, __, given) => { load = given; } } };
+  const [, place, buttons] = measurements(page);
+  const rows = () => place.querySelectorAll("tr").map(({ children }) => children.map(({ textContent }) => textContent));
+
+  await load();
+  assert.deepEqual(rows()[1].slice(0, 6), ["all", "–", "sample from before", "0.2, 0.4", "0.3", "✓ measured"]);
+  assert.equal(rows().length, 1 + 50);
+  assert.match(place.textContent, /The spec has all 61 from before/);
+  await load();
+  assert.deepEqual([rows().length, rows().at(-1)[2]], [1 + 50 + 1, "sample"]);
+  buttons.querySelectorAll("button").at(-1).click();
+  while (rows().length > 2) await new Promise((resume) => { setTimeout(resume); });
+  assert.deepEqual([rows()[1][2], place.textContent.includes("from before")], ["sample", false]);
 });
 
 /** A service with these numbers of an experiment's events, `size` a page. */

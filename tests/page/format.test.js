@@ -1,6 +1,11 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { age, count, duration, fixed, number, percent, readableName, threeDigits, timeBetween, titleOf } from "../../api/dashboard/lib/format.js";
+import { age, count, duration, evaluationsText, fixed, number, percent, readableName, threeDigits, timeBetween, titleOf } from "../../api/dashboard/lib/format.js";
+
+test("a number of real-world evaluations says how many samples were there before", () => {
+  assert.equal(evaluationsText({ evaluations: 1, known: 0 }), "1 real-world evaluation");
+  assert.equal(evaluationsText({ evaluations: 0, known: 1200 }), "0 real-world evaluations (and 1,200 from before)");
+});
 
 test("a missing value is a dash, in every format", () => {
   for (const format of [number, fixed, threeDigits, count, duration]) assert.deepEqual([format(null), format(undefined)], ["–", "–"]);

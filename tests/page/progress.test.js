@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { durationRange } from "../../api/dashboard/lib/format.js";
-import { fraction, iterationsDone, repetitionsDone, rolloutsDone, timeLeft, timeLeftFact } from "../../api/dashboard/lib/progress.js";
+import { fraction, rolloutsDone, timeLeft, timeLeftFact, workFacts } from "../../api/dashboard/lib/progress.js";
 
 test("rollouts that were saved are done, and no progress is beyond the end", () => {
   assert.equal(fraction({ rollouts: 100, rollouts_done: 20, rollouts_saved: 30 }), 0.5);
@@ -9,9 +9,20 @@ test("rollouts that were saved are done, and no progress is beyond the end", () 
   assert.equal(fraction({ rollouts: 0, rollouts_done: 0, rollouts_saved: 0 }), 0);
 });
 
-test("failed repetitions are named, where there are any", () => {
-  assert.equal(repetitionsDone({ completed: 1, repetitions: 4000, failed: 0 }), "1 of 4,000");
-  assert.equal(repetitionsDone({ completed: 1, repetitions: 4, failed: 2 }), "1 of 4, 2 failed");
+const WORK = {
+  repetitions: 4000, completed: 1, failed: 0, iterations: 20, iterations_done: 20, counted_iterations: 15, counted_iterations_done: 15,
+  rollouts: 1000, rollouts_done: 900, rollouts_failed: 0, rollouts_saved: 0, steps: [],
+};
+
+test("failures are named, where there are any, and iterations counted as in a spec", () => {
+  assert.deepEqual(workFacts(WORK), [["Repetitions", "1 of 4,000"], ["Iterations", "15 of 15"], ["Rollouts", "900 of 1,000"]]);
+  assert.deepEqual(workFacts({ ...WORK, failed: 2, counted_iterations: 0, rollouts_failed: 3 }),
+    [["Repetitions", "1 of 4,000, 2 failed"], ["Rollouts", "900 of 1,000, physics failed in 3"]]);
+});
+
+test("each step under way tells how far it has come", () => {
+  const steps = [["tuning", 3, 419], ["transfer", 2, 1000]].map(([kind, iteration, rollouts], repetition) => ({ repetition, kind, iteration, rollouts, budget: 1000 }));
+  assert.deepEqual(workFacts({ ...WORK, steps }).at(-1), ["Now", "tuning 3: 41 %, transfer 2: 100 %"]);
 });
 
 test("only what runs has a time left, which is an interval or not known yet", () => {
@@ -22,8 +33,7 @@ test("only what runs has a time left, which is an interval or not known yet", ()
   assert.deepEqual([durationRange({ low_s: 5, high_s: 40 }), durationRange({ low_s: 28_800, high_s: 45_000 })], ["less than 1 min", "8 to 13 h"]);
 });
 
-test("iterations are counted as in a spec, and saved rollouts are named where there are any", () => {
-  assert.equal(iterationsDone({ iterations: 20, iterations_done: 20, counted_iterations: 15, counted_iterations_done: 15 }), "15 of 15");
+test("saved rollouts are named where there are any", () => {
   assert.equal(rolloutsDone({ rollouts: 1000, rollouts_done: 900, rollouts_saved: 0 }), "900 of 1,000");
   assert.equal(rolloutsDone({ rollouts: 1000, rollouts_done: 900, rollouts_saved: 100 }), "900 of 1,000, 100 saved");
 });

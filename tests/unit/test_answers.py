@@ -40,7 +40,7 @@ class Interruption:
         self.left -= 1
         return 1_000
 
-    def record(self, answers: Any, rollouts: Any) -> None:
+    def record(self, answers: Any, rollouts: Any, budget: int) -> None:
         self.answers += answers
 
 
@@ -185,6 +185,7 @@ def searched(offspring: Any, cores: Any, simulate: Any = paraboloid) -> Any:
     """What a search finds in one simulator, its cost, and how many genomes it asked for in each call."""
     simulated, rng = Recorder(simulate), np.random.default_rng(0)
     answers = Answers(simulated, lambda: cores)
+    answers.budget = 60
     optimizer = SteadyState(SteadyStateOptions(population=6, offspring=offspring))
     found = maximise(
         optimizer,
@@ -193,4 +194,4 @@ def searched(offspring: Any, cores: Any, simulate: Any = paraboloid) -> Any:
         60,
         rng,
     )
-    return found, answers.cost_of(60), [genomes for genomes, _ in simulated.calls]
+    return found, answers.cost, [genomes for genomes, _ in simulated.calls]

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.api.clients.drivers import DriverBroken, measure
+from gaplab.api.clients.drivers import DriverBroken, Robot, measure
+from gaplab.api.clients.journal import Journal
+from gaplab.api.clients.takes import TakeLost
 from gaplab.schemas.records import SensorsRead
 
 SENSORS = SensorsRead(names=("roll", "height"), units=("rad", "m"), noises=(0.02, 0.005), times_s=(0.5, 1.0, 1.5))
@@ -18,7 +20,10 @@ class Task(SimpleNamespace):
 
     def __init__(self, sensors: SensorsRead | None) -> None:
         motion, request = SimpleNamespace(observe_s=(3.0,)), SimpleNamespace(unit="m/s")
-        super().__init__(repeats=2, known=[], motion=motion, request=request, sensors=sensors, noted=[], told=[])
+        take = SimpleNamespace(lost=None, ask=lambda: None)
+        super().__init__(
+            repeats=2, known=[], motion=motion, request=request, sensors=sensors, noted=[], told=[], take=take
+        )
 
     def note(self, value: float, readings: Any) -> None:
         self.noted.append((value, readings))
@@ -65,7 +70,7 @@ def test_a_wrong_answer_is_refused_after_the_first_run(sensors: SensorsRead, ans
     task, driver = Task(sensors), Driver(answer)
 
     with pytest.raises(DriverBroken) as refused:
-        measure(task, driver, None, lambda sentence: None)  # type: ignore[arg-type]
+        measure(task, Robot(driver), None, lambda sentence: None)  # type: ignore[arg-type]
 
     assert said in str(refused.value)
     assert (driver.runs, task.noted, task.told) == (1, [], [])
@@ -83,16 +88,36 @@ def test_a_wrong_answer_is_refused_after_the_first_run(sensors: SensorsRead, ans
 def test_what_fits_is_told_after_the_last_run(sensors: SensorsRead | None, answer: Any, told: Any) -> None:
     task, driver, said = Task(sensors), Driver(answer), list[str]()
 
-    measure(task, driver, None, said.append)  # type: ignore[arg-type]
+    measure(task, Robot(driver), None, said.append)  # type: ignore[arg-type]
 
     assert (driver.runs, task.told) == (2, told)
     assert said[-1] == "doubtful: 0.4 is 5 times what was expected; correct a1, or confirm it"
+
+
+@pytest.mark.parametrize(("refused", "kept"), [("Bo has taken it since", []), (None, [(0.4, None)])])
+def test_repeats_are_forgotten_if_somebody_else_may_have_moved_the_robot_meanwhile(
+    refused: str | None, kept: Any
+) -> None:
+    task, said = Task(None), list[str]()
+    journal, left = Journal(), iter([None])
+    journal.repeat("r", 0.4)
+
+    def ask() -> None:
+        if next(left, "lost"):
+            raise TakeLost(refused or "no sign of life")
+
+    task.take = SimpleNamespace(lost=None, refused=refused, ask=ask)
+    task.forget = lambda: journal.forget("r")
+    measure(task, Robot(Driver(0.4)), None, said.append)  # type: ignore[arg-type]
+
+    assert (len(task.noted), task.told, said[-1]) == (1, [], f"stopped: {refused or 'no sign of life'}")
+    assert journal.repeats("r") == kept
 
 
 def test_a_repeat_of_a_journal_whose_readings_do_not_fit_is_measured_again() -> None:
     task, driver = Task(SENSORS.model_copy(update={"needed": True})), Driver((0.4, TABLE))
     task.known = [(0.3, None), (0.2, TABLE)]
 
-    measure(task, driver, None, lambda sentence: None)  # type: ignore[arg-type]
+    measure(task, Robot(driver), None, lambda sentence: None)  # type: ignore[arg-type]
 
     assert (driver.runs, task.told) == (1, [([0.2, 0.4], [TABLE, TABLE])])

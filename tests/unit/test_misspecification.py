@@ -21,7 +21,7 @@ from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.gauss_newton import GaussNewton
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Fit, Sample, Simulator
-from gaplab.services.core.unreproduced import unreproduced
+from gaplab.services.core.unreproduced import doubt, unreproduced
 
 SPACE = Space.box([0.0, 10.0], [1.0, 30.0])
 SENSORS = Sensors(("roll", "height"), ("rad", "m"), frozen([0.02, 0.005]), frozen([0.5, 1.0, 1.5]))
@@ -61,8 +61,8 @@ def test_a_reality_between_the_bounds_surprises_rarely_and_one_beyond_the_model_
 
     assert sum(fit.surprise <= SURPRISING for fit in honest) <= 1
     assert all(fit.surprise <= SURPRISING for fit in tilted)
-    assert np.median([fit.interval_scale for fit in honest]) < 1.5
-    assert min(fit.interval_scale for fit in tilted) > 1.8
+    assert np.median([fit.interval_scale for fit in honest]) < 1.6
+    assert min(fit.interval_scale for fit in tilted) > 2.0
 
 
 def test_a_reading_that_no_simulator_has_differs_and_a_sensor_that_failed_does_not_count() -> None:
@@ -128,9 +128,24 @@ def test_it_is_said_how_far_off_and_where_most_and_identified_is_not() -> None:
     )
     assert "a slope of the ground, a weak or slow motor, mass, latency" in said
     points = [misfit_point(1, tunings, ["grip", "mass"], SPACE)]
-    grip, mass = verdicts(points, [2], Means(), unreproduced=True)
+    grip, mass = verdicts(points, [2], Means(), doubt(tunings, simulated=True))
     assert (grip.verdict, mass.verdict) == (Identification.DOUBTFUL, Identification.NOT)
     assert grip.sentence.startswith("grip: doubtful, for no simulator reproduces the samples; ")
-    assert verdicts(points, [2], Means())[0].verdict is Identification.IDENTIFIED
     assert unreproduced([tuning(0.02), tuning(0.4), tuning(0.4)], SENSORS, "× noise") == ""
     assert unreproduced([replace(tuning(0.02), fit=None)], SENSORS, "× noise") == ""
+
+
+def test_a_tunable_is_identified_only_where_the_model_was_tested_and_is_credible() -> None:
+    points = [misfit_point(1, [tuning(0.4)], ["grip", "mass"], SPACE)]
+    unknown = replace(tuning(0.4), fit=None)
+
+    sure, exact, less, untested = (
+        verdicts(points, [2], Means(), doubt([each], simulated=simulated))[0]
+        for each, simulated in ((tuning(0.4), False), (unknown, True), (tuning(0.1), False), (unknown, False))
+    )
+
+    assert sure.verdict is exact.verdict is Identification.IDENTIFIED
+    assert less.verdict is untested.verdict is Identification.PARTLY
+    assert less.sentence.startswith("grip: partly identified, for the samples raise some doubt about the model; ")
+    assert untested.sentence.startswith("grip: partly identified, for nothing tells noise from a wrong model; ")
+    assert untested.helps == ("repeats of a measurement, or the discrepancy readings",)

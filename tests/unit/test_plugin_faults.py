@@ -138,6 +138,6 @@ def test_an_edit_that_keeps_size_and_second_is_imported(put: Put, place: str) ->
 
         assert getattr(strategies["careful"], "weight", None) == float(weight)
 
-    watching.imported.renewed()
+    watching.imported.contents()
     assert not list(file.parent.rglob("*.pyc"))
     assert re.search("weight = 9.0", file.read_text())

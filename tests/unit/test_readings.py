@@ -210,7 +210,7 @@ def test_answers_with_readings_go_through_checkpoints() -> None:
         def genomes_per_call(self, simulators: int) -> int:
             return 2
 
-        def record(self, answers: Any, rollouts: int) -> None:
+        def record(self, answers: Any, rollouts: int, budget: int) -> None:
             recorded.extend(answers)
 
     calls = []

@@ -281,8 +281,8 @@ def test_tunables_that_rebuild_edit_before_those_that_edit_in_place() -> None:
     labels = ["mass(trunk)", "length_scale(*_shin)", "slope"]
     simulation = Simulation(Quadruped(), Analytic(), edits_of(labels))
 
-    world = simulation._edited((1.2, 1.1, 0.05))
-    heavier = simulation._edited((0.9, 1.1, 0.02))
+    world = simulation.world(np.array((1.2, 1.1, 0.05)))
+    heavier = simulation.world(np.array((0.9, 1.1, 0.02)))
 
     assert body(world, "trunk").mass_kg == pytest.approx(1.8)
     assert body(world, "rear_left_shin").center_m[2] == pytest.approx(-0.165)
@@ -310,7 +310,7 @@ class Slimmer(Tunable):
 def test_what_a_plug_in_replaces_is_built_whatever_else_is_tuned(other: str) -> None:
     simulation = Simulation(Quadruped(), Analytic(), [tunable_of(other), Slimmer()])
 
-    world = simulation._edited((1.1 if other == "mass(trunk)" else 0.02, 0.05))
+    world = simulation.world(np.array((1.1 if other == "mass(trunk)" else 0.02, 0.05)))
 
     assert world.bodies[0].shape == Box((0.3, 0.2, 0.05))
     everything = frozenset({"body.mass_kg", "body.center_m", "slope_rad"})

@@ -12,7 +12,7 @@ from rich.table import Table
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
 from gaplab.api.clients.progress.text import COLORS, counts, fraction, left, percent, standing
 from gaplab.api.clients.records import Record
-from gaplab.schemas.curves import Curve
+from gaplab.schemas.curves import Curve, from_before
 from gaplab.schemas.records import StudyRead
 
 BLOCKS = "▁▂▃▄▅▆▇█"
@@ -66,7 +66,8 @@ def _curve(curve: Curve | None, scale: Sequence[float]) -> str:
     if not curve or not points:
         return "-" if curve else ""
     sd = f"±{points[-1].sd:.2f}" if points[-1].sd is not None else ""
-    return f"{spark(_means(curve), min(scale), max(scale))} {points[-1].mean:.2f}{sd} after {points[-1].evaluations}"
+    after = f"{points[-1].evaluations}{from_before(curve.known)}"
+    return f"{spark(_means(curve), min(scale), max(scale))} {points[-1].mean:.2f}{sd} after {after}"
 
 
 def _repetitions(row: RecordProgress) -> str:

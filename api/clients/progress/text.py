@@ -1,11 +1,15 @@
 """Progress in words and colours, for all renderers."""
 
 import math
+import re
+from collections.abc import Iterable
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.markup import escape
+from rich.segment import Segment
 
 from gaplab.api.clients.records import Record
+from gaplab.schemas.curves import from_before
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Progress, StudyRead, TimeLeft
 
@@ -21,11 +25,27 @@ COLORS = {
     State.WAITING: "yellow",
 }
 
+_CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+def printable(text: str) -> str:
+    """Return a text without characters that a terminal obeys: names come from others. JSON keeps its meaning."""
+    return _CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+class _Screen(Console):
+    """A console whose texts are as `printable` returns them; its own colours and movements stay."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield the parts of what is printed."""
+        for part in super().render(renderable, options):
+            yield part if part.control else part._replace(text=printable(part.text))
+
 
 def console(*, stderr: bool = False) -> Console:
     """Return a console; without a terminal it is wide, so that the lines of a log are not cut at 80 characters."""
-    terminal = Console(stderr=stderr, highlight=False)
-    return terminal if terminal.is_terminal else Console(stderr=stderr, highlight=False, width=160)
+    terminal = _Screen(stderr=stderr, highlight=False)
+    return terminal if terminal.is_terminal else _Screen(stderr=stderr, highlight=False, width=160)
 
 
 def colored(state: State) -> str:
@@ -35,9 +55,7 @@ def colored(state: State) -> str:
 
 def standing(record: Record) -> str:
     """Return the state of a study or an experiment in its colour, with what the state alone does not say."""
-    if not record.caveat:
-        return colored(record.state)
-    return f"[yellow]{record.state}, {escape(record.caveat)}[/]"
+    return f"[yellow]{escape(state_text(record))}[/]" if record.caveat else colored(record.state)
 
 
 def state_text(record: Record) -> str:
@@ -66,7 +84,7 @@ def left(record: Record) -> str:
 def fitness(record: Record) -> str:
     """Return the fitness of an experiment, or of a study's best, with its number of evaluations: "0.585 at 10"."""
     found = record.best if isinstance(record, StudyRead) else record.fitness
-    return f"{found.mean:.3f} at {found.evaluations}" if found else "-"
+    return f"{found.mean:.3f} at {found.evaluations}{from_before(found.known)}" if found else "-"
 
 
 def best(study: StudyRead) -> list[str]:
@@ -75,7 +93,8 @@ def best(study: StudyRead) -> list[str]:
     if not found:
         return []
     evaluations = f"{found.evaluations} real-world evaluation{'' if found.evaluations == 1 else 's'}"
-    return [f"best: {found.name.replace('_', ' ')}, mean {found.mean:.3f} after {evaluations} (n = {found.n})"]
+    mean = f"mean {found.mean:.3f} after {evaluations}{from_before(found.known)}"
+    return [f"best: {found.name.replace('_', ' ')}, {mean} (n = {found.n})"]
 
 
 def fraction(progress: Progress) -> float:
@@ -90,12 +109,14 @@ def percent(progress: Progress) -> str:
 
 
 def counts(progress: Progress) -> str:
-    """Return the finished repetitions, iterations and rollouts as a sentence."""
+    """Return the finished repetitions, iterations and rollouts as a sentence, with some of the steps under way."""
     failed = f", {progress.failed} failed" if progress.failed else ""
     physics = f", {progress.rollouts_failed:,} of them nan" if progress.rollouts_failed else ""
     iterations = f"{progress.counted_iterations_done} of {progress.counted_iterations} iterations; "
+    now = [f"; {each.kind} {each.iteration}: {100 * each.rollouts // each.budget} %" for each in progress.steps]
     return (
         f"{progress.completed} of {progress.repetitions} repetitions{failed}; "
         f"{iterations if progress.counted_iterations else ''}"
         f"{progress.rollouts_done:,} rollouts{physics}, {progress.rollouts_saved:,} saved, of {progress.rollouts:,}"
+        f"{''.join(now[:3])}"
     )

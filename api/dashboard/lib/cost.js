@@ -1,10 +1,10 @@
 // @ts-check
-/** What the service refuses until its cost is confirmed. */
+/** What the service refuses until it is confirmed: a high cost, or a name that is nearly that of another bench. */
 
 import { openDialog } from "./dialog.js";
 
 /**
- * Send a request; if the service wants its cost confirmed, ask the reader, and send it again.
+ * Send a request; if the service wants it confirmed, ask the reader, and send it again.
  *
  * @template T
  * @param {(query: string) => Promise<T>} send adds a query to the address
@@ -19,7 +19,7 @@ export async function confirmingCost(send, signal) {
     if (!refused) throw error;
     return new Promise((resolve) => {
       const dialog = openDialog({
-        title: "That much?", text: `The service says: ${refused.message}.`, action: "Compute it all the same",
+        title: "Is that right?", text: `The service says: ${refused.message}.`, action: "Do it all the same",
         act: async () => { resolve(await send("?confirm_cost=true")); },
       }, signal);
       dialog.addEventListener("close", () => { resolve(null); });  // after an answer, this does nothing

@@ -74,12 +74,15 @@ export function durationRange({ low_s: low, high_s: high }) {
   return least ? `${least} to ${most} ${name}` : `less than ${most} ${name}`;
 }
 
+/** @type {(known: number) => string} */
+export const fromBefore = (known) => (known ? ` (and ${count(known)} from before)` : "");
+
 /**
- * Format a number of real-world evaluations.
+ * Format a number of real-world evaluations, with that of samples from before.
  *
- * @param {number} evaluations
+ * @param {{ evaluations: number, known: number }} fitness
  */
-export const evaluationsText = (evaluations) => `${count(evaluations)} real-world evaluation${evaluations === 1 ? "" : "s"}`;
+export const evaluationsText = ({ evaluations, known }) => `${count(evaluations)} real-world evaluation${evaluations === 1 ? "" : "s"}${fromBefore(known)}`;
 
 /**
  * Format the time between two moments; a dash unless both are known.

@@ -14,7 +14,7 @@ let library = null;
 /** Return Plotly, which is loaded for the first figure; if that fails, with the next one. */
 function plotly() {
   library ??= new Promise((resolve, reject) => {
-    const src = `assets/plotly/plotly.min.js?v=${document.documentElement.dataset.plotly}`;
+    const src = `assets/plotly/plotly-basic.min.js?v=${document.documentElement.dataset.plotly}`;
     const fail = () => {
       library = null;
       reject(new Error("The library that draws figures could not be loaded."));

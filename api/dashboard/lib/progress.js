@@ -4,6 +4,8 @@
 import { h, setText } from "./dom.js";
 import { count, durationRange, percent } from "./format.js";
 
+const MOST_STEPS = 5;
+
 /**
  * Return the share that is done, between 0 and 1; a saved rollout is done.
  *
@@ -14,28 +16,30 @@ export function fraction(progress) {
 }
 
 /**
- * Return the number of completed repetitions, with those that failed.
- *
- * @param {Api.Progress} progress
- */
-export function repetitionsDone({ completed, repetitions, failed }) {
-  return `${count(completed)} of ${count(repetitions)}${failed ? `, ${count(failed)} failed` : ""}`;
-}
-
-/**
- * Return the number of completed iterations, as a spec counts them: without number 0.
- *
- * @param {Api.Progress} progress
- */
-export const iterationsDone = ({ counted_iterations_done: done, counted_iterations: all }) => `${count(done)} of ${count(all)}`;
-
-/**
  * Return the number of rollouts, with those that were saved.
  *
  * @param {Api.Progress} progress
  */
 export const rolloutsDone = ({ rollouts_done: done, rollouts: all, rollouts_saved: saved }) =>
   `${count(done)} of ${count(all)}${saved ? `, ${count(saved)} saved` : ""}`;
+
+/**
+ * Return the facts of completed work and of the steps under way. Iterations are counted as in a spec: without number 0.
+ *
+ * @param {Api.Progress} progress
+ */
+export function workFacts(progress) {
+  const { completed, repetitions, failed, counted_iterations: iterations, counted_iterations_done: done, rollouts_failed: broken, steps } = progress;
+  const shares = steps.map(({ kind, iteration, rollouts, budget }) => `${kind} ${iteration}: ${percent(rollouts / budget)}`);
+  /** @type {import("./head_parts.js").Fact[]} */
+  const facts = [
+    ["Repetitions", `${count(completed)} of ${count(repetitions)}${failed ? `, ${count(failed)} failed` : ""}`],
+    ["Iterations", iterations ? `${count(done)} of ${count(iterations)}` : ""],
+    ["Rollouts", `${rolloutsDone(progress)}${broken ? `, physics failed in ${count(broken)}` : ""}`],
+    ["Now", [...shares.slice(0, MOST_STEPS), ...(shares.length > MOST_STEPS ? ["…"] : [])].join(", ")],
+  ];
+  return facts.filter(([, text]) => text);
+}
 
 /**
  * Return a bar with its per cent.

@@ -49,6 +49,7 @@ declare namespace Api {
   }
   interface BestRead {
     evaluations: number;
+    known: number;
     n: number;
     mean: number;
     sd: number | null;
@@ -130,6 +131,7 @@ declare namespace Api {
     welch: Test;
     mann_whitney: Test;
     fitness: Fitness;
+    where: string;
     caution: string | null;
     lower: number | null;
     upper: number | null;
@@ -180,6 +182,7 @@ declare namespace Api {
     fitness: Fitness;
     direct: boolean;
     level: boolean;
+    known: number;
     points: Array<CurvePoint>;
     best_of: Array<number | null>;
   }
@@ -339,6 +342,7 @@ declare namespace Api {
   type Fitness = "recorded" | "transferred" | "equal_chances";
   interface FitnessRead {
     evaluations: number;
+    known: number;
     n: number;
     mean: number;
     sd: number | null;
@@ -488,6 +492,7 @@ declare namespace Api {
     rollouts_saved: number;
     seconds_left: number | null;
     time_left: TimeLeft | null;
+    steps: Array<StepRead>;
   }
   interface Provenance {
     gaplab: string;
@@ -530,6 +535,7 @@ declare namespace Api {
     take: number;
     operator: string | null;
     reason: string | null;
+    moved_s: number | null;
   }
   interface RepetitionRead {
     number: number;
@@ -752,6 +758,13 @@ declare namespace Api {
     remarks: Array<string>;
   }
   type State = "QUEUED" | "RUNNING" | "PAUSING" | "PAUSED" | "STOPPING" | "COMPLETED" | "FAILED" | "CANCELLED" | "WAITING";
+  interface StepRead {
+    repetition: number;
+    iteration: number;
+    kind: string;
+    rollouts: number;
+    budget: number;
+  }
   interface StudyRead {
     id: string;
     name: string;

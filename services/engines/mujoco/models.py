@@ -58,6 +58,8 @@ class Models:
             if id(world) in self._kept:  # the cache keeps the world, so its id is its own
                 self._kept.move_to_end(id(world))
         most = max(min(KEPT, KEPT_BYTES // self.structure.model.nbuffer), len(worlds))
+        while len(self._kept) > most:
+            self._kept.popitem(last=False)
         for world in worlds:
             if id(world) not in self._kept:
                 spare = self._kept.popitem(last=False)[1] if len(self._kept) >= most else None

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from gaplab.schemas.curves import Curve, CurvePoint, Fitness
+from gaplab.schemas.curves import Curve, CurvePoint, Fitness, from_before
 from gaplab.services.figures.kinds.best_of import best_of_in_words, best_of_line
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Line, Mark, Panel, Table, faint_lines
 from gaplab.services.figures.style import INK, Dash, Style, strategy_styles
@@ -83,7 +83,8 @@ def curves_figure(
     found = [best_of_line(one.name, one.curve, span) for one in levels] if lines and not against else []
     best_of = [line for line in found if line]
     marks += best_of
-    x = Axis(against.label if against else EVALUATIONS, (-0.02 * span, 1.02 * span), whole=against is None)
+    evaluations = EVALUATIONS + from_before(*(one.curve.known for one in lines))
+    x = Axis(against.label if against else evaluations, (-0.02 * span, 1.02 * span), whole=against is None)
     y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
     caption = _caption(lines, levels, BANDS[band], against, each=each, thin=bool(thin))
     return FigureDefinition(
@@ -196,6 +197,8 @@ def _caption(
     parts += sorted({f"{one.curve.fitness.words}." for one in lines if one.curve.fitness is not Fitness.RECORDED})
     parts += ["Thin lines: transferred controllers alone."] if thin else []
     parts += ["Faint lines: single repetitions."] if counts and each else []
+    known = [one.curve.known for one in lines]
+    parts += [f"{number_of('sample', *known)} from before are not counted."] if any(known) else []
     parts += [against.note] if against else []
     origins = {True: "evolved in reality itself", False: "without samples"}
     parts += [f"{one.name}: {origins[one.curve.direct]}, {_level_in_words(one)}." for one in levels]

@@ -120,9 +120,10 @@ def _measure(errors: Mapping[int, Errors], name: str, label: str, unit: str, *, 
     line = _median(there)
     logarithmic = is_wide(line.y)
     marks = (line, *([_repetitions(errors)] if each else [])) if there else ()
+    before = ", without those from before" if 0 in there else ""
     panel = Panel(
         tuple(_above_zero(mark) for mark in marks) if logarithmic else marks,
-        Axis("Iteration (real-world evaluations so far)", _frame(there), whole=True),
+        Axis(f"Iteration (real-world evaluations so far{before})", _frame(there), whole=True),
         Axis(with_unit(label, {unit}), _limits(marks, logarithmic=logarithmic), log=logarithmic),
         title=name,
     )

@@ -60,7 +60,7 @@ def _samples(toy: ToyIteration) -> list[Mark]:
     found = [each for each in toy.samples if each.fitness is not None]
     if not found:
         return []
-    told = tuple(f"Sample of iteration {each.iteration}" for each in found)
+    told = tuple(f"Sample of iteration {each.iteration}" if each.iteration else "Sample from before" for each in found)
     places = tuple(each.gene for each in found), tuple(each.fitness for each in found)
     return [Points("Samples", *places, SAMPLES, hover=told)]
 

@@ -1,4 +1,4 @@
-"""Figures as self-contained HTML files, with the JavaScript of the Python package plotly inside."""
+"""Figures as self-contained HTML files, with Plotly inside."""
 
 import json
 from functools import cache
@@ -34,12 +34,12 @@ CONFIG = {
 def render_html(figure: FigureDefinition) -> str:
     """Return the figure as a page with a table of its numbers; the page makes no network request."""
     drawn = chart(figure)
-    return Template(_resource("gaplab.services.figures.plotly", "page.html")).substitute(
+    return Template(_resource("page.html")).substitute(
         title=escape(figure.title or figure.name.replace("-", " ").capitalize()),
         alt=escape(figure.alt),
         caption=escape(figure.caption),
         numbers=_numbers(figure.table) if figure.table else "",
-        plotly=_resource("plotly", "package_data", "plotly.min.js"),
+        plotly=_resource("library", "plotly-basic.min.js"),
         data=_script(drawn["data"]),
         layout=_script(_on_white(drawn["layout"])),
         config=_script(CONFIG | {"toImageButtonOptions": {"format": "svg", "filename": f"gaplab-{figure.name}"}}),
@@ -49,8 +49,8 @@ def render_html(figure: FigureDefinition) -> str:
 
 
 @cache
-def _resource(package: str, *path: str) -> str:
-    return files(package).joinpath(*path).read_text("utf-8")
+def _resource(*path: str) -> str:
+    return files("gaplab.services.figures.plotly").joinpath(*path).read_text("utf-8")
 
 
 def _on_white(layout: dict[str, Any]) -> dict[str, Any]:

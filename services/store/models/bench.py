@@ -18,10 +18,11 @@ class RequestRow(Base):
     Attributes:
         place: place of the measurement's step in the log of the repetition.
         bench: name of the physical robot.
-        held: the bench while the request is taken, else NULL; unique, so a bench has one holder at a time.
-        takes: number of takes so far; it fences the answer of an earlier one.
+        held: what the spellings of the bench share, until the holder has let go, also if the request is wanted no more;
+            else NULL. It is unique, so a bench has one holder at a time.
+        takes: number of the latest take; it fences the answer of an earlier one.
         unanswered: takes in a row that ended without an answer.
-        taken_until: time at which the take ends unless a heartbeat extends it.
+        taken_until: time at which the take ends unless a heartbeat extends it, to be shown; it changes with each one.
         lease_s: seconds that a heartbeat extends it by.
         safety: what the believed simulators expect of the controller.
         branch: number of the closed branch that it belongs to; NULL if it belongs to none.

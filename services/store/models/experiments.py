@@ -8,6 +8,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.resolved import SPEC_VERSION
+from gaplab.services.core.strategies import strategies
 from gaplab.services.store.clock import now
 from gaplab.services.store.models.base import Base, Reason
 from gaplab.services.store.models.work import LeasedRow
@@ -103,7 +104,13 @@ class ExperimentRow(Base):
     @property
     def tunes(self) -> bool:
         """Whether it has samples to tune on: it takes some, beside iteration 0, or has some from before."""
-        return self.iterations > 1 or bool(self.spec["reality"]["samples"])
+        return self.iterations > 1 or self.known > 0
+
+    @property
+    def known(self) -> int:
+        """Number of samples from before the experiment; 0 if its strategy takes no samples."""
+        strategy = strategies.get(self.strategy)
+        return len(self.spec["reality"]["samples"]) if strategy is None or strategy.takes_samples else 0
 
 
 class RepetitionRow(LeasedRow):

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ForeignKey, Index, String
+from sqlalchemy import BigInteger, ForeignKey, Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import Ending, State
@@ -66,6 +66,7 @@ class CheckpointRow(Base):
         part: number of the part within the step.
         answers: digests and fitnesses, packed by `gaplab.services.core.answers`; no other module reads them.
         seconds: seconds of work that they took.
+        rollouts, budget: rollouts of the step so far, and those that it was given.
     """
 
     __tablename__ = "checkpoint"
@@ -75,6 +76,8 @@ class CheckpointRow(Base):
     part: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     answers: Mapped[bytes]
     seconds: Mapped[float]
+    rollouts: Mapped[int] = mapped_column(BigInteger, server_default="0")
+    budget: Mapped[int] = mapped_column(BigInteger, server_default="0")
 
 
 class SensitivityRow(LeasedRow):

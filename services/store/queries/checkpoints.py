@@ -1,15 +1,19 @@
 """Checkpoints of current steps: stored in parts, read with a claim, deleted when the step is recorded."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from sqlalchemy import bindparam, delete, insert, select, update
 from sqlalchemy.orm import Session
 
+from gaplab.schemas.records import StepRead
 from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Checkpoint, Claim, Delivered
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
+
+_COLUMNS = tuple(Checkpoint.__dataclass_fields__)
+_KINDS = ("selection", "measurement", "tuning", "transfer", "probe")
 
 
 def fresh(delivered: Iterable[Delivered], step: int, parts: int) -> list[Checkpoint]:
@@ -37,7 +41,7 @@ def fresh(delivered: Iterable[Delivered], step: int, parts: int) -> list[Checkpo
 def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None:
     """Store parts of current steps. The repetitions must be locked, and the claims valid."""
     rows = [
-        {"repetition_id": claim.id} | {name: getattr(each, name) for name in Checkpoint.__dataclass_fields__}
+        {"repetition_id": claim.id} | {name: getattr(each, name) for name in _COLUMNS}
         for claim, checkpoints in parts.items()
         for each in checkpoints
     ]
@@ -65,5 +69,17 @@ def stored(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Chec
     found = session.scalars(select(row).where(row.repetition_id.in_(repetitions)).order_by(row.step, row.part))
     gathered: dict[int, list[Checkpoint]] = defaultdict(list)
     for each in found:
-        gathered[each.repetition_id].append(Checkpoint(each.step, each.part, each.answers, each.seconds))
+        gathered[each.repetition_id].append(Checkpoint(*(getattr(each, name) for name in _COLUMNS)))
     return {each: tuple(gathered[each]) for each in repetitions}
+
+
+def begun(session: Session, experiments: Sequence[str]) -> Iterator[tuple[str, StepRead]]:
+    """Yield the steps that have checkpoints, each with its experiment."""
+    row, of = CheckpointRow, RepetitionRow
+    query = select(of.experiment_id, of.number, row.step, row.rollouts, row.budget)
+    last = of.experiment_id.in_(experiments) & (row.part == of.checkpoints - 1) & (row.budget > 0)
+    joined = query.join(of, of.id == row.repetition_id).where(last).order_by(of.number)
+    for experiment, number, place, rollouts, budget in session.execute(joined):
+        iteration, kind = divmod(place + _KINDS.index("tuning"), len(_KINDS))
+        step = StepRead(repetition=number, iteration=iteration, kind=_KINDS[kind], rollouts=rollouts, budget=budget)
+        yield experiment, step

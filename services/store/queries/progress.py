@@ -9,7 +9,9 @@ from sqlalchemy import ColumnElement, Select, bindparam, case, func, select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import PENDING, State
+from gaplab.schemas.records import StepRead
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.queries import checkpoints
 
 _STOPPED = (State.COMPLETED, State.CANCELLED)
 
@@ -24,6 +26,7 @@ class Tally:
         counted_iterations, counted_iterations_done: iterations without number 0.
         rollouts_left: remaining rollouts of repetitions that have not ended.
         seconds: seconds of work in the completed rollouts.
+        steps: what its repetitions have begun; the rollouts of those count.
     """
 
     repetitions: int = 0
@@ -42,6 +45,7 @@ class Tally:
     rollouts_saved: int = 0
     rollouts_left: int = 0
     seconds: float = 0.0
+    steps: tuple[StepRead, ...] = ()
 
     def __add__(self, other: "Tally") -> "Tally":
         return Tally(*(mine + theirs for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True)))
@@ -50,7 +54,10 @@ class Tally:
 def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
     """Return the tally of each experiment."""
     found = session.execute(_all_tallies(), {"experiments": experiments})
-    return {experiment: _tally(*counts, seconds=float(seconds)) for experiment, *counts, seconds in found}
+    tallied = {experiment: _tally(*counts, seconds=float(seconds)) for experiment, *counts, seconds in found}
+    for experiment, step in checkpoints.begun(session, experiments):
+        tallied[experiment] += Tally(rollouts_done=step.rollouts, rollouts_left=-step.rollouts, steps=(step,))
+    return tallied
 
 
 @cache
@@ -84,6 +91,13 @@ def _all_tallies() -> Select[*tuple[Any, ...]]:
     )
 
 
+def most_done(session: Session, experiments: Sequence[str]) -> dict[str, int]:
+    """Return the iterations, number 0 included, that the farthest repetition of each experiment has completed."""
+    row = RepetitionRow
+    query = select(row.experiment_id, func.max(row.iterations_done)).where(row.experiment_id.in_(experiments))
+    return dict(session.execute(query.group_by(row.experiment_id)).all())
+
+
 def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """Return the distinct errors of failed repetitions, by experiment, in the order of repetitions."""
     row = RepetitionRow
@@ -101,8 +115,8 @@ def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str
 
 def _tally(*counts: int, seconds: float) -> Tally:
     """Return a tally from counts in the order of its fields, as int: Postgres returns decimals."""
-    names = (each.name for each in fields(Tally))
-    return Tally(seconds=seconds, **{name: int(count) for name, count in zip(names, counts, strict=False)})
+    named: dict[str, Any] = {each.name: int(count) for each, count in zip(fields(Tally), counts, strict=False)}
+    return Tally(seconds=seconds, **named)
 
 
 def _count(condition: ColumnElement[bool]) -> ColumnElement[int]:

@@ -50,9 +50,9 @@ def tuned_samples(session: Session, experiment: ExperimentRow) -> tuple[TunedSam
     for found, iteration in ((before, row.iteration - 1), (after, row.iteration)):
         best = (found.repetition_id == row.repetition_id) & (found.iteration == iteration) & (found.rank == 0)
         query = query.join(found, best)
-    share, known = experiment.spec["held_out"], len(experiment.spec["reality"]["samples"])
+    share = experiment.spec["held_out"]
     samples = starmap(TunedSample, session.execute(query.order_by(RepetitionRow.number, row.iteration)))
-    seen = (each for each in samples if not is_held_out(known + each.iteration, share))
+    seen = (each for each in samples if not is_held_out(experiment.known + each.iteration, share))
     return (*_known_samples(session, experiment), *seen)
 
 
@@ -61,7 +61,7 @@ def _known_samples(session: Session, experiment: ExperimentRow) -> Iterator[Tune
     tuned = (row.iteration == 0) & (row.rank == 0) & row.squared_error.is_not(None)
     query = of_experiments(row, [experiment.id], RepetitionRow.number, row.parameters).where(tuned)
     for repetition, after in session.execute(query.order_by(RepetitionRow.number)):
-        for number, known in enumerate(experiment.spec["reality"]["samples"], 1):
+        for number, known in enumerate(experiment.spec["reality"]["samples"][: experiment.known], 1):
             if not is_held_out(number, share):
                 yield TunedSample(repetition, 0, known["genome"], fmean(known["values"]), None, after)
 

@@ -7,7 +7,7 @@ answer    conflict ──> counted ──> replaced, void;  or conflict ──> 
 
 from typing import Any
 
-from sqlalchemy import ColumnElement, update
+from sqlalchemy import ColumnElement, case, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.measurements import AnswerState, RequestState
@@ -17,6 +17,9 @@ from gaplab.services.store.models import AnswerRow, RequestRow
 
 PENDING = (RequestState.OPEN, RequestState.TAKEN, RequestState.STUCK)
 """States of a request that is still wanted."""
+
+LET_GO_S = 60.0
+"""Longest time for which a silent holder keeps the bench of a request that is wanted no more."""
 
 ANSWERED = (RequestState.MEASURED, RequestState.FAILED)
 
@@ -64,7 +67,7 @@ def judge(session: Session, row: AnswerRow, to: AnswerState, reason: str) -> Non
 
 
 def withdraw(session: Session, which: ColumnElement[bool]) -> None:
-    """Withdraw the requests of a condition that are still wanted."""
+    """Withdraw the requests of a condition that are still wanted; its holder has the bench until he lets go."""
     row = RequestRow
-    values = {"held": None, "ended_at": now()}
+    values = {"ended_at": now(), "lease_s": case((row.lease_s > LET_GO_S, LET_GO_S), else_=row.lease_s)}
     session.execute(update(row).where(which, row.state.in_(PENDING)).values(state=RequestState.WITHDRAWN, **values))

@@ -1,7 +1,6 @@
 """Rows of requests for physical measurements, and of their answers."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from datetime import datetime, timedelta
 
 from sqlalchemy import ColumnElement, select, union_all
 from sqlalchemy.orm import Session
@@ -13,8 +12,9 @@ from gaplab.services.store.clock import moment
 from gaplab.services.store.lease import Claim, Requested
 from gaplab.services.store.models import AnswerRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import request_states
+from gaplab.services.store.queries.benches import spellings
 from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.experiments import new_id
+from gaplab.services.store.queries.experiments import lock, new_id
 from gaplab.services.store.queries.repetition_rows import of_experiments
 from gaplab.services.store.queries.request_states import ANSWERED as ANSWERED
 from gaplab.services.store.queries.request_states import PENDING as PENDING
@@ -42,6 +42,7 @@ def insert(session: Session, asked: Mapping[Claim, Requested]) -> dict[Claim, Re
 
 
 def _new(session: Session, claim: Claim, wanted: Requested, same: RequestRow | None) -> RequestRow:
+    bench = claim.spec.reality.bench or ""
     row = RequestRow(
         id=new_id(),
         repetition_id=claim.id,
@@ -49,7 +50,7 @@ def _new(session: Session, claim: Claim, wanted: Requested, same: RequestRow | N
         iteration=wanted.iteration,
         kind=wanted.kind,
         genome=vector(wanted.genome),
-        bench=storable(claim.spec.reality.bench or ""),
+        bench=next(iter(spellings(session, bench)), storable(bench).strip()),
         state=RequestState.OPEN if same is None else same.state,
         safety=wanted.safety,
         same_as=None if same is None else same.same_as or same.id,
@@ -116,6 +117,19 @@ def get(session: Session, id_: str) -> tuple[RequestRow, RepetitionRow]:
     return row, repetition
 
 
+def locked(session: Session, id_: str) -> tuple[RequestRow, RepetitionRow]:
+    """Return a request and its repetition, both as they are; their experiment is locked first.
+
+    Raises:
+        NotFound: the request does not exist.
+    """
+    row, repetition = get(session, id_)
+    lock(session, [repetition.experiment_id])
+    session.refresh(row, with_for_update=True)
+    session.refresh(repetition)
+    return row, repetition
+
+
 def get_answer(session: Session, id_: str) -> AnswerRow:
     """Return an answer.
 
@@ -127,37 +141,22 @@ def get_answer(session: Session, id_: str) -> AnswerRow:
     return row
 
 
-def is_expired(row: RequestRow, at: datetime) -> bool:
-    """Return whether a take has ended without an answer.
-
-    A take that ends later than a heartbeat could have set was set before the clock was set back, and says nothing.
-    """
-    if row.state is not RequestState.TAKEN or row.taken_until is None:
-        return False
-    return not at < row.taken_until <= at + timedelta(seconds=row.lease_s or 0.0) + timedelta(seconds=1)
-
-
-def expire(session: Session, which: ColumnElement[bool] | None = None) -> int:
-    """Open the requests again whose take has ended, and return their number."""
-    row, at = RequestRow, moment(session)
-    taken = select(row).where(row.state == RequestState.TAKEN)
-    taken = taken if which is None else taken.where(which)
-    expired = [each for each in session.scalars(taken.with_for_update()) if is_expired(each, at)]
-    for each in expired:
-        give_up(session, each, EventKind.TAKE_EXPIRED)
-    session.flush()
-    return len(expired)
-
-
 def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
-    """End the take of a request that got no answer; `more` is told in its event."""
+    """End the take of a request that got no answer; `more` is told in its event, if it is still wanted."""
+    if row.state is not RequestState.TAKEN:
+        row.held = None
+        return
     unanswered = row.unanswered + (kind is EventKind.TAKE_EXPIRED)
     to = RequestState.STUCK if unanswered >= MOST_UNANSWERED else RequestState.OPEN
     request_states.become(session, row, to, held=None, unanswered=unanswered)
-    repetition = session.get(RepetitionRow, row.repetition_id)
-    if repetition is not None:
-        body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by, **more}
-        note(session, kind, repetition.experiment_id, repetition.number, **body)
+    note_take(session, row, kind, **more)
+
+
+def note_take(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
+    """Add the event of a take; `more` is told in it."""
+    repetition = session.get_one(RepetitionRow, row.repetition_id)
+    body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by, **more}
+    note(session, kind, repetition.experiment_id, repetition.number, **body)
 
 
 def answers_of(session: Session, requests: Iterable[str]) -> dict[str, list[AnswerRow]]:

@@ -110,7 +110,7 @@ def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
     row, share = MeasurementRow, experiment.spec["held_out"]
     query = of_experiments(row, [experiment.id], RepetitionRow.number, row.iteration)
     tuned_on, held_out = dict[int, list[int]](), dict[int, list[int]]()
-    before = len(experiment.spec["reality"]["samples"])
+    before = experiment.known
     for repetition, iteration in session.execute(
         query.where(row.kind == MeasurementKind.SAMPLE, row.fitness.is_not(None))
     ):

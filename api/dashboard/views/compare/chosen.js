@@ -2,7 +2,7 @@
 /** The experiments that are compared, each with its letter and a button that removes it. */
 
 import { byId, h, refill } from "../../lib/dom.js";
-import { fixed } from "../../lib/format.js";
+import { fixed, fromBefore } from "../../lib/format.js";
 import { stateBadge } from "../../lib/state_badge.js";
 import { letter } from "./ranges.js";
 
@@ -44,7 +44,7 @@ export function chosenList(view) {
 }
 
 /** @param {Api.FitnessRead} fitness */
-const fitnessText = ({ mean, evaluations }) => h("small", {}, `${fixed(mean)} after ${evaluations}`);
+const fitnessText = ({ mean, evaluations, known }) => h("small", {}, `${fixed(mean)} after ${evaluations}${fromBefore(known)}`);
 
 /** @param {Page.CompareView} view */
 const areOfSeveralStudies = ({ cache, choice }) => new Set(choice.experiments.map((id) => cache.get(id)?.study ?? id)).size > 1;

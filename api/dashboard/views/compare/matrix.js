@@ -14,12 +14,11 @@ import { probabilities, signed, swapped, verdict } from "./verdict.js";
  * @param {string[]} ids
  * @param {Page.RangeResult} result
  */
-export function matrix({ cache, choice }, ids, { range: [from, to], pairs }) {
+export function matrix({ cache, choice }, ids, { pairs }) {
   const letterOf = (/** @type {string} */ id) => letter(choice.experiments.indexOf(id));
   const names = cache.namesOf(choice.experiments);
   const pairsByIds = new Map([...pairs, ...pairs.map(swapped)].map((pair) => [`${pair.first} ${pair.second}`, pair]));
-  const range = from === to ? `after ${from} real-world evaluation${from === 1 ? "" : "s"}` : `by the mean over ${from} to ${to} real-world evaluations`;
-  const title = `The row against the column, ${range}`;
+  const title = `The row against the column, ${pairs[0].where}`;
   const head = h("tr", {}, h("td", {}), ...ids.map((id) => h("th", { scope: "col", title: names.get(id) }, letterOf(id))));
   const rows = ids.map((row) => h("tr", {}, h("th", { scope: "row" }, h("b", {}, letterOf(row)), ` ${names.get(row)}`),
     ...ids.map((column) => cell(pairsByIds.get(`${row} ${column}`), choice.test))));

@@ -11,7 +11,7 @@ import { keepingButtons } from "../../lib/keeping.js";
 import { notesBlock } from "../../lib/markdown.js";
 import { isPhysical, worldsText } from "../../lib/robots.js";
 import { newFromThis } from "../../lib/new_from_this.js";
-import { fraction, iterationsDone, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
+import { fraction, timeLeftFact, workFacts } from "../../lib/progress.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { tagList } from "../../lib/tags.js";
 import { actions } from "./actions.js";
@@ -89,12 +89,9 @@ function trail({ experiment: { study }, signal }) {
  */
 function factsOf({ experiment, unit }) {
   const { progress, fitness, max_parallel: maxParallel } = experiment;
-  const broken = progress.rollouts_failed ? `, physics failed in ${count(progress.rollouts_failed)}` : "";
   return [
     ["Done", percent(fraction(progress))],
-    ["Repetitions", repetitionsDone(progress)],
-    ...(progress.counted_iterations ? [/** @type {Fact} */ (["Iterations", iterationsDone(progress)])] : []),
-    ["Rollouts", `${rolloutsDone(progress)}${broken}`],
+    ...workFacts(progress),
     ...(fitness ? [/** @type {Fact} */ (["Fitness in reality", fitnessText(fitness, unit(experiment))])] : []),
     ...times(experiment),
     ["Priority", experiment.priority],
@@ -103,7 +100,7 @@ function factsOf({ experiment, unit }) {
 }
 
 /** @type {(fitness: Api.FitnessRead, unit: string) => string} */
-const fitnessText = ({ mean, evaluations, n }, unit) => `${fixed(mean)} ${unit} after ${evaluationsText(evaluations)} (mean of ${n})`;
+const fitnessText = (fitness, unit) => `${fixed(fitness.mean)} ${unit} after ${evaluationsText(fitness)} (mean of ${fitness.n})`;
 
 /**
  * @param {Api.ExperimentRead} experiment

@@ -6,7 +6,7 @@ import { undoButtons } from "../../lib/bench/corrections.js";
 import { answerText, requestWords } from "../../lib/bench/values.js";
 import { h } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
-import { number } from "../../lib/format.js";
+import { count, number } from "../../lib/format.js";
 import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
 import { conflictList } from "../bench/conflicts.js";
@@ -34,12 +34,16 @@ const ENDED = { failed: "✕ failed", withdrawn: "– wanted no more", measured:
 export function measurements(page) {
   const show = h("select", {}, ...CHOICES.map(([value, label]) => h("option", { value }, label)));
   const reload = () => page.reload().then(() => page.sections.reload([]));
-  const render = (/** @type {Api.RequestRead[]} */ items) => {
-    if (!items.length) return [empty(show.value ? "There are none." : "No measurement was requested yet.")];
-    const unit = items[0].unit;
+  /** @type {{ values: number[] }[]} */
+  const known = page.experiment.spec.reality.samples;
+  const render = (/** @type {Api.RequestRead[]} */ items, /** @type {boolean} */ isFirst) => {
+    const earlier = isFirst && !show.value ? known.slice(0, PAGE_SIZE).map(earlierRow) : [];
+    if (!items.length && !earlier.length) return [empty(show.value ? "There are none." : "No measurement was requested yet.")];
+    const unit = items[0]?.unit ?? page.unit(page.experiment);
     const columns = ["Repetition", "Iteration", "Kind", `Repeats${unit && ` (${unit})`}`, "Mean", "State", "Operator", "When", "Replay", "Take back"];
     const conflicts = items.filter(({ answers }) => answers.some(({ state }) => state === "conflict"));
-    return [conflictList(conflicts, { signal: page.signal, refresh: reload }), table("Measurements", columns, items.map((request) => row(page, request, reload)))];
+    return [conflictList(conflicts, { signal: page.signal, refresh: reload }), table("Measurements", columns, [...earlier, ...items.map((request) => row(page, request, reload))]),
+      earlier.length < known.length && earlier.length ? h("p", { class: "note" }, `The spec has all ${count(known.length)} from before.`) : ""];
   };
   return pagedList(page, {
     path: "/requests", size: PAGE_SIZE, kinds: BENCH_KINDS, render,
@@ -47,6 +51,13 @@ export function measurements(page) {
     query: () => ({ experiment: page.id, pending: show.value === "pending", conflicts: show.value === "conflicts" || null }),
   });
 }
+
+/**
+ * Return a sample from before the experiment, which every repetition knows.
+ *
+ * @param {{ values: number[] }} sample
+ */
+const earlierRow = ({ values }) => ["all", "–", "sample from before", answerText({ values }), number(values.reduce((sum, each) => sum + each) / values.length), ENDED.measured, "–", "–", "", ""];
 
 /**
  * @param {Page.ExperimentPage} page

@@ -10,7 +10,8 @@ import { table } from "../../lib/table.js";
 import { REWRITES } from "./event_words.js";
 
 const KINDS = ["tuned", "probed", ...REWRITES];
-const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Simulators tuned on no sample are random.";
+const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound.";
+const RANDOM = " Simulators tuned on no sample are random.";
 
 const VERDICT_NOTE = "100 % is as uncertain as before any sample. The largest counts of the spread over repetitions, the tuner’s 95 % intervals, and its posterior. Agreement is not truth: simulators that lack an effect agree on a value that makes up for it.";
 
@@ -33,7 +34,7 @@ export function misfit(page) {
     const columns = ["Iteration", `Error per sample (${errorUnit})`, ...unseen, `Gap of what it evolved (${unit})`, ...tunables, "n"];
     place.replaceChildren(...identified(verdicts), h("h3", {}, "Misfit"),
       h("ul", { class: "misfit-remarks" }, ...remarks.map((remark) => h("li", {}, remark))),
-      table("Misfit by iteration", columns, points.map((point) => row(point, Boolean(share)))), h("p", { class: "note" }, NOTE,
+      table("Misfit by iteration", columns, points.map((point) => row(point, Boolean(share)))), h("p", { class: "note" }, NOTE, points[0].error.n ? "" : RANDOM,
         " ", downloadLink("CSV", `/experiments/${page.id}/misfit`, { format: "csv" }, `gaplab-${page.id}-misfit.csv`)));
   });
   return [place];

@@ -14,7 +14,7 @@ import { h, refillInPlace } from "../../lib/dom.js";
  * @param {() => Page.Query} list.query what the filters ask for
  * @param {number} list.size of a page
  * @param {string[]} list.kinds of events that change it
- * @param {(items: any[]) => Page.Child[]} list.render
+ * @param {(items: any[], isFirst: boolean) => Page.Child[]} list.render
  */
 export function pagedList(page, { path, filters, query, size, kinds, render }) {
   const place = h("div");
@@ -29,7 +29,7 @@ export function pagedList(page, { path, filters, query, size, kinds, render }) {
     const loaded = await get(path, { limit: size, cursor: cursors.at(-1), ...query() }, page.signal);
     if (request !== requests) return;  // a later request has replaced this one
     next = loaded.next;
-    refillInPlace(place, JSON.stringify([loaded.items, query()]), () => render(loaded.items));
+    refillInPlace(place, JSON.stringify([loaded.items, query()]), () => render(loaded.items, cursors.length === 1));
     back.disabled = cursors.length < 2;
     forward.disabled = !next;
     status.textContent = `Page ${cursors.length}`;

@@ -2,7 +2,7 @@
 /** Rows of the list: a study, which can be unfolded, and an experiment, by itself or below its study. */
 
 import { h, refill, setText } from "../../lib/dom.js";
-import { age, evaluationsText, fixed, readableName, titleOf } from "../../lib/format.js";
+import { age, evaluationsText, fixed, fromBefore, readableName, titleOf } from "../../lib/format.js";
 import { progressBar, timeLeft } from "../../lib/progress.js";
 import { worldsText } from "../../lib/robots.js";
 import { stateBadge } from "../../lib/state_badge.js";
@@ -89,8 +89,8 @@ function baseRow(cssClass, name, list, toggle = null) {
 function fitnessParts(fitness, unit) {
   if (!fitness) return "–";
   const by = "name" in fitness ? `${titleOf(fitness)}: ` : "";
-  const title = `${by}mean of ${fitness.n} after ${evaluationsText(fitness.evaluations)}`;
-  return h("span", { title }, fixed(fitness.mean), h("span", { class: "unit" }, ` ${unit}`), h("small", { class: "at" }, ` at ${fitness.evaluations}`));
+  const title = `${by}mean of ${fitness.n} after ${evaluationsText(fitness)}`;
+  return h("span", { title }, fixed(fitness.mean), h("span", { class: "unit" }, ` ${unit}`), h("small", { class: "at" }, ` at ${fitness.evaluations}${fromBefore(fitness.known)}`));
 }
 
 /**

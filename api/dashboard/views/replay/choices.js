@@ -12,7 +12,7 @@ import { h } from "../../lib/dom.js";
  */
 export function choices({ direct, level, spec }, choice, load) {
   const iterations = level ? [0] : Array.from({ length: spec.iterations + 1 }, (_, number) => number);
-  const kinds = [["transfer", "transferred controller"], ...(level ? [] : [["sample", "real-world sample"]])];
+  const kinds = [["transfer", "transferred controller"], ...(iterations.length < 2 ? [] : [["sample", "real-world sample"]])];
   const kind = select("Controller", kinds, choice.kind);
   const repetition = h("input", { type: "number", min: 0, max: spec.repetitions - 1, step: 1, value: choice.repetition, class: "short", "aria-label": "Repetition" });
   const iteration = h("select", { "aria-label": "Iteration" });

@@ -9,7 +9,7 @@ import { factItems, remarkBlocks } from "../../lib/head_parts.js";
 import { keepingButtons } from "../../lib/keeping.js";
 import { notesBlock } from "../../lib/markdown.js";
 import { newFromThis } from "../../lib/new_from_this.js";
-import { iterationsDone, progressBar, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
+import { progressBar, timeLeftFact, workFacts } from "../../lib/progress.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { tagList } from "../../lib/tags.js";
 import { actions } from "./actions.js";
@@ -66,9 +66,7 @@ function factsOf({ study, unit }) {
   const ended = experiments.filter(({ ended_at: endedAt }) => endedAt).length;
   return [
     ["Experiments", `${count(ended)} of ${count(experiments.length)} ended`],
-    ["Repetitions", repetitionsDone(progress)],
-    ...(progress.counted_iterations ? [/** @type {Fact} */ (["Iterations", iterationsDone(progress)])] : []),
-    ["Rollouts", rolloutsDone(progress)],
+    ...workFacts(progress),
     ...bestFact(study, unit(experiments[0])),
     ...times(study),
   ];
@@ -83,7 +81,7 @@ function factsOf({ study, unit }) {
  */
 function bestFact({ best }, unit) {
   if (!best) return [];
-  return [["Best fitness", `${fixed(best.mean)} ${unit} by ${titleOf(best)}, after ${evaluationsText(best.evaluations)} (mean of ${best.n})`]];
+  return [["Best fitness", `${fixed(best.mean)} ${unit} by ${titleOf(best)}, after ${evaluationsText(best)} (mean of ${best.n})`]];
 }
 
 /**

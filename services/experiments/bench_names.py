@@ -1,0 +1,39 @@
+"""Names of benches that are nearly those of others: a slip of the keyboard would make one robot two."""
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.errors import CostUnconfirmed, Violation
+from gaplab.services.core.robot_library import label_of
+from gaplab.services.experiments.limits import Admission
+from gaplab.services.store.queries.benches import key_of, spellings
+from gaplab.services.store.session import Session
+
+CLOSE = 0.8
+"""Similarity of two names, from 0 to 1, from which one may be the other; names with other digits are others."""
+
+
+def check_benches(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission) -> None:
+    """Refuse a bench that is new and nearly has the name of another, unless the request confirms it.
+
+    Raises:
+        CostUnconfirmed: the message has both names.
+    """
+    named = {each.reality.bench: None for each in specs if each.reality.bench not in (None, label_of(each.robot))}
+    if not named or admitted.limits is None or admitted.cost_known:
+        return
+    known = {key_of(each): each for each in spellings(session)}
+    for bench in named:
+        key = key_of(bench)
+        alike = [each for each in known if _digits(each) == _digits(key)]
+        if key not in known and (close := get_close_matches(key, alike, n=1, cutoff=CLOSE)):
+            message = (
+                f"the bench {bench!r} is new, and {known[close[0]]!r} is known; if they are two robots, confirm it"
+            )
+            how = "confirm_cost=true, --yes, or yes=True in Python"
+            raise CostUnconfirmed([Violation("confirm_cost", False, f"{message}: {how}", "true")])
+
+
+def _digits(name: str) -> list[str]:
+    return [each for each in name if each.isdigit()]
