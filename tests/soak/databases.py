@@ -72,7 +72,7 @@ class Sqlite:
     name = "SQLite"
 
     def __init__(self, folder: Path) -> None:
-        self.disk = SmallDisk(Path(folder) / "disk", 64)
+        self.disk = SmallDisk(Path(folder) / "disk", 256)
         self._file = self.disk.folder / "gaplab.db"
         self._backup = Path(folder) / "backup.db"
         self.url = self.url_of_service = f"sqlite:///{self._file}"
@@ -120,7 +120,7 @@ class Postgres:
 
     def __init__(self, folder: Path) -> None:
         folder = Path(folder)
-        self.disk = SmallDisk(folder / "disk", 256)
+        self.disk = SmallDisk(folder / "disk", 512)
         installation, data = Installation(folder), self.disk.folder / "data"
         installation.initialise(data)
         self.url, self._data, self._backup = url(data), data, folder / "backup"
