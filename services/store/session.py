@@ -165,7 +165,7 @@ class Store:
 
 @contextmanager
 def private_store(file: Path) -> Iterator[Store]:
-    """Open a new SQLite database in a file that the caller deletes, with the present tables, for a private computation."""
+    """Open a new SQLite database in a file that the caller deletes, with the present tables, to compute privately."""
     create(file)
     file.write_bytes(_without_rows())
     with Store(url_of(file)) as store:

@@ -321,8 +321,7 @@ def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store: Store, monkey
     assert read.warnings[0].endswith("ZeroDivisionError: the check is broken")
 
 
-@ray.remote(num_cpus=0, max_retries=0)
-def killed_once(spec: Any, mark: Any) -> Any:
+def killed_once(mark: str, spec: Any) -> Any:
     if not os.path.exists(mark):
         Path(mark).touch()
         os.kill(os.getpid(), signal.SIGKILL)
@@ -333,7 +332,9 @@ def killed_once(spec: Any, mark: Any) -> Any:
 def test_a_sensitivity_check_whose_worker_is_killed_runs_again(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(checking.check, "remote", lambda spec, _: killed_once.remote(spec, str(tmp_path / "killed")))
+    mark = str(tmp_path / "killed")
+    killed = ray.remote(num_cpus=0, max_retries=0)(lambda spec, _: killed_once(mark, spec))
+    monkeypatch.setattr(checking, "check", killed)
     check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
 
     found = checked(sqlite_store, check_id, Supervisor(sqlite_store, lambda: 2))
