@@ -333,7 +333,7 @@ def test_a_sensitivity_check_whose_worker_is_killed_runs_again(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     mark = str(tmp_path / "killed")
-    killed = ray.remote(num_cpus=0, max_retries=0)(lambda spec, _: killed_once(mark, spec))
+    killed: Any = ray.remote(num_cpus=0, max_retries=0)(lambda spec, _: killed_once(mark, spec))
     monkeypatch.setattr(checking, "check", killed)
     check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
 
