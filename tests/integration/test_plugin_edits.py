@@ -47,6 +47,26 @@ if os.environ.get("CHANGES_GAPLAB"):
     true_fitness = ToyFunction.fitness
     ToyFunction.fitness = lambda self, seen: 2 * true_fitness(self, seen)
 """
+GAIT = """
+from gaplab.services.core.controllers.square_pulses import SquarePulses
+
+
+class Gait(SquarePulses):
+    name = "gait"
+"""
+WALKER = """
+from gaplab.plugins import PluginRef
+from gaplab.services.core.robots.quadruped import Quadruped
+
+
+class Walker(Quadruped):
+    name = "walker"
+
+    def __init__(self, options=None):
+        super().__init__(options)
+        self.usual_controller = PluginRef(name="gait")
+        self.perform_as_usual()
+"""
 SLIPPERY = """
 from gaplab.services.core.robots.toy_function import ToyFunction
 
@@ -83,9 +103,9 @@ def begin(store: Store) -> str:
     return id_
 
 
-def expected(strategy: str = "careful") -> Any:
+def expected(strategy: str = "careful", **changes: Any) -> Any:
     """The versions that a process needs for a spec with this strategy, as this process has them now."""
-    return Plugins(versions.versions()).expected(resolve_experiment(toy(strategy=strategy)))
+    return Plugins(versions.versions()).expected(resolve_experiment(toy(strategy=strategy, **changes)))
 
 
 def test_a_new_process_is_refused_for_an_edit_of_a_plug_in_that_the_spec_names_and_does_not_import_it(
@@ -128,7 +148,7 @@ def test_a_process_that_cannot_import_a_named_plug_in_says_why(
 def test_a_process_imports_what_the_spec_needs_alone(put: Any) -> None:
     brave = CAREFUL.replace("careful", "brave")
     home = put(careful=f"from gaplab_plugins import _shared\n{CAREFUL}", brave=brave, _shared="")
-    (home / "_shared.py").write_text(f"print(end='x', file=open({str(home / 'imports')!r}, 'a'))\n")
+    (home / "_shared.py").write_text(f"with open({str(home / 'imports')!r}, 'a') as file:\n    file.write('x')\n")
     put()
     wanted = expected()
     put()
@@ -140,6 +160,18 @@ def test_a_process_imports_what_the_spec_needs_alone(put: Any) -> None:
     assert ("careful" in strategies, "brave" in strategies) == (True, False)
     assert (home / "imports").read_text() == "x"
     assert "gaplab_plugins.brave" not in sys.modules
+
+
+def test_the_usual_controller_of_a_robot_is_needed_too_unless_the_spec_names_another(put: Any) -> None:
+    put(walker=WALKER, gait=GAIT)
+
+    usual, other = (
+        {name for name in expected("random", robot="walker", controller=controller) if name.startswith("plug-in")}
+        for controller in (None, "square_pulses")
+    )
+
+    assert usual == {"plug-in robot walker", "plug-in controller gait"}
+    assert other == {"plug-in robot walker"}
 
 
 def test_each_version_of_the_named_plug_ins_has_processes_of_its_own_and_without_any_all_share_theirs(put: Any) -> None:
@@ -155,6 +187,7 @@ def test_each_version_of_the_named_plug_ins_has_processes_of_its_own_and_without
     assert nodes.process_for(expected("random")) == {}
 
 
+@pytest.mark.release
 def test_a_plug_in_that_changes_gaplab_changes_no_number_of_specs_that_do_not_name_it(
     put: Any, sqlite_store: Store, shared_ray: ExitStack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
