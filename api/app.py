@@ -1,5 +1,6 @@
 """The application: routes, problems, limits and documentation, put together."""
 
+import asyncio
 import os
 from importlib.metadata import version
 
@@ -8,7 +9,7 @@ from fastapi.middleware.gzip import GZipMiddleware
 
 from gaplab.api.http import documentation, problems
 from gaplab.api.http.access import Access
-from gaplab.api.http.dependencies import refuse_malformed, reload_plugins
+from gaplab.api.http.dependencies import WRITERS, refuse_malformed, reload_plugins, take_place
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import SPARE, BodyLimit, RequestLimit, Streams, most_requests
 from gaplab.api.http.metrics import Metrics, RequestCounter
@@ -130,8 +131,8 @@ def create_app(
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.connections = most_requests(limits) + SPARE
     app.state.feed, app.state.notify = EventFeed(store), notify or Notify()
-    app.state.rollout_process = RolloutProcess()
-    app.state.drawing_process = RolloutProcess(line=WaitingLine("videos"))
+    app.state.rollout_process, app.state.drawing_process = RolloutProcess(), RolloutProcess(line=WaitingLine("videos"))
+    app.state.exports, app.state.writers = WaitingLine("exports"), asyncio.Semaphore(WRITERS)
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)
@@ -143,7 +144,7 @@ def create_app(
     problems.install(app)
     for module in MODULES:
         reloading = [] if module in WITHOUT_PLUGINS else [Depends(reload_plugins)]
-        app.include_router(module.router, dependencies=[Depends(refuse_malformed), *reloading])
+        app.include_router(module.router, dependencies=[Depends(refuse_malformed), Depends(take_place), *reloading])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

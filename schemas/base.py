@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
@@ -14,6 +14,12 @@ class Frozen(BaseModel):
     """Immutable data that refuses unknown fields, infinities and nan."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def filled_from(cls, source: object, **others: Any) -> Self:  # noqa: ANN401 - fields of any type
+        """Return the attributes of an object that have the names of fields, and `others` in place of or beside them."""
+        named = [name for name in cls.model_fields if name not in others and hasattr(source, name)]
+        return cls(**{name: getattr(source, name) for name in named} | others)
 
 
 def from_name(value: object, field: str) -> object:

@@ -97,10 +97,7 @@ def revoke_token(session: Session, token_id: str) -> TokenRead:
 def authenticate(store: Store, shown: str | None, *, required: bool) -> Caller:
     """Return the caller of a request with this token, or without a token.
 
-    Args:
-        store: has the tokens.
-        shown: the token; None for none.
-        required: whether a token is required even if none was ever created.
+    Without one, it is refused if one is `required`, or if any was ever created.
 
     Raises:
         Unauthenticated: a token is required, and is missing, unknown or revoked.

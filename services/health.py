@@ -5,7 +5,7 @@ from sqlalchemy import select
 from gaplab.schemas.lifecycle import State
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import totals
-from gaplab.services.store.session import Session, snapshot
+from gaplab.services.store.session import Session, Store, snapshot
 
 RECENTLY_S = 600.0
 """Age of a heartbeat up to which the end of its supervisor is news."""
@@ -14,14 +14,24 @@ AGAIN_AND_AGAIN = 3
 """Supervisors that died recently, from which on something is wrong with them."""
 
 
-@snapshot
-def warnings(session: Session, silent_s: float) -> tuple[str, ...]:
-    """Return sentences about supervisors that are missing, silent, or die again and again; none if all is well.
+def warnings(store: Store, silent_s: float) -> tuple[str, ...]:
+    """Return sentences about what fails although the database can be read; none if all is well.
 
     Args:
-        session: of any transaction.
+        store: the database.
         silent_s: seconds without a heartbeat after which a supervisor counts as lost.
+
+    Raises:
+        StoreUnavailable: it cannot be read, or has another schema.
     """
+    store.check()
+    unwritten = (f"nothing has been written since this failed: {store.unwritten}",) if store.unwritten else ()
+    return unwritten + _of_supervisors(store, silent_s)
+
+
+@snapshot
+def _of_supervisors(session: Session, silent_s: float) -> tuple[str, ...]:
+    """Return sentences about supervisors that are missing, silent, or die again and again."""
     ages = totals.ages(session)
     found = []
     if ages and min(ages) > silent_s:

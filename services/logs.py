@@ -71,11 +71,7 @@ def without_secrets(text: str) -> str:
 
 
 class Repeats(logging.Filter):
-    """Drops repeated records of the libraries that serve requests: clients could fill the disk with them.
-
-    Args:
-        clock: returns seconds.
-    """
+    """Drops repeated records of the libraries that serve requests: clients could fill the disk with them."""
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
         super().__init__()

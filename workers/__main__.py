@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, MutableMapping
+from math import inf
 from secrets import token_hex
 
 from gaplab.services import logs
@@ -33,7 +34,7 @@ that died within half a minute instead of a whole one.
 
 
 def serve(settings: Settings) -> int:
-    """Work until SIGTERM or SIGINT; return 1 without a cluster or a usable database, or if the latter was changed."""
+    """Work until a signal; return 1 without a cluster or a usable database, or if the latter was changed."""
     choose_authentication(settings)
     pulse = PulsePipe.inherited()
     logs.adopt("ray")
@@ -70,8 +71,11 @@ def _work(store: Store, settings: Settings, pulse: PulsePipe) -> None:
     with cluster(settings) as joined:
         for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
             signal.signal(signum, lambda *_: stop.set())
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as `nohup` sets it
+            signal.signal(signal.SIGHUP, lambda *_: stop.set())
         logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
-        patience = Patience(settings.rollout_limit_s, settings.step_limit_s)
+        start_s = inf if settings.ray_address else Patience.start_s
+        patience = Patience(settings.rollout_limit_s, settings.step_limit_s, start_s)
         supervisor = Supervisor(store, joined.capacity, joined.versions, lease_s=settings.lease_s, patience=patience)
         supervisor.serve(stop, pulse)
 

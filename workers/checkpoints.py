@@ -49,11 +49,7 @@ def recorded(
 ) -> Iterator[Delivered | Pulse]:
     """Yield the steps that follow the log, checkpoints of long steps as soon as they exist, and signs of life.
 
-    Args:
-        setting: setting of the repetition.
-        log: its steps so far.
-        checkpoints: checkpoints of the next step.
-        every_s: seconds between checkpoints of a step.
+    The given checkpoints are those of the next step; further ones are `every_s` seconds apart.
     """
     items: SimpleQueue[Delivered | Pulse | None] = SimpleQueue()
     unwanted = Event()
@@ -76,13 +72,9 @@ def recorded(
 
 
 class StepRecorder:
-    """Records the answers of the step under way, and emits a checkpoint of them from time to time.
+    """Records the answers of the step under way, and emits a checkpoint of them every few seconds.
 
-    Args:
-        emit: takes steps and checkpoints.
-        every_s: seconds between checkpoints.
-        log: the steps before the running step.
-        checkpoints: its checkpoints from before an interruption.
+    The log ends before the running step; its checkpoints are from before an interruption.
     """
 
     def __init__(self, emit: Emit, every_s: float, log: Sequence[Step], checkpoints: Sequence[Checkpoint] = ()) -> None:

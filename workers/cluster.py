@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 
 import ray
 from ray._private import parameter, ray_constants
@@ -105,7 +106,8 @@ def _start(cores: int | None, folder: Path) -> None:
         msg = "RAY_AUTH_MODE is 'disabled': anyone who reaches a Ray without a token can run any code; unset it"
         raise ClusterUnusable(msg)
     limit_files()
-    with _on_loopback(), _without_monitors():
+    without_monitors = partial(parameter.RayParams, no_monitor=True, include_log_monitor="")
+    with _replaced(ray_constants, ENABLE_RAY_CLUSTER=False), _replaced(parameter, RayParams=without_monitors):
         try:
             ray.init(
                 address="local",  # not another Ray on this machine
@@ -122,33 +124,21 @@ def _start(cores: int | None, folder: Path) -> None:
 
 
 @contextmanager
-def _on_loopback() -> Iterator[None]:
-    """Let a Ray that starts within the context listen on loopback, as it does by itself on a Mac.
+def _replaced(module: ModuleType, **values: object) -> Iterator[None]:
+    """Give variables of a module of Ray other values within the context, where Ray has no setting for them.
 
     On Linux, Ray replaces 127.0.0.1 by an address that other machines reach, and listens there. The only setting
-    against that is RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER, which Ray reads into this constant when it is imported.
+    against that is RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER, which Ray reads into ENABLE_RAY_CLUSTER when it is imported.
+
+    The monitors of its autoscaler and of its logs have nothing to do here: no node is added, and no log is shown.
+    `ray start` has options for both; `ray.init` passes none on to the class RayParams.
     """
-    before = ray_constants.ENABLE_RAY_CLUSTER
-    ray_constants.ENABLE_RAY_CLUSTER = False
+    before = {name: getattr(module, name) for name in values}
+    vars(module).update(values)
     try:
         yield
     finally:
-        ray_constants.ENABLE_RAY_CLUSTER = before
-
-
-@contextmanager
-def _without_monitors() -> Iterator[None]:
-    """Let a Ray that starts within the context start neither the monitor of its autoscaler nor that of its logs.
-
-    They have nothing to do here: no node is added, and no log is shown. `ray start` has options for both; `ray.init`
-    passes none on, so this replaces the class of its parameters.
-    """
-    before = parameter.RayParams
-    parameter.RayParams = partial(before, no_monitor=True, include_log_monitor="")  # type: ignore[misc,assignment]
-    try:
-        yield
-    finally:
-        parameter.RayParams = before  # type: ignore[misc]
+        vars(module).update(before)
 
 
 def _join(address: str) -> None:

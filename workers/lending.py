@@ -27,15 +27,11 @@ SHARE = 0.8
 def sizes(rows: int, cores: int, least: int) -> list[int]:
     """Return the number of rows of each part: large parts at both ends, where work begins, small ones in the middle.
 
-    Each core first gets most of its fair share, then most of its share of the rest, and so on. Equal cores end together
-    after few parts; of unequal cores, the faster one simulates more of the small parts.
+    Each core, this one too, first gets most of its fair share, then most of its share of the rest, and so on. Equal
+    cores end together after few parts; of unequal cores, the faster one simulates more of the small parts. Only the
+    last part has fewer rows than `least`.
 
     Source: "factoring", Hummel, Schonberg and Flynn 1992.
-
-    Args:
-        rows: number of all rows.
-        cores: number of cores, including this one.
-        least: rows of a part at least, except for the last part.
     """
     ours: list[int] = []
     theirs: list[int] = []

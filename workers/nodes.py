@@ -43,12 +43,9 @@ log = logging.getLogger("gaplab.supervisor")
 
 
 def with_plugins(shared: Versions, under: Provenance, spec: Mapping[str, Any]) -> Versions:
-    """Return what a process must have to work on a spec: the shared versions, those of its plug-ins, and robot files.
+    """Return what a process must have for work on a spec that was claimed under a provenance.
 
-    Args:
-        shared: versions of gaplab and its libraries.
-        under: the provenance under which the work was claimed.
-        spec: of the experiment, or of the sensitivity check.
+    These are the shared versions of gaplab and its libraries, those of its plug-ins, and robot files.
     """
     files = robot_library.needed_by(PluginRef.model_validate(spec["robot"]))
     return (

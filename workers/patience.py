@@ -15,10 +15,12 @@ class Patience:
     Attributes:
         rollout_s: most seconds of a rollout.
         step_s: most seconds of a step.
+        start_s: most seconds until one of the workers begins; infinite where others may have the cores.
     """
 
     rollout_s: float = 60.0
     step_s: float = 604_800.0
+    start_s: float = 120.0
 
     @property
     def idle_s(self) -> float:

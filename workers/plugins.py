@@ -35,11 +35,8 @@ class _Refusal:
 class Plugins:
     """The external plug-ins of a supervisor, as their files are now, and the versions of them that processes refused.
 
-    Experiments that name a refused version wait. A later try may find another process, or the file repaired.
-
-    Args:
-        shared: versions of gaplab and its libraries that a process must have.
-        clock: seconds.
+    Experiments that name a refused version wait. A later try may find another process, or the file repaired. `shared`
+    are the versions of gaplab and its libraries that a process must have.
     """
 
     def __init__(self, shared: Versions | None = None, clock: Callable[[], float] = monotonic) -> None:

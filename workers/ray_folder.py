@@ -17,8 +17,8 @@ except ImportError:  # not on Windows
 
 PREFIX = "gaplab-ray-"
 
-LONGEST_PARENT = 24
-"""Characters of the parent's path: the path of a socket has at most 107, and Ray and the folder's name take 83.
+LONGEST_PARENT = 22
+"""Characters of the parent's path: the path of a socket has at most 107, and Ray and the folders' names take 85.
 
 Source: man 7 unix.
 """
@@ -29,13 +29,11 @@ STARTING_S = 60.0
 
 @contextmanager
 def ray_folder(wanted: Path | None = None) -> Iterator[Path]:
-    """Make a folder that only this user can enter, and remove it when the context ends.
+    """Yield a place for Ray in a new folder that only this user can enter, and remove both when the context ends.
 
-    Ray's own default is one that all users of the machine share, where others could connect to its sockets. Folders of
-    processes that were killed are removed at the next start.
-
-    Args:
-        wanted: where to make it; left out: RAY_TMPDIR, or the folder for temporary files.
+    It is in the `wanted` one; left out: in RAY_TMPDIR, or the folder for temporary files. Ray lets all users of the
+    machine write into the place itself, and so connect to its sockets. Folders of processes that were killed are
+    removed at the next start.
 
     Raises:
         ClusterUnusable: this user cannot make one there.
@@ -52,7 +50,7 @@ def ray_folder(wanted: Path | None = None) -> Iterator[Path]:
         raise ClusterUnusable(msg) from error
     held = _hold(folder)
     try:
-        yield folder
+        yield folder / "r"
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         if held is not None:

@@ -38,13 +38,7 @@ log = logging.getLogger("gaplab.supervisor")
 class Repetitions:
     """The claimed repetitions of one supervisor. All methods raise StoreUnavailable; no delivery is lost then.
 
-    Args:
-        store: the database.
-        owner: the supervisor's name in it.
-        versions: versions that a node must have to run them.
-        checkpoint_s: seconds between the checkpoints of a step.
-        patience: how long work may take.
-        lease_s: seconds without a heartbeat after which others may take the claims.
+    Nodes must have the versions to run them. After `lease_s` without a heartbeat, others may take the claims.
     """
 
     def __init__(

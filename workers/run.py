@@ -1,5 +1,6 @@
 """A claimed repetition in Ray: its task and its deliveries."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from time import monotonic
 
@@ -13,6 +14,14 @@ from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, Reques
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import Handle
 from gaplab.workers.task import Batch, told
+
+
+def stuck(runs: Collection["Run"], longest_s: float) -> str:
+    """Return a sentence if no worker has begun any of these runs, and one has waited for so long; else nothing."""
+    waits_s = [monotonic() - run.heard_at for run in runs if not run.begun]
+    if len(waits_s) < len(runs) or max(waits_s, default=0.0) <= longest_s:
+        return ""
+    return f"no worker has begun for {max(waits_s):.0f} s; the logs of Ray say why"
 
 
 @dataclass(eq=False)

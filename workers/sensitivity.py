@@ -51,16 +51,9 @@ def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...] | Fai
 
 
 class Checks:
-    """The sensitivity checks of one supervisor.
+    """The sensitivity checks of one supervisor. All methods raise StoreUnavailable; no result is lost then.
 
-    Args:
-        store: the database.
-        owner: the supervisor's name in it.
-        lease_s: seconds without a heartbeat after which the holder of a check loses it.
-        versions: versions that a node must have to run them.
-        patience: how long work may take.
-
-    All methods raise StoreUnavailable; no result is lost then.
+    Nodes must have the versions to run them. After `lease_s` without a heartbeat, others may take a check.
     """
 
     def __init__(

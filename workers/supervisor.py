@@ -24,6 +24,7 @@ from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
 from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
+from gaplab.workers.run import stuck
 from gaplab.workers.sensitivity import Checks
 from gaplab.workers.stop import Stop
 
@@ -42,13 +43,8 @@ log = logging.getLogger("gaplab.supervisor")
 class Supervisor:
     """Runs the queued work of a store.
 
-    Args:
-        store: the database.
-        capacity: returns the number of repetitions to submit to Ray at once; called before each claim.
-        versions: versions that a node must have to run them.
-        checkpoint_s: seconds between the checkpoints of a long step.
-        lease_s: seconds without a heartbeat after which a supervisor loses its work; the same for all supervisors.
-        patience: how long work may take; default: that of the default settings.
+    Before each claim, `capacity` returns the number of repetitions to submit to Ray at once. Nodes must have the
+    versions to run them. All supervisors have the same `lease_s`: without a heartbeat for so long, one loses its work.
     """
 
     def __init__(
@@ -67,7 +63,7 @@ class Supervisor:
         self._repetitions = Repetitions(store, self._owner, versions or {}, checkpoint_s, patience, lease_s)
         self._checks = Checks(store, self._owner, lease_s, versions, patience)
         self._takes = Silences[str]()
-        self._lease_s = lease_s
+        self._lease_s, self._start_s = lease_s, (patience or Patience()).start_s
         self._beat = -lease_s
         self._noted: datetime | None = None
         self._pulse = PulsePipe()
@@ -78,11 +74,9 @@ class Supervisor:
         return bool(self._repetitions.runs)
 
     def serve(self, stop: Stop | Event, pulse: PulsePipe | None = None) -> None:
-        """Work until told to stop; then hand back unfinished repetitions, each after one more delivery.
+        """Work until `stop` is set; then hand back unfinished repetitions, each after one more delivery.
 
-        Args:
-            stop: is set to end the work.
-            pulse: to the process that keeps this one; None if no process does.
+        The pulse goes to the process that keeps this one; None if no process does.
 
         Raises:
             ClusterUnusable: a node would compute other numbers, or Ray died; this ends the work as well.
@@ -98,6 +92,7 @@ class Supervisor:
                 except StoreChanged:
                     raise
                 except StoreUnavailable as error:
+                    self._pulse.trouble = str(error)
                     log.warning("waiting: %s", error)
                     self._takes.forget()
                     stop.wait(RETRY_S)
@@ -139,6 +134,7 @@ class Supervisor:
         self._repetitions.receive()
         self._repetitions.store_received()
         self._repetitions.end()
+        self._pulse.trouble = stuck(self._repetitions.runs, self._start_s)
 
     def _heartbeat(self) -> None:
         if monotonic() - self._beat < self._lease_s / HEARTBEATS:

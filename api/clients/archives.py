@@ -45,8 +45,9 @@ class Archives:
 
 @contextmanager
 def _new(path: Path) -> Iterator[IO[bytes]]:
-    """Open a new file to write into; remove it if that fails."""
-    with path.open("xb") as file:
+    """Open a new file to write into, which its owner alone may read; remove it if that fails."""
+    path.touch(0o600, exist_ok=False)
+    with path.open("wb") as file:
         try:
             yield file
         except BaseException:

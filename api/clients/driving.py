@@ -212,8 +212,8 @@ class Driving:
             except ServiceUnreachable as error:
                 log.warning("not sent yet: %s", error)
             except ServiceError as error:
-                status = error.problem.status
-                if status < 500 and status != 429:
+                if is_final(error):
+                    status = error.problem.status
                     if is_of_gaplab(error) and status in {INVALID, ENDED}:
                         self.journal.sent(key, refused=status == INVALID)
                     raise

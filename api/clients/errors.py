@@ -66,7 +66,7 @@ class ExtraMissing(ImportError):
 def is_final(error: Exception) -> bool:
     """Return whether a repeated request would fail the same way."""
     if isinstance(error, ServiceError):
-        return error.problem.status < 500
+        return error.problem.status < 500 and error.problem.status != HTTPStatus.TOO_MANY_REQUESTS
     return isinstance(error, UnknownService)
 
 

@@ -22,7 +22,7 @@ class Journal:
     that is none of these, as a power cut leaves, is logged once, and copied to a file beside, `*.unreadable`.
 
     Args:
-        file: created if it does not exist; None: no file.
+        file: created, for its owner alone, if it does not exist; None: no file.
     """
 
     def __init__(self, file: str | Path | None = None) -> None:
@@ -32,6 +32,7 @@ class Journal:
             path = Path(file)
             content = path.read_bytes() if path.exists() else b""
             self._lines = list(_lines(content, path.with_name(f"{path.name}.unreadable")))
+            path.touch(0o600)
             self._file = path.open("ab")
             if content and not content.endswith(b"\n"):
                 self._file.write(b"\n")

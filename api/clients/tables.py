@@ -47,8 +47,8 @@ class Tables:
         """Return the real-world evaluations of an experiment, with a column for each gene.
 
         `repeats` is the number of values whose mean is the fitness, 0 if the measurement failed. `standard_error` is
-        nan without repeats. Without evaluations there are no columns of genes. Permitted for `kind`: "sample", of which
-        strategies learn, and "probe", which is only recorded; left out: both.
+        nan without repeats. Without evaluations there are no columns of genes. With a `repetition` or a `kind`,
+        "sample" (learned from) or "probe" (only recorded), the table has only those.
         """
         samples = self._samples(id, repetition, kind)
         columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at", "standard_error")
@@ -87,7 +87,8 @@ class Tables:
         `squared_error` is a sum over samples and grows with them; `error` is per sample, in the unit of the
         discrepancy; by default the root mean square. A tuner that gives 95 % intervals has the columns `NAME_lower` and
         `NAME_upper` of each tunable, and one that gives shares of the posterior probability the column `weight`.
-        Without simulators there are no columns of tunables. Iteration 0 is the untuned start.
+        Without simulators there are no columns of tunables. With a `repetition` or an `iteration`, 0 for the untuned
+        start, the table has only those.
         """
         path = f"/experiments/{segment(id)}/simulators"
         filters = {"limit": PAGE, "repetition": repetition, "iteration": iteration}

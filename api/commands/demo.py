@@ -26,6 +26,7 @@ from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.process.local_service import start_service
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
+from gaplab.services.store.sqlite_file import url_of
 
 SPECS = Path(__file__).parents[4] / "examples"
 STUDIES = ("toy", "quadruped")
@@ -43,7 +44,7 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     started_at = time.monotonic()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the demo in order, like Ctrl-C
-    database, log = f"sqlite:///{folder / 'gaplab.db'}", folder / "service.log"
+    database, log = url_of(folder / "gaplab.db"), folder / "service.log"
     try:
         with start_service(database, log) as client:
             _print(f"Service: {client.url}, database {database}, log {log}", console)

@@ -1,7 +1,9 @@
 """Dependencies of endpoints: the store, the caller, valid ids, and query parameters that several endpoints share."""
 
+import asyncio
 import logging
 import re
+from collections.abc import AsyncIterator
 from contextlib import suppress
 from dataclasses import replace
 from typing import Annotated, Any, TypeVar
@@ -10,11 +12,14 @@ from fastapi import Depends, Header, Request, Response
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.datastructures import URLPath
 
+from gaplab.api.http.access import ASKING, READING
+from gaplab.api.http.event_feed import EventFeed
+from gaplab.api.http.limits import Streams
 from gaplab.api.http.violations import wrong_parameters
 from gaplab.schemas.access import Role
 from gaplab.schemas.base import Frozen
 from gaplab.services.access import Caller, demand
-from gaplab.services.core.errors import InvalidSpec, NotFound
+from gaplab.services.core.errors import InvalidSpec, NotFound, StoreUnavailable
 from gaplab.services.core.nesting import refuse_too_deep
 from gaplab.services.experiments.idempotency import Once
 from gaplab.services.experiments.limits import Admission
@@ -24,6 +29,12 @@ from gaplab.services.settings import Limits
 from gaplab.services.store.session import Store
 
 R = TypeVar("R", bound=Frozen)
+
+WRITERS = 12
+"""Requests that may write at once: with three waiting lines, they leave a thread of the service free."""
+
+PATIENCE_S = 20.0
+"""Longest wait of a request that may write for its place."""
 
 logger = logging.getLogger(__name__)
 
@@ -81,6 +92,8 @@ CallerDep = Annotated[Caller, Depends(_caller)]
 LimitsDep = Annotated[Limits, of_app("limits")]
 RolloutProcessDep = Annotated[RolloutProcess, of_app("rollout_process")]
 DrawingProcessDep = Annotated[RolloutProcess, of_app("drawing_process")]
+FeedDep = Annotated[EventFeed, of_app("feed")]
+StreamsDep = Annotated[Streams, of_app("streams")]
 LimitedDep = Annotated[Admission, Depends(_limited)]
 AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
@@ -97,6 +110,27 @@ async def refuse_malformed(request: Request) -> None:
     if request.scope["route"].body_field is not None:
         with suppress(ValueError, RecursionError):  # it is refused as not being JSON
             refuse_too_deep(await request.json())
+
+
+async def take_place(request: Request) -> AsyncIterator[None]:
+    """Let a few requests that may write in at once; others wait without a thread, and not for ever.
+
+    Raises:
+        StoreUnavailable: no place became free in time.
+    """
+    places = request.app.state.writers
+    if request.method in READING or request.scope["path"] in ASKING:
+        yield
+        return
+    try:
+        async with asyncio.timeout(PATIENCE_S):
+            await places.acquire()
+    except TimeoutError as error:
+        raise StoreUnavailable(f"other requests have been writing for {PATIENCE_S:g} s; try again soon") from error
+    try:
+        yield
+    finally:
+        places.release()
 
 
 def reload_plugins() -> None:

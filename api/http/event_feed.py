@@ -4,7 +4,7 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import AsyncIterator, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from anyio.to_thread import run_sync
 
@@ -68,6 +68,14 @@ class EventFeed:
                 for event in recent:
                     if which.has(event):
                         yield event
+
+    async def news(self, after: int, which: WantedEvents, wait_s: float) -> bool:
+        """Wait for a selected event after that number, and return whether there is one in time."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(wait_s):
+                async for _ in self.follow(after, which):
+                    return True
+        return False
 
     def close(self) -> None:
         """End all streams, and refuse later ones."""

@@ -3,11 +3,15 @@
 import resource
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from io import SEEK_END
+from tempfile import SpooledTemporaryFile
 from threading import Lock
+from typing import IO
 
 from starlette.datastructures import Headers
-from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from gaplab.api.http.problems import FRAMEWORK, problem, response
@@ -27,25 +31,52 @@ MOST_BYTES_OF = {"/import": MOST_BYTES_OF_IMPORT, "/attachments": 20_000_000, "/
 """Limits of the addresses that take more than a spec."""
 
 
-class BodyLimit:
-    """Middleware that refuses a body over the limit with 413, by its announced length and by what arrives."""
+SMALL = 2**16
+"""Bytes of a body for which there is always room, in memory; a larger one is kept on the disk."""
 
-    def __init__(self, app: ASGIApp, most_bytes: int) -> None:
+MOST_BYTES_AT_ONCE = MOST_BYTES_OF_IMPORT
+"""Bytes of all bodies of a process together that have arrived, and whose requests have not ended."""
+
+
+class BodyLimit:
+    """Middleware that takes in a whole body, as `request.state.body`, before anything else is done for the request.
+
+    A body over the limit is refused with 413, by its announced length and by what arrives, and one for which there is
+    no room beside the others with 503.
+    """
+
+    def __init__(self, app: ASGIApp, most_bytes: int, most_at_once: int = MOST_BYTES_AT_ONCE) -> None:
         self.app = app
-        self._most = most_bytes
+        self._most, self._most_at_once, self._at_once = most_bytes, most_at_once, 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request within the limit."""
+        """Serve one request within the limits, unless its client leaves before its end."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
+        with SpooledTemporaryFile(SMALL) as body, suppress(ClientDisconnect):
+            try:
+                answer = await self._refusal(scope, receive, body) or self.app
+                scope.setdefault("state", {})["body"] = body
+                await answer(scope, _again(body, receive), send)
+            finally:
+                self._at_once -= body.seek(0, SEEK_END)
+
+    async def _refusal(self, scope: Scope, receive: Receive, body: IO[bytes]) -> Response | None:
+        """Take in the body, and return the answer to one that is refused."""
         most, detail = self._limit_of(scope["path"])
+        too_large = response(problem(*FRAMEWORK[413], detail), {"Connection": "close"})
         announced = Headers(scope=scope).get("content-length", "")
         if announced.isdecimal() and int(announced[:20]) > most:
-            refusal = response(problem(*FRAMEWORK[413], detail), {"Connection": "close"})
-            await refusal(scope, receive, send)
-            return
-        await self.app(scope, _counted(receive, most, detail), send)
+            return too_large
+        async for part in Request(scope, receive).stream():
+            self._at_once += body.write(part)
+            if body.tell() > most:
+                return too_large
+            if body.tell() > SMALL and self._at_once > self._most_at_once:
+                return busy("the bodies of other requests have taken all room")
+        body.seek(0)
+        return None
 
     def _limit_of(self, path: str) -> tuple[int, str]:
         """Return the limit in bytes, and the detail of its problem."""
@@ -55,18 +86,19 @@ class BodyLimit:
         return self._most, f"The body has more than {self._most:,} bytes ({variable}); a spec has a few hundred."
 
 
-def _counted(receive: Receive, most: int, detail: str) -> Receive:
-    arrived = 0
+def _again(body: IO[bytes], receive: Receive) -> Receive:
+    """Return a receiver of a body that has arrived, and then of what follows it."""
+    unread = [body]
 
-    async def count() -> Message:
-        nonlocal arrived
-        message = await receive()
-        arrived += len(message.get("body", b""))
-        if arrived > most:
-            raise HTTPException(413, detail)
-        return message
+    async def part() -> Message:
+        return {"type": "http.request", "body": unread.pop().read()} if unread else await receive()
 
-    return count
+    return part
+
+
+def busy(detail: str) -> Response:
+    """Return the answer to a request for which there is no room now."""
+    return response(problem(503, "busy", "The service is busy", detail), {"Retry-After": "5"})
 
 
 def most_requests(limits: Limits, files: int | None = None) -> int:
@@ -95,8 +127,7 @@ class RequestLimit:
             return
         if self._open >= self._most:
             detail = f"{self._open} requests are being served; at most {self._most} may be ({variable_of('requests')})"
-            refusal = response(problem(503, "busy", "The service is busy", detail), {"Retry-After": "5"})
-            await refusal(scope, receive, send)
+            await busy(detail)(scope, receive, send)
             return
         self._open += 1
         try:

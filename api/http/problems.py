@@ -13,7 +13,6 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, Response
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
 
 from gaplab.api.http.security_headers import page
 from gaplab.api.http.violations import MOST_ERRORS, explain, finite, without_consequences
@@ -90,7 +89,6 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(GaplabError, of_gaplab)
     app.add_exception_handler(RequestValidationError, _of_validation)
     app.add_exception_handler(HTTPException, _of_framework)
-    app.add_exception_handler(ClientDisconnect, _of_absent_client)
     app.add_exception_handler(Exception, _of_bug)
 
 
@@ -189,11 +187,6 @@ def _of_framework(request: Request, error: Exception) -> Response:
     template = DETAILS.get(error.status_code, str(error.detail).replace("{", "{{").replace("}", "}}"))
     detail = template.format(path=finite(request.url.path), method=request.method)
     return _shown(request, problem(*kind, detail), dict(error.headers or {}))
-
-
-def _of_absent_client(request: Request, error: Exception) -> Response:  # noqa: ARG001 - a handler's signature
-    """Return what the client no longer receives; that it left in the middle of its request is no incident."""
-    return response(problem(*FRAMEWORK[400], "The request ended before its body did."))
 
 
 def _of_bug(request: Request, error: Exception) -> Response:

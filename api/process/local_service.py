@@ -13,6 +13,7 @@ from gaplab.services.core.errors import Unauthenticated
 from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.store.atomic_files import private
 from gaplab.services.store.session import Store
+from gaplab.services.store.sqlite_file import url_of
 
 START_WITHIN_S = 120.0
 
@@ -45,7 +46,7 @@ def local_service(folder: str | Path = "results/local", *, plugins: str | Path |
     """
     home = Path(folder).absolute()
     home.mkdir(parents=True, exist_ok=True)
-    return start_service(f"sqlite:///{home / 'gaplab.db'}", home / "service.log", plugins=plugins)
+    return start_service(url_of(home / "gaplab.db"), home / "service.log", plugins=plugins)
 
 
 def start_service(

@@ -160,7 +160,7 @@ def serve_api(
     limits: Limits | None = None,
     notify: Notify | None = None,
 ) -> None:
-    """Serve until SIGINT or SIGTERM, then finish the requests under way.
+    """Serve until SIGINT, SIGTERM or SIGHUP, then finish the requests under way.
 
     Args:
         settings: of the service.
@@ -221,6 +221,8 @@ class Server(uvicorn.Server):
 
 
 def exit_on_signals() -> None:
-    """Turn SIGINT and SIGTERM into SystemExit, so that `finally` blocks close what is open."""
+    """Turn SIGINT and SIGTERM into SystemExit, so that `finally` blocks close what is open; a lost terminal too."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: sys.exit(0))
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as `nohup` sets it
+        signal.signal(signal.SIGHUP, lambda *_: signal.raise_signal(signal.SIGTERM))

@@ -20,7 +20,7 @@ log = logging.getLogger("gaplab.service")
 
 
 def serve(settings: Settings, *, workers: bool = True) -> None:
-    """Serve until SIGINT or SIGTERM, then end in order.
+    """Serve until SIGINT, SIGTERM or SIGHUP, then end in order.
 
     Args:
         settings: settings of the API and the supervisor.

@@ -85,7 +85,7 @@ class SupervisorProcess:
         self._stopping = Event()
         self._short_lives = 0
         self._end: str | None = None
-        self._silence_s = 0.0
+        self._silence_s, self._told = 0.0, ""
         self._thread = Thread(target=self._keep_running, name="supervisor process", daemon=True)
 
     def start(self) -> None:
@@ -108,7 +108,7 @@ class SupervisorProcess:
                 f"the supervisor has not answered for {self._silence_s:.0f} s; if it stays silent, "
                 f"it is killed and started again in {max(left_s, 0):.0f} s"
             )
-        return None
+        return f"the supervisor waits: {self._told}" if self._told else None
 
     @property
     def warning(self) -> str | None:
@@ -149,7 +149,7 @@ class SupervisorProcess:
     def _listen(self, heard: Heard, process: "subprocess.Popen[bytes]", began: float) -> None:
         """Take what the supervisor says, and kill it if it says nothing for too long."""
         silence_s = heard.silence_s()
-        self._silence_s = silence_s if heard.begun else 0.0
+        self._silence_s, self._told = silence_s if heard.begun else 0.0, heard.trouble
         if heard.begun and monotonic() - began > self._long_life_s:
             self._short_lives, self._end = 0, None
         if silence_s > (self._silence.killed_s if heard.begun else self._silence.start_s):
@@ -159,7 +159,7 @@ class SupervisorProcess:
     def _bury(self, process: "subprocess.Popen[bytes]", heard: Heard) -> None:
         """End what the supervisor left, note why it ended, and queue its work again."""
         kill(process)
-        self._silence_s = 0.0
+        self._silence_s, self._told = 0.0, ""
         self._end = f"exit code {process.returncode}" + (f": {heard.reason}" if heard.reason else "")
         if heard.owner and self._store:
             with suppress(StoreUnavailable):  # then its leases will run out

@@ -1,18 +1,18 @@
 """Archives: export an experiment or a study with everything in it, and import it again."""
 
 from collections.abc import Iterator
-from tempfile import TemporaryFile
+from typing import Annotated
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
-from starlette.concurrency import run_in_threadpool
 
-from gaplab.api.http.dependencies import Id, LimitedDep, StoreDep
+from gaplab.api.http.dependencies import Id, LimitedDep, StoreDep, of_app
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.routes.studies import Confirming
 from gaplab.schemas.archives import ImportRead
 from gaplab.services import archives
 from gaplab.services.archives import Archive
+from gaplab.services.waiting_line import WaitingLine
 
 router = APIRouter(tags=["archives"])
 
@@ -20,7 +20,8 @@ MEDIA_TYPE = "application/zip"
 
 _CHUNK = 2**16
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
-_EXPORTED: Responses = {200: {"content": {MEDIA_TYPE: {**_BINARY, "example": "PK…"}}}, **documented(404)}
+_EXPORTED: Responses = {200: {"content": {MEDIA_TYPE: {**_BINARY, "example": "PK…"}}}, **documented(404, 429)}
+LineDep = Annotated[WaitingLine, of_app("exports")]
 _CONTENT = "A zip of JSON Lines and Parquet, one member for each table; `manifest.json` has their SHA-256"
 
 
@@ -31,9 +32,10 @@ _CONTENT = "A zip of JSON Lines and Parquet, one member for each table; `manifes
     response_description=_CONTENT,
     responses=_EXPORTED,
 )
-def export_experiment(id: Id, store: StoreDep) -> Response:
+def export_experiment(id: Id, store: StoreDep, line: LineDep) -> Response:
     """Export all of an experiment as of one moment; reality's parameters are null while they are hidden."""
-    return _sent(archives.export_experiment(store, id))
+    with line.turn():
+        return _sent(archives.export_experiment(store, id))
 
 
 @router.get(
@@ -43,9 +45,10 @@ def export_experiment(id: Id, store: StoreDep) -> Response:
     response_description=_CONTENT,
     responses=_EXPORTED,
 )
-def export_study(id: Id, store: StoreDep) -> Response:
+def export_study(id: Id, store: StoreDep, line: LineDep) -> Response:
     """Export all of a study and its experiments as of one moment."""
-    return _sent(archives.export_study(store, id))
+    with line.turn():
+        return _sent(archives.export_study(store, id))
 
 
 @router.post(
@@ -56,18 +59,14 @@ def export_study(id: Id, store: StoreDep) -> Response:
     responses=documented(409, 413, 422, 429),
     openapi_extra={"requestBody": {"required": True, "content": {MEDIA_TYPE: _BINARY}}},
 )
-async def import_archive(
+def import_archive(
     store: StoreDep, admitted: LimitedDep, query: Confirming, request: Request, response: Response
 ) -> ImportRead:
     """Store all of an exported archive, or nothing.
 
     Experiments that had not ended become CANCELLED; those on a bench obey the limits of a submission, and are PAUSED.
     """
-    with TemporaryFile() as file:
-        async for chunk in request.stream():
-            file.write(chunk)
-        file.seek(0)
-        stored = await run_in_threadpool(archives.import_archive, store, file, query.given(admitted))
+    stored = archives.import_archive(store, request.state.body, query.given(admitted))
     route, id = ("read_study", stored.study) if stored.study else ("read_experiment", stored.experiments[0])
     response.headers["Location"] = str(request.app.url_path_for(route, id=id))
     return stored

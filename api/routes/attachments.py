@@ -2,7 +2,6 @@
 
 from typing import Annotated
 
-from anyio.to_thread import run_sync
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
@@ -32,13 +31,13 @@ class AttachmentQuery(Parameters):
     responses=documented(413, 422, 429),
     openapi_extra={"requestBody": {"required": True, "content": _BINARY}},
 )
-async def store_attachment(
+def store_attachment(
     query: Annotated[AttachmentQuery, Query()], request: Request, store: StoreDep, limits: LimitsDep
 ) -> AttachmentRead:
     """Store a file, sent as the body, under the hash of its content; answers name it by that."""
-    content, media_type = await request.body(), request.headers.get("content-type", "application/octet-stream")
+    content, media_type = request.state.body.read(), request.headers.get("content-type", "application/octet-stream")
     most = limits.unnamed_attachment_bytes
-    return await run_sync(attachments.store_attachment, store, content, query.name, media_type[:100], most)
+    return attachments.store_attachment(store, content, query.name, media_type[:100], most)
 
 
 @router.get("/{id}", summary="Read an attachment", response_class=Response, responses={**_FILE, **documented(404)})

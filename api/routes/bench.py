@@ -3,7 +3,6 @@
 from time import monotonic
 from typing import Annotated, Literal
 
-import anyio
 from anyio.to_thread import run_sync
 from fastapi import APIRouter, Body, Query, Request, Response
 from pydantic import Field
@@ -11,15 +10,19 @@ from pydantic import Field
 from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import (
     AdmissionDep,
+    CallerDep,
+    FeedDep,
     Id,
     Paging,
     Parameters,
     RolloutProcessDep,
     StoreDep,
+    StreamsDep,
     created,
     once_answered,
 )
 from gaplab.api.http.problems import Responses, documented
+from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import (
     AnswerRead,
     DoubtsRead,
@@ -31,10 +34,13 @@ from gaplab.schemas.measurements import (
 )
 from gaplab.schemas.records import Page
 from gaplab.schemas.traces import TracesRead, TracesSpec
+from gaplab.services import events
 from gaplab.services.bench import answering, doubts, motions, taking
 from gaplab.services.bench.taking import RequestFilter
+from gaplab.services.events import WantedEvents
 from gaplab.services.replay import traces
 from gaplab.services.replay.traces import measured_by_traces
+from gaplab.services.store.session import Store
 
 router = APIRouter(prefix="/requests", tags=["bench"])
 
@@ -44,8 +50,10 @@ Release = Annotated[ReleaseSpec, Body(openapi_examples=ReleaseSpec.EXAMPLES)]
 Measurement = Annotated[MeasurementSpec, Body(openapi_examples=MeasurementSpec.EXAMPLES)]
 Traces = Annotated[TracesSpec, Body(openapi_examples=TracesSpec.EXAMPLES)]
 
-LOOK_S = 0.5
-"""Seconds between two looks for a request that somebody waits for."""
+_NEWS = frozenset(EventKind) - frozenset(
+    {EventKind.SELECTED, EventKind.MEASURED, EventKind.TUNED, EventKind.TRANSFERRED, EventKind.PROBED}
+)
+"""What may add a request to a list, or be the end of its experiment: steps are neither."""
 
 _MOTIONS = {"csv": ("text/csv", "csv"), "json": ("application/json", "json"), "ros2": ("application/yaml", "yaml")}
 
@@ -90,16 +98,30 @@ class MotionQuery(Parameters):
     )
 
 
-@router.get("", summary="List the requests for measurements", responses=documented(404, 422))
-async def list_requests(query: Annotated[RequestQuery, Query()], store: StoreDep) -> Page[RequestRead]:
-    """List what experiments wait for, the oldest first."""
+@router.get("", summary="List the requests for measurements", responses=documented(404, 422, 429))
+async def list_requests(
+    query: Annotated[RequestQuery, Query()], store: StoreDep, feed: FeedDep, streams: StreamsDep, caller: CallerDep
+) -> Page[RequestRead]:
+    """List what experiments wait for, the oldest first.
+
+    A waiting request counts as an open event stream.
+    """
+    until, which = monotonic() + query.wait_s, WantedEvents(experiment=query.experiment, kinds=_NEWS)
+    page, latest = await run_sync(_look, store, query)
+    if latest is not None:
+        with streams.open(caller.token):
+            while latest is not None and await feed.news(latest, which, until - monotonic()):
+                page, latest = await run_sync(_look, store, query)
+    return page
+
+
+def _look(store: Store, query: RequestQuery) -> tuple[Page[RequestRead], int | None]:
+    """Return the requests, and the latest event before them if there is reason to wait for another."""
     wanted = RequestFilter(query.experiment, query.bench, query.pending, query.conflicts)
-    until = monotonic() + query.wait_s
-    while True:
-        page = await run_sync(taking.list_requests, store, wanted, query.limit, query.cursor)
-        if page.items or monotonic() >= until or await run_sync(taking.none_will_follow, store, wanted):
-            return page
-        await anyio.sleep(min(LOOK_S, max(0.0, until - monotonic())))
+    latest = events.latest(store)
+    page = taking.list_requests(store, wanted, query.limit, query.cursor)
+    waits = query.wait_s and not page.items and not taking.none_will_follow(store, wanted)
+    return page, latest if waits else None
 
 
 @router.get("/{id}", summary="Read a request", responses=documented(404))

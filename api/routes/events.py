@@ -1,8 +1,6 @@
 """Events: what happens to experiments, as a stream or page by page."""
 
-import asyncio
 from collections.abc import AsyncIterator
-from contextlib import suppress
 from typing import Annotated
 
 from anyio.to_thread import run_sync
@@ -10,9 +8,7 @@ from fastapi import APIRouter, Depends, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import Field
 
-from gaplab.api.http.dependencies import CallerDep, Id, Parameters, StoreDep, of_app
-from gaplab.api.http.event_feed import EventFeed
-from gaplab.api.http.limits import Streams
+from gaplab.api.http.dependencies import CallerDep, FeedDep, Id, Parameters, StoreDep, StreamsDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.events import EventKind, EventPage
 from gaplab.services import events
@@ -46,10 +42,6 @@ class EventPaging(EventFilter):
 
     limit: int = Field(default=100, ge=1, le=1_000, description="most events to return")
     wait_s: float = Field(default=0.0, ge=0.0, le=60.0, description="seconds to wait for an event if there is none")
-
-
-FeedDep = Annotated[EventFeed, of_app("feed")]
-StreamsDep = Annotated[Streams, of_app("streams")]
 
 
 async def _count_stream(streams: StreamsDep, caller: CallerDep) -> AsyncIterator[None]:
@@ -112,8 +104,6 @@ async def list_events(
     page = await run_sync(lambda: events.page(store, query.after, which, limit=query.limit))
     if page.items or not query.wait_s:
         return page
-    with streams.open(caller.token), suppress(TimeoutError):
-        async with asyncio.timeout(query.wait_s):
-            async for _ in feed.follow(page.last, which):
-                break
+    with streams.open(caller.token):
+        await feed.news(page.last, which, query.wait_s)
     return await run_sync(lambda: events.page(store, page.last, which, limit=query.limit))

@@ -2,20 +2,25 @@
 
 from typing import Literal
 
+import anyio
+from anyio.to_thread import run_sync
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import Field
 
-from gaplab.api.http.dependencies import StoreDep
+from gaplab.api.http.dependencies import WRITERS
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.base import Frozen
 from gaplab.services import health
-from gaplab.services.core.errors import SupervisorUnavailable
+from gaplab.services.core.errors import StoreUnavailable, SupervisorUnavailable
 
 router = APIRouter(tags=["health"])
 
 SILENT_S = 30.0
 """Seconds without a heartbeat after which a supervisor counts as lost, where no setting says otherwise."""
+
+ANSWER_S = 3.0
+"""Longest wait for the database; docker-compose.yml waits for longer."""
 
 
 class Alive(Frozen):
@@ -28,7 +33,7 @@ class Health(Frozen):
     """The answer of a service that serves requests; any other service answers with a problem.
 
     Attributes:
-        status: `degraded` if requests are served but experiments may not run.
+        status: `degraded` if requests are served but experiments may not run, or not be stored.
         warnings: why, a sentence each; left out if all is well.
     """
 
@@ -48,17 +53,26 @@ async def live() -> Alive:
     responses=documented(),
     response_model_exclude_defaults=True,
 )
-def ready(store: StoreDep, request: Request) -> Health:
+async def ready(request: Request) -> Health:
     """Answer if the database can be used, has the schema of this version, and the supervisor of `gaplab serve` runs.
 
-    Supervisors that other processes keep are only warned about: requests are served without them.
+    Supervisors that other processes keep are only warned about, and so are writes that failed or wait: other requests
+    are served.
     """
-    kept = getattr(request.app.state, "supervisor", None)
+    state = request.app.state
+    kept = getattr(state, "supervisor", None)
     if kept and (trouble := kept.trouble):
         raise SupervisorUnavailable(trouble)
-    found = health.warnings(store, getattr(request.app.state, "lease_s", SILENT_S))
+    lost_s = getattr(state, "lease_s", SILENT_S)
+    try:
+        with anyio.fail_after(ANSWER_S):
+            found = await run_sync(health.warnings, state.store, lost_s, abandon_on_cancel=True)
+    except TimeoutError as error:
+        raise StoreUnavailable(f"the database has not answered for {ANSWER_S:g} s") from error
     if kept and kept.warning:
         found = (kept.warning, *found)
+    if state.writers.locked():
+        found = (*found, f"{WRITERS} requests are writing, and others wait")
     return Health(status="degraded" if found else "ok", warnings=found)
 
 

@@ -68,12 +68,7 @@ _TYPES: dict[Kind, Any] = {
 
 
 def checked(table: str, file: Path, count: int) -> Iterator[Row]:
-    """Yield the rows of a table from its file of JSON Lines.
-
-    Args:
-        table: name of the table.
-        file: file with one row a line.
-        count: number of rows that the manifest states.
+    """Yield the rows of a table from its file, which has a row a line; the manifest states their number.
 
     Raises:
         InvalidArchive: a row or the number of rows is invalid; the message names the first invalid row and column.

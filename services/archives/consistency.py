@@ -125,9 +125,7 @@ def owner_of(table: str, row: Row) -> str:
 def check_attachments(session: Session, opened: OpenedArchive) -> None:
     """Refuse files without a row, rows without a file, and files that no answer names.
 
-    Args:
-        session: session of the private database, which has all rows.
-        opened: the archive.
+    The session is of the private database, which has all rows.
 
     Raises:
         InvalidArchive: the message names the first of them.

@@ -71,13 +71,7 @@ class OpenedArchive:
 
 
 def open_archive(file: IO[bytes], folder: Path, most_rows: int, convert: ParquetConverter) -> OpenedArchive:
-    """Unpack an archive into an empty folder.
-
-    Args:
-        file: the archive.
-        folder: receives its members.
-        most_rows: rows of all tables together.
-        convert: reads Parquet.
+    """Unpack an archive into an empty folder; its tables have at most `most_rows` together.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, not an archive, or written by a later version.
@@ -207,11 +201,7 @@ def _unpack(archive: ZipFile, info: ZipInfo, promised: Member, target: Path) -> 
 
 
 def convert_apart(files: Mapping[Path, int], program: Path = _UNPACKING) -> None:
-    """Convert Parquet in a subprocess, which has limits.
-
-    Args:
-        files: number of rows that each file must have.
-        program: what the subprocess runs.
+    """Convert Parquet in a subprocess, which has limits; each file must have its number of rows.
 
     Raises:
         InvalidArchive: a file is not readable, or has other rows.

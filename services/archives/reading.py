@@ -75,13 +75,9 @@ class CheckedArchive:
 def import_archive(
     store: Store, file: IO[bytes], admitted: Admission = FREELY, *, convert: ParquetConverter = convert_apart
 ) -> ImportRead:
-    """Store the content of an archive under its own ids; ids that are taken are replaced.
+    """Store the content of an archive, a seekable file at its beginning, under its own ids; taken ones are replaced.
 
-    Args:
-        store: database at the latest revision.
-        file: seekable file, at its beginning.
-        admitted: the sender and its limits; left out: those of rows and of the size of a spec, by default.
-        convert: reads Parquet.
+    The limits are those of `admitted`; left out: those of rows and of the size of a spec, by default.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, too large or not an archive; nothing was stored.
@@ -106,13 +102,10 @@ def import_archive(
 def checked_archive(
     file: IO[bytes], now: datetime, *, most_rows: int | None = None, convert: ParquetConverter = convert_apart
 ) -> Iterator[CheckedArchive]:
-    """Yield the content of an archive in a private database, which is deleted afterwards.
+    """Yield the content of an archive, a seekable file at its beginning, in a private database, which is deleted then.
 
-    Args:
-        file: seekable file, at its beginning.
-        now: when work that the archive shows under way counts as ended.
-        most_rows: most rows of all tables together; left out: the default of the setting.
-        convert: reads Parquet.
+    Work that the archive shows under way counts as ended `now`. All tables together may have `most_rows`; left out: the
+    default of the setting.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, too large or not an archive.

@@ -3,12 +3,7 @@
 from typing import Any
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.measurements import (
-    AnswerRead,
-    AnswerState,
-    MeasurementSpec,
-    RequestState,
-)
+from gaplab.schemas.measurements import AnswerRead, AnswerState, MeasurementSpec, RequestState
 from gaplab.schemas.traces import TraceRead, TracesRead
 from gaplab.services.bench.checking import check_attachments, check_values
 from gaplab.services.bench.doubts import doubts
@@ -39,13 +34,6 @@ def answer(
     An answer that came late counts unless somebody else took or answered the request meanwhile. Then it is kept as a
     conflict. The answer that counts, sent twice, is stored once, also if parts of it are left out the second time. With
     another value, reading, note, attachment or operator it is a conflict too.
-
-    Args:
-        store: the database.
-        id_: id of the request.
-        spec: the answer.
-        admitted: with the idempotency key.
-        traces: values and readings of its traces, if it has any.
 
     Raises:
         NotFound: the request does not exist.
@@ -145,14 +133,9 @@ def note_answer(
 
 def _parts(spec: MeasurementSpec) -> dict[str, Any]:
     """Return the parts of an answer by column, as they are stored; None for a part that is left out."""
-    return {
-        "values": None if spec.values is None else list(spec.values),
-        "readings": None if spec.readings is None else [[list(each) for each in table] for table in spec.readings],
-        "failed": None if spec.failed is None else storable(spec.failed),
-        "operator": None if spec.operator is None else storable(spec.operator),
-        "note": None if spec.note is None else storable(spec.note),
-        "attachments": list(spec.attachments) or None,
-    }
+    parts = {"values", "readings", "failed", "operator", "note", "attachments"}
+    given = spec.model_dump(mode="json", include=parts).items()
+    return {name: storable(part) if isinstance(part, str) else part or None for name, part in given}
 
 
 def _says_nothing_new(counted: AnswerRow, spec: MeasurementSpec) -> bool:

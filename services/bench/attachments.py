@@ -21,14 +21,8 @@ def store_attachment(
 ) -> AttachmentRead:
     """Store a file, unless it is stored already, and return its hash.
 
-    Sending it again keeps it as long as a new one, until an answer names it.
-
-    Args:
-        session: session of a transaction that writes.
-        content: content of the file.
-        name: name of the file.
-        media_type: as the sender states it.
-        most_unnamed: bytes of all files that no answer names; None for no limit.
+    Sending it again keeps it as long as a new one, until an answer names it. All that no answer names have at most
+    `most_unnamed` bytes; None for no limit.
 
     Raises:
         InvalidSpec: it is empty or too large.

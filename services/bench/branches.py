@@ -31,19 +31,10 @@ _LEASES = RepetitionLeases()
 
 
 def close(session: Session, repetition: RepetitionRow, place: int, iteration: int, reason: str) -> int | None:
-    """Take the steps from a place on out of the log of a repetition, and return the number of their branch.
+    """Close the steps of a log from a place on, and return the number of their branch; None if no step is closed.
 
-    A worker that computes further steps loses its lease. The caller settles the experiment.
-
-    Args:
-        session: session of a transaction that has locked the experiment.
-        repetition: the repetition.
-        place: place of the first step to close.
-        iteration: iteration of the measurement that was corrected.
-        reason: why.
-
-    Returns:
-        None if no step is closed.
+    A worker that computes further steps loses its lease. The caller has locked the experiment, and settles it.
+    `iteration` is that of the measurement that was corrected.
     """
     if repetition.state is State.RUNNING:
         given_up = Change(State.QUEUED, Ending.HANDED_BACK, "a measurement was corrected", {"owner": None})
@@ -100,17 +91,7 @@ def list_branches(session: Session, experiment: str) -> tuple[BranchRead, ...]:
     row, repetition = BranchRow, RepetitionRow
     query = select(row, repetition.number).join(repetition, repetition.id == row.repetition_id)
     found = session.execute(query.where(repetition.experiment_id == experiment).order_by(repetition.number, row.number))
-    return tuple(
-        BranchRead(
-            repetition=number,
-            number=each.number,
-            iteration=each.iteration,
-            reason=each.reason,
-            steps=tuple(each.steps),
-            closed_at=each.closed_at,
-        )
-        for each, number in found
-    )
+    return tuple(BranchRead.filled_from(each, repetition=number) for each, number in found)
 
 
 def _withdraw(session: Session, repetition: int, place: int, branch: int | None) -> None:

@@ -47,13 +47,7 @@ def check_attachments(session: Session, hashes: Sequence[str]) -> None:
     Raises:
         InvalidSpec: with each that is missing.
     """
-    stored = attachments.present(session, hashes)
-    missing = [
-        Violation(f"/attachments/{place}", name, "no attachment with this hash is stored; send the file first")
-        for place, name in enumerate(hashes)
-        if name not in stored
-    ]
-    if missing:
+    if missing := attachments.missing(session, hashes, "/attachments"):
         raise InvalidSpec(missing)
 
 

@@ -43,23 +43,16 @@ def consequences(
     later = log[leading[0].place + 1 :] if leading else ()
     measured = [step for step in later if isinstance(step, Measured | Probed)]
     measurements = sum(not (isinstance(step, Probed) and step.left_out) for step in measured)
-    steps = len(later)
-    if not steps:
-        words = "nothing follows from it"
-    else:
+    words = "nothing follows from it"
+    if later:
         again = f"; {measurements} of them measurements, which are reused if asked for again" if measurements else ""
-        words = f"{steps} stored step{'' if steps == 1 else 's'} after it will be computed again{again}"
+        words = f"{len(later)} stored step{'' if len(later) == 1 else 's'} after it will be computed again{again}"
         iterations = session.get_one(ExperimentRow, repetition.experiment_id).iterations
         if repetition.state is State.COMPLETED and repetition.iterations_done < iterations:
             words += "; the repetition, which was stopped, goes on to its last iteration"
-    return Consequences(
-        request=request.id,
-        repetition=repetition.number,
-        iteration=rows[0].iteration,
-        steps=steps,
-        measurements=measurements,
-        words=words if verb == "correct" else f"{words}; the controller is asked for again",
-    )
+    words += "" if verb == "correct" else "; the controller is asked for again"
+    follows = {"iteration": rows[0].iteration, "steps": len(later), "measurements": measurements}
+    return nothing_follows(request, repetition, words).model_copy(update=follows)
 
 
 def nothing_follows(request: RequestRow, repetition: RepetitionRow, words: str) -> Consequences:

@@ -10,7 +10,6 @@ from gaplab.schemas.measurements import (
     RequestState,
     Safety,
 )
-from gaplab.schemas.traces import TraceRead
 from gaplab.services.bench.motions import between_repeats
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.repeats import mean
@@ -59,22 +58,15 @@ def _view(
     robot, safety = robot_of(spec), None if row.safety is None else Safety.model_validate(row.safety)
     needs = needs_readings(discrepancy_of(experiment.spec), robot.sensors)
     taken = row.state is RequestState.TAKEN
-    return RequestRead(
-        id=row.id,
+    return RequestRead.filled_from(
+        row,
         experiment=experiment.id,
         experiment_name=experiment.name,
         experiment_state=experiment.state,
         repetition=number,
-        iteration=row.iteration,
-        kind=row.kind,
         robot=label_of(spec.robot),
         unit=robot.unit,
-        bench=row.bench,
         repeats=spec.reality.repeats,
-        genome=tuple(row.genome),
-        state=row.state,
-        takes=row.takes,
-        unanswered=row.unanswered,
         taken_by=row.taken_by if taken else None,
         taken_until=row.taken_until if taken else None,
         busy=held and not taken,
@@ -82,30 +74,17 @@ def _view(
         expected=tuple(expected(safety, robot.unit)) if safety else (),
         between_repeats=between_repeats(robot.world) if robot.world.bodies else None,
         needs=READINGS if needs else None,
-        same_as=row.same_as,
-        branch=row.branch,
         answers=tuple(map(view_answer, answers)),
-        created_at=row.created_at,
-        ended_at=row.ended_at,
     )
 
 
 def view_answer(row: AnswerRow) -> AnswerRead:
     """Return an answer."""
-    return AnswerRead(
-        id=row.id,
+    return AnswerRead.filled_from(
+        row,
         request=row.request_id,
-        state=row.state,
-        values=None if row.values is None else tuple(row.values),
         fitness=None if row.values is None else mean(frozen(row.values)),
-        readings=row.readings,
-        failed=row.failed,
-        operator=row.operator,
-        note=row.note,
-        attachments=tuple(row.attachments or ()),
-        traces=tuple(TraceRead.model_validate(trace) for trace in row.traces or ()),
-        doubts=tuple(row.doubts or ()),
-        replaces=row.replaces,
-        reason=row.reason,
-        at=row.at,
+        attachments=row.attachments or (),
+        traces=row.traces or (),
+        doubts=row.doubts or (),
     )

@@ -108,12 +108,9 @@ class CheckedPlugin:
 
 
 def write_skeleton(kind: str, name: str, folder: Path) -> Path:
-    """Write a plug-in that runs into a new file of a folder, and return the file.
+    """Write a plug-in that runs into a new file of a folder, which is created if absent, and return the file.
 
-    Args:
-        kind: one of `CHECKS`.
-        name: name in specs, and of the file.
-        folder: is created if absent.
+    The kind is one of `CHECKS`; the name is that in specs, and of the file.
 
     Raises:
         GaplabError: the name is not permitted, or the kind has a plug-in of this name.

@@ -36,6 +36,7 @@ Diverged physics is not an error: its fitness is nan, which never wins.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -72,10 +73,10 @@ class Violation:
 
 
 class InvalidSpec(GaplabError):
-    """A spec that cannot run, with all its violations."""
+    """A spec that cannot run, with its first hundred violations."""
 
     def __init__(self, violations: Iterable[Violation]) -> None:
-        self.violations = tuple(violations)
+        self.violations = tuple(islice(violations, 100))
         super().__init__("; ".join(f"{each.pointer or '/'}: {each.message}" for each in self.violations))
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cached_property
 from hashlib import sha256
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 from pydantic import ConfigDict, Field, StringConstraints, ValidationError
 
@@ -18,7 +18,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import MOST_LOSSES, RobotSource
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.world import World
-from gaplab.services.core.world_checks import world_violations
+from gaplab.services.core.world_checks import MOST_BODIES, world_violations
 
 LONGEST_NAME = 60
 """Most characters of a robot's name."""
@@ -29,6 +29,10 @@ MOST_BYTES = 2_000_000
 LONGEST_LINE = 1_000
 """Most characters of a line of what an import lost, and of a comment."""
 
+Lines: TypeAlias = Annotated[
+    tuple[Annotated[str, Field(max_length=LONGEST_LINE)], ...], Field(max_length=MOST_LOSSES, fail_fast=True)
+]
+
 _SHAPES = "a shape: its kind is box, sphere, capsule, cylinder or hull"
 _MESSAGES = {
     "extra_forbidden": ("{} is no field here", "no such field"),
@@ -38,7 +42,7 @@ _MESSAGES = {
 }
 """Message and what is permitted, by pydantic's type of error, where its own words would not help."""
 
-_UNWRITTEN = ("origin", "edits")
+_UNWRITTEN = {"origin", "edits"}
 """Fields of a world that say how it was edited; a file has only what it is."""
 
 
@@ -63,8 +67,8 @@ class RobotFile(Frozen):
     source: RobotSource | None = None
     usual_controller: PluginRef
     usual_task: PluginRef
-    lost: Annotated[tuple[Annotated[str, Field(max_length=LONGEST_LINE)], ...], Field(max_length=MOST_LOSSES)] = ()
-    comments: Annotated[tuple[Annotated[str, Field(max_length=LONGEST_LINE)], ...], Field(max_length=MOST_LOSSES)] = ()
+    lost: Lines = ()
+    comments: Lines = ()
     world: World
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> "RobotFile":
@@ -118,19 +122,26 @@ def stored_robot_file(text: str | bytes) -> RobotFile:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InvalidSpec([Violation("", None, f"the robot file is no JSON: {error}", "JSON in UTF-8")]) from error
-    _refuse_edits(content)
+    if violations := list(_world_violations(content)):
+        raise InvalidSpec(violations)
     try:
         return RobotFile.model_validate_json(text)
     except ValidationError as error:
         raise InvalidSpec(_violations(error, content)) from error
 
 
-def _refuse_edits(content: Any) -> None:  # noqa: ANN401 - any JSON
+def _world_violations(content: Any) -> Iterator[Violation]:  # noqa: ANN401 - any JSON
+    """Yield what is seen of a world at once, before every value in it is looked at."""
     world = content.get("world") if isinstance(content, dict) else None
-    names = [name for name in _UNWRITTEN if isinstance(world, dict) and name in world]
-    if names:
-        message = "{} is no field of a robot file: it would say how the world was edited"
-        raise InvalidSpec(Violation(f"/world/{name}", None, message.format(name), "no such field") for name in names)
+    if not isinstance(world, dict):
+        return
+    for name in world.keys() & _UNWRITTEN:
+        message = f"{name} is no field of a robot file: it would say how the world was edited"
+        yield Violation(f"/world/{name}", None, message, "no such field")
+    for name in ("bodies", "joints"):
+        if isinstance(given := world.get(name), list) and len(given) > MOST_BODIES:
+            message = f"{name} must be at most {MOST_BODIES}, not {len(given):,}"
+            yield Violation(f"/world/{name}", len(given), message, f"at most {MOST_BODIES}")
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - any value of a world

@@ -55,7 +55,7 @@ class Cylinder:
 class Hull:
     """The convex hull of points, of which there are at most `MOST_VERTICES`."""
 
-    points_m: tuple[Vector, ...]
+    points_m: Annotated[tuple[Vector, ...], Field(max_length=MOST_VERTICES, fail_fast=True)]
     kind: Literal["hull"] = field(default="hull", kw_only=True, repr=False)
 
 

@@ -5,9 +5,14 @@ SI units throughout; z points up; the ground is the plane z = 0.
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import Field
 
 from gaplab.services.core.shapes import ORIGIN, UNTURNED, Part, Quaternion, Shape, Vector
+
+MOST_PARTS = 64
+"""Largest number of parts of a body."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ class Body:
 
     name: str
     mass_kg: float
-    shape: Shape | tuple[Part, ...]
+    shape: Shape | Annotated[tuple[Part, ...], Field(max_length=MOST_PARTS, fail_fast=True)]
     center_m: Vector = ORIGIN
     collides: bool = True
     inertia: Inertia | None = None
@@ -170,7 +175,7 @@ class Noise:
     latency_s: float = 0.0
 
 
-Surfaces: TypeAlias = tuple[tuple[str, Material], ...]
+Surfaces: TypeAlias = Annotated[tuple[tuple[str, Material], ...], Field(fail_fast=True)]
 
 
 @dataclass(frozen=True)

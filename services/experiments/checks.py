@@ -151,10 +151,7 @@ def warnings(check: SensitivityRow) -> tuple[str, ...]:
 def id_of(spec: Checked, external: Mapping[str, str] | None = None) -> str:
     """Return the id of the check: a hash of the spec, the version of the method, and the external plug-ins.
 
-    Args:
-        spec: subject of the check.
-        external: versions of external plug-ins by kind and name, so that an edited one is checked again; left out:
-            this process's.
+    `external` are their versions by kind and name, so that an edited one is checked again; left out: this process's.
     """
     versions = external_plugins() if external is None else external
     names = named_in(spec.model_dump(mode="json"))
@@ -175,16 +172,12 @@ def _findings(check: SensitivityRow) -> tuple[Sensitivity, ...]:
 
 def _view(check: SensitivityRow) -> SensitivityRead:
     spec = Checked.model_validate(check.spec)
-    return SensitivityRead(
-        id=check.id,
-        state=check.state,
+    return SensitivityRead.filled_from(
+        check,
         spec=spec,
         rollouts=Effort(spec.points, spec.evaluations).rollouts(len(spec.tunables)),
         unit=unit(spec),
         tunables=_findings(check),
         warnings=warnings(check),
         reason=check.error,
-        created_at=check.created_at,
-        started_at=check.started_at,
-        ended_at=check.ended_at,
     )

@@ -61,13 +61,7 @@ def estimate(
 
 
 def check_cost(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
-    """Refuse a cost above the limit, unless the request confirms it.
-
-    Args:
-        session: session of the transaction that stores it.
-        specs: specs of the submission.
-        admitted: the sender and its limits.
-        done: completed rollouts of these specs.
+    """Refuse a cost above the limit, unless the request confirms it; `done` rollouts of it are completed.
 
     Raises:
         CostUnconfirmed: the message has the cost and the limit.

@@ -17,12 +17,9 @@ def fitness_of(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, Fit
 
 
 def points_at(session: Session, counts: Mapping[str, int], known: Mapping[str, int]) -> dict[str, FitnessRead]:
-    """Return a point of each experiment's curve, if it has a mean.
+    """Return the point of each experiment's curve after its number of real-world evaluations, if it has a mean.
 
-    Args:
-        session: session of a transaction.
-        counts: numbers of real-world evaluations, by experiment.
-        known: numbers of samples from before, by experiment.
+    `counts` are these numbers, `known` those of samples from before.
     """
     points = {
         experiment: mean_and_deviation(frozen(values)) for experiment, values in recorded_at(session, counts).items()
@@ -38,10 +35,6 @@ def best_of(session: Session, studies: Mapping[str, Sequence[ExperimentRead]]) -
     """Return the fittest experiment of each study, after the last number of evaluations that its experiments share.
 
     It is the fittest of those with the most repetitions.
-
-    Args:
-        session: session of a transaction.
-        studies: experiments by study.
     """
     shared = {study: common_count(experiments) for study, experiments in studies.items()}
     counts = {study: count for study, count in shared.items() if count is not None}

@@ -42,14 +42,8 @@ def once(
     """Do the work and store its answer under the key, in one transaction; or return the stored answer.
 
     This waits for another transaction with the same key: in Postgres at the unique key, in SQLite for the one writer.
-
-    Args:
-        store: the database.
-        admitted: has the key; without a key, the work is always done.
-        asked: the request's body; its class identifies the endpoint.
-        kind: class of the answer.
-        work: creates the answer in the transaction.
-        of: id of what the request is about, so that a key fits this alone.
+    Without a key, the work is always done. The class of what was asked identifies the endpoint; `of` is the id of what
+    the request is about, so that a key fits this alone.
 
     Raises:
         KeyReused: the key was used for another request.

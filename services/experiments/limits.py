@@ -62,13 +62,9 @@ def check_extent(specs: Sequence[ResolvedSpec], limits: Limits | None) -> None:
 
 
 def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
-    """Refuse a submission that would exceed the work in progress, in the transaction that inserts it.
+    """Refuse a submission, of which `done` rollouts are completed, that would exceed the work in progress.
 
-    Args:
-        session: session of the transaction.
-        specs: specs of the submission.
-        admitted: the sender and its limits.
-        done: completed rollouts of these specs.
+    The transaction is the one that inserts it.
 
     Raises:
         LimitReached: the message names the limit.

@@ -71,12 +71,7 @@ _COMPUTED = frozenset({"seconds_left", "time_left"})
 
 
 def progress_of(tally: Tally, spans: Sequence[Span] = ()) -> Progress:
-    """Return the progress of an experiment or a study.
-
-    Args:
-        tally: sums over its repetitions.
-        spans: times of the work on its repetitions; none unless it is running.
-    """
+    """Return the progress of an experiment or a study, with the times of its work if it is running."""
     sums = {name: getattr(tally, name) for name in Progress.model_fields if name not in _COMPUTED}
     finished, left, busy = tally.rollouts_done + tally.rollouts_saved, tally.rollouts_left, busy_s(spans)
     seconds_left = estimate_s(finished, left, busy) if tally.open else 0.0
@@ -93,14 +88,7 @@ def caveat_of(state: State, tally: Tally) -> str | None:
 
 
 def study_caveat_of(state: State, members: Mapping[State, int], stopped: int, tally: Tally) -> str | None:
-    """Return what the state of a study does not say about its experiments.
-
-    Args:
-        state: state of the study.
-        members: number of its experiments by state.
-        stopped: number of COMPLETED experiments that were stopped early.
-        tally: sums over all repetitions.
-    """
+    """Return what the state of a study does not say about its experiments; `stopped` were COMPLETED early."""
     counts = {each.lower(): members.get(each, 0) for each in (State.FAILED, State.CANCELLED) if each is not state}
     counts["stopped early"] = stopped if state.ended else 0
     parts = [f"{count} {what}" for what, count in counts.items() if count]

@@ -34,16 +34,9 @@ def move(
     to: State,
     **values: Any,  # noqa: ANN401 - columns of any type
 ) -> list[Any]:
-    """Move rows to a state in one statement, and return the ids of the rows that moved.
+    """Move rows to a state in one statement, set further columns, and return the ids of the rows that moved.
 
     A row whose state may not become `to` stays as it is. `ended_at` follows from the state.
-
-    Args:
-        session: session of a transaction that writes.
-        table: table of the rows.
-        which: condition on the rows.
-        to: their new state.
-        values: further columns to set.
     """
     sources = [state for state, targets in MOVES.items() if to in targets]
     ended_at = now() if to.ended else None
@@ -52,15 +45,10 @@ def move(
 
 
 def settle(session: Session, experiments: Iterable[str], requested: State | None = None) -> None:
-    """Update the states of experiments after a repetition has moved, or when a state is requested.
+    """Update the states of locked experiments after a repetition has moved, or when a person requests a state.
 
     An experiment without a repetition left to run ends. A PAUSING one becomes PAUSED when its last running step is
     over. A STOPPING one keeps no queued repetition. Only this function keeps the counts that turns depend on.
-
-    Args:
-        session: session of a transaction that has locked these experiments.
-        experiments: their ids.
-        requested: a state that a person requests; None without a request.
 
     Raises:
         Conflict: the move to the resulting state is not permitted.
@@ -89,12 +77,7 @@ def _settle(session: Session, experiment: str, requested: State | None) -> None:
 
 
 def _following(state: State, repetitions: Collection[State]) -> State:
-    """Return the state of an experiment that follows from its repetitions.
-
-    Args:
-        state: stored or requested state of the experiment.
-        repetitions: states of its repetitions.
-    """
+    """Return the state of an experiment, stored or requested, that follows from those of its repetitions."""
     if state.ended:
         return state
     queued, running, waiting = (each in repetitions for each in (State.QUEUED, State.RUNNING, State.WAITING))

@@ -61,11 +61,7 @@ def list_robots(session: Session) -> tuple[RobotRead, ...]:
 
 @snapshot
 def robot_text(session: Session, named: str) -> str:
-    """Return the text of a robot file.
-
-    Args:
-        session: a snapshot of the database.
-        named: hash or name of the robot.
+    """Return the text of a robot file, named by its hash or its name.
 
     Raises:
         NotFound: there is no such robot.
@@ -167,13 +163,11 @@ def _entry(found: RobotRead) -> PluginRead:
 
 def _view(row: RobotRow, file: RobotFile) -> RobotRead:
     world = file.world
-    return RobotRead(
-        sha256=row.sha256,
-        name=row.name,
+    return RobotRead.filled_from(
+        row,
         file=file.source.file if file.source else None,
         bodies=len(world.bodies),
         actuators=len(world.actuators),
         mass_kg=sum(body.mass_kg for body in world.bodies),
         lost=file.lost,
-        created_at=row.created_at,
     )

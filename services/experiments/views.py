@@ -32,13 +32,7 @@ _MOVING = (State.RUNNING, State.PAUSING, State.STOPPING)
 def view_experiments(
     session: Session, rows: Sequence[ExperimentRow], *, reveal: bool = False
 ) -> tuple[ExperimentRead, ...]:
-    """Return the experiments with their progress.
-
-    Args:
-        session: session of a transaction.
-        rows: rows of the experiments.
-        reveal: include hidden parameters of reality.
-    """
+    """Return the experiments with their progress; `reveal` includes hidden parameters of reality."""
     return _view(session, rows, _work(session, rows), reveal=reveal)
 
 
@@ -62,14 +56,8 @@ def view_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = F
 
 
 def view_repetition(row: RepetitionRow, *, secret: bool) -> RepetitionRead:
-    """Return the repetition.
-
-    Args:
-        row: the repetition.
-        secret: keep what reality's code said about an error to itself.
-    """
-    shown = RepetitionRead(**{name: getattr(row, name) for name in RepetitionRead.model_fields})
-    return shown if secret or row.hidden_error is None else shown.model_copy(update={"error": row.hidden_error})
+    """Return the repetition; `secret` leaves out what reality's code said about an error."""
+    return RepetitionRead.filled_from(row, error=row.error if secret else row.hidden_error or row.error)
 
 
 def state_of(states: Collection[State]) -> State:
@@ -139,22 +127,15 @@ class _Findings:
 
 def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bool) -> ExperimentRead:
     check, doubts = found.checks.get(row.id, CheckSummary()), found.doubts.get(row.id, ())
-    return ExperimentRead(
-        id=row.id,
+    return ExperimentRead.filled_from(
+        row,
         study=row.study_id,
-        name=row.name,
-        notes=row.notes,
         tags=unpack_tags(row.tags),
-        edits=row.edits,
-        archived_at=row.archived_at,
-        strategy=row.strategy,
         direct=row.strategy in strategies and strategies[row.strategy].in_reality,
         level=not row.tunes,
-        state=row.state,
         caveat=caveat_of(row.state, work.tally),
         spec=without_truth(row.spec) if secret else row.spec,
         priority=-row.precedence,
-        max_parallel=row.max_parallel,
         progress=work.progress,
         fitness=found.fitness.get(row.id),
         best_fitness=mean_best(found.best[row.id]) if row.id in found.best else None,
@@ -162,9 +143,6 @@ def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bo
         sensitivity=check.id,
         doubts=doubts,
         warnings=(*doubts, *check.warnings, *_version_warnings(row, work.tally)),
-        created_at=row.created_at,
-        started_at=row.started_at,
-        ended_at=row.ended_at,
     )
 
 
@@ -175,19 +153,14 @@ def _study(
     states = Counter(each.state for each in experiments)
     stopped = sum(each.state is State.COMPLETED and work[each.id].tally.stopped > 0 for each in experiments)
     state = state_of(states)
-    return StudyRead(
-        id=row.id,
-        name=row.name,
-        notes=row.notes,
+    return StudyRead.filled_from(
+        row,
         tags=unpack_tags(row.tags),
-        edits=row.edits,
-        archived_at=row.archived_at,
         state=state,
         caveat=study_caveat_of(state, states, stopped, together.tally),
         best=best,
         experiments=tuple(experiments),
         progress=together.progress,
-        created_at=row.created_at,
     )
 
 

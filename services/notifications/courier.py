@@ -27,10 +27,7 @@ log = logging.getLogger("gaplab.notifications")
 class Courier:
     """Delivers notifications in the background, from `start` to `stop`; without settings it does nothing.
 
-    Args:
-        store: the database; the courier does not close it.
-        notify: settings of the service's owner.
-        page: address of the service's page, for links in messages.
+    It does not close the store. Links in messages lead to `page`, the address of the service's page.
     """
 
     def __init__(self, store: Store, notify: Notify, page: str = "") -> None:

@@ -37,14 +37,7 @@ class Attempt:
 
 
 def deliver(message: Notification, channel: Channel, webhook: str | None, notify: Notify) -> Attempt:
-    """Send a notification once.
-
-    Args:
-        message: what to send.
-        channel: where to.
-        webhook: address that the study or experiment has of its own.
-        notify: settings of the service's owner.
-    """
+    """Send a notification once; `webhook` is the address that its study or experiment has of its own."""
     if channel is Channel.COMMAND:
         return run(notify.command, message) if notify.command else _no_longer("the command")
     if channel is Channel.WEBHOOK:

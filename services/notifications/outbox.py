@@ -71,10 +71,7 @@ class Letter:
 def collect(session: Session, owner: str, channels: Sequence[Channel]) -> bool:
     """Add a notification for each new end, and return whether it is this process's turn to send.
 
-    Args:
-        session: session of a transaction that writes.
-        owner: name of the process.
-        channels: channels of the service, which tell of everything; others are told by their own webhooks.
+    The channels of the service tell of everything; others are told by their own webhooks.
     """
     notifier, present = session.get(NotifierRow, 1, with_for_update=True), moment(session)
     assert notifier is not None
@@ -108,13 +105,9 @@ def next_letter(session: Session) -> Letter | None:
 
 @transaction
 def settle(session: Session, letter: Letter, failure: str | None, *, hopeless: bool = False) -> None:
-    """Store the outcome of an attempt as an event, and when to try again.
+    """Store the outcome of an attempt as an event, and when to try again; without a `failure` it was delivered.
 
-    Args:
-        session: session of a transaction that writes.
-        letter: what was sent.
-        failure: why it was not delivered; None if it was.
-        hopeless: whether a further attempt would fail the same way.
+    A `hopeless` one would fail the same way again.
     """
     row = session.get(NotificationRow, letter.key, with_for_update=True)
     if row is None or row.attempts >= letter.attempt:

@@ -21,11 +21,7 @@ from gaplab.services.specs.presets import PRESETS
 
 
 def catalogue(stored: Sequence[PluginRead] = ()) -> Catalogue:
-    """Return every plug-in of every kind, by name, and the named budgets.
-
-    Args:
-        stored: entries of the stored robots, which specs name as they do plug-ins.
-    """
+    """Return every plug-in of every kind, by name, with the stored robots, and the named budgets."""
     own = [robot for robot in robots.describe() if robot.name != IMPORTED]
     return Catalogue(
         strategies=strategies.describe(),

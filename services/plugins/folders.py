@@ -37,8 +37,7 @@ def find() -> None:
 def use(files: Iterable[str]) -> None:
     """Import the modules of these files and no others, since a module may change gaplab for all that a process does.
 
-    Args:
-        files: those of each plug-in, the first its own, with their hashes, as `imported_files` has them.
+    The files are as `imported_files` has them: those of each plug-in, the first its own, with their hashes.
     """
     find()
     if external_plugins.chosen() != (modules := frozenset(map(module_of, files))):

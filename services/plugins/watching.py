@@ -19,11 +19,7 @@ TRIES = 3
 
 
 class FolderWatch:
-    """The contents of the plug-in folders, read again after an edit.
-
-    Args:
-        clock: seconds.
-    """
+    """The contents of the plug-in folders, read again after an edit; `clock` returns seconds."""
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
         self._clock = clock

@@ -73,12 +73,9 @@ class _Moving:
 
 
 def pictures(replay: Replay, *, every: int, width_px: int) -> Iterator[Image.Image]:
-    """Yield every n-th frame of the replay, from the start.
+    """Yield every n-th frame of the replay, from the start, as pictures of an even width, which its worlds share.
 
-    Args:
-        replay: the motion in one or two worlds; a world whose physics failed, or that is hardware, is left out.
-        every: take each n-th frame.
-        width_px: width of a picture, an even number; worlds share it.
+    A world whose physics failed, or that is hardware, is left out.
     """
     worlds = _worlds(replay)
     size = (width_px // max(1, len(worlds)), round(width_px / 3 / 2) * 2)

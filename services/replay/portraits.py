@@ -20,14 +20,7 @@ from gaplab.services.store.session import Store
 
 
 def robot_picture(drawing: RolloutProcess, store: Store, name: str, *, dark: bool, width_px: int) -> bytes:
-    """Return a picture of a robot of the catalogue as PNG.
-
-    Args:
-        drawing: the process that draws.
-        store: has the robots from files.
-        name: name of the robot, or the hash of its file.
-        dark: true for the dark colours of the page.
-        width_px: width of the picture.
+    """Return a picture of a robot, of the catalogue or from a file, by its name or the hash of its file, as PNG.
 
     Raises:
         NotFound: no usable robot has this name or hash, or it has no body.

@@ -42,14 +42,8 @@ Place = tuple[str, str]
 def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, seconds: float = SECONDS) -> Predictions:
     """Return the predictions of an experiment's samples that are computed so far.
 
-    Each request computes more of them, early iterations first. The rest counts as pending: repeat the request. Samples
-    beyond `MOST_KEPT` are left out.
-
-    Args:
-        store: database with the experiment.
-        process: executes the rollouts and caches their fitness.
-        experiment_id: the experiment.
-        seconds: time limit of the rollouts of this request.
+    Each request computes more of them, early iterations first, for `seconds`. The rest counts as pending: repeat the
+    request. Samples beyond `MOST_KEPT` are left out.
 
     Raises:
         NotFound: no such experiment.
@@ -83,13 +77,7 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
 
 
 def predict(spec: SentSpec, samples: Sequence[TunedSample], seconds: float) -> list[Pair]:
-    """Return the fitness of samples before and after tuning: of the first one, and of as many others as time permits.
-
-    Args:
-        spec: resolved spec.
-        samples: samples, with the simulators before and after them.
-        seconds: time limit.
-    """
+    """Return the fitness of samples before and after tuning: of the first, and of as many others as time permits."""
     read = received(spec)
     robot = robot_of(read)
     simulate = simulation_of(read, robot)

@@ -96,13 +96,10 @@ class RolloutProcess:
         load: Callable[[], Any] | None = None,
         plugins: tuple[str, ...] = (),
     ) -> T:
-        """Return `function(*arguments)`, computed in the subprocess.
+        """Return `function(*arguments)`, computed in the subprocess; all of it can be pickled.
 
-        Args:
-            function: defined at the top of a module, so that it can be pickled.
-            arguments: values that can be pickled.
-            load: returns the last argument once it is the caller's turn, as those who wait shall hold nothing large.
-            plugins: files of the external plug-ins that it may import, with their hashes.
+        `load` returns the last argument once it is the caller's turn, as those who wait shall hold nothing large.
+        `plugins` are the files, with their hashes, of the external plug-ins that it may import.
 
         Raises:
             EngineInterrupted: the process died or took too long, or `close` was called.

@@ -37,14 +37,7 @@ LONGEST_PLOT_S = 20.0
 def evaluate_traces(
     store: Store, process: RolloutProcess, request: str, spec: TracesSpec, *, answer: bool = False
 ) -> TracesRead:
-    """Return what traces say about the controller of a request; nothing is stored.
-
-    Args:
-        store: the store.
-        process: process that reads them, and computes the expected motion.
-        request: id of the request.
-        spec: the traces.
-        answer: whether they answer the request, which takes a trace of each repeat.
+    """Return what traces say about the controller of a request; nothing is stored. An answer takes one of each repeat.
 
     Raises:
         NotFound: the request does not exist.
@@ -82,12 +75,7 @@ def said_by_files(
 ) -> TracesRead | tuple[Violation, ...]:
     """Return what traces say about a genome, beside the motion in a simulator of a spec; or what is wrong with them.
 
-    Args:
-        sent_spec: of the experiment.
-        genes: the genome.
-        parameters: of the simulator.
-        spec: the traces.
-        files: contents by hash; each is read once, however often the spec names it.
+    `files` are contents by hash; each is read once, however often the spec names it.
     """
     robot = robot_of(received(sent_spec))
     try:
@@ -147,12 +135,7 @@ def _check(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) ->
     Raises:
         InvalidSpec: with every violation.
     """
-    stored = attachments.present(session, spec.traces)
-    violations = [
-        Violation(f"/traces/{place}", digest, "no attachment with this hash is stored; send the file first")
-        for place, digest in enumerate(spec.traces)
-        if digest not in stored
-    ]
+    violations = attachments.missing(session, spec.traces, "/traces")
     if len(spec.traces) > repeats or (answer and len(spec.traces) < repeats):
         message = f"an answer has one trace for each repeat: {repeats}, not {len(spec.traces)}"
         violations.append(Violation("/traces", f"traces: {len(spec.traces)}", message, f"exactly {repeats}"))

@@ -28,13 +28,7 @@ LOOP = 0
 
 
 def replay_video(drawing: RolloutProcess, replay: bytes, kind: VideoFormat, width_px: int) -> bytes:
-    """Return a replay, given as JSON, as a film.
-
-    Args:
-        drawing: the process that draws.
-        replay: the replay.
-        kind: the format.
-        width_px: width of the film, an even number.
+    """Return a replay, given as JSON, as a film of an even width.
 
     Raises:
         Conflict: the physics failed, so there is no motion.

@@ -77,11 +77,7 @@ def takehome_zip(
 ) -> bytes:
     """Return the outcome of an experiment as a zip.
 
-    Args:
-        store: the database.
-        process: process that computes expected motions.
-        experiment_id: id of the experiment.
-        draw: calls a function that draws figures, perhaps after waiting for a turn.
+    `draw` calls a function that draws figures, perhaps after waiting for a turn.
 
     Raises:
         NotFound: no such experiment.

@@ -42,13 +42,9 @@ def judge(
     pairs: Sequence[Comparison],
     unreproduced: Mapping[str, str],
 ) -> VerdictRead:
-    """Return the verdict on experiments.
+    """Return the verdict on experiments from their curves, in their order, and the pairs at the common count.
 
-    Args:
-        curves: the curves of the experiments, in their order.
-        experiments: one or more experiments.
-        pairs: comparisons of all pairs at the common count.
-        unreproduced: by experiment, that no simulator reproduces its samples.
+    `unreproduced` says, by experiment, that no simulator reproduces its samples.
     """
     count = common_count(experiments)
     judged = judged_curves(curves, experiments, count)

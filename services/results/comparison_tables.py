@@ -40,9 +40,7 @@ def comparisons_csv(comparisons: Sequence[Comparison]) -> str:
 def comparisons_latex(comparisons: Sequence[Comparison], unit: str) -> str:
     """Return tables for the package booktabs: the pairs, the experiments, and over a range the paper's pooled tests.
 
-    Args:
-        comparisons: pairs over one range of real-world evaluations.
-        unit: unit of fitness; "" if it has none.
+    The comparisons have one range of real-world evaluations; the unit is "" if fitness has none.
     """
     return "\n".join([_pairs(comparisons, unit), _experiments(comparisons, unit), *_pooled(comparisons)])
 

@@ -114,16 +114,13 @@ def values_of(
 def _curve(row: ExperimentRow, values: FloatArray, fitness: Fitness) -> Curve:
     spec = spec_of(row.spec)
     direct = is_direct(spec)
-    return Curve(
+    return Curve.filled_from(
+        row,
         experiment=row.id,
-        name=row.name,
-        strategy=row.strategy,
-        state=row.state,
         unit=unit(spec),
         fitness=fitness,
         direct=direct,
         level=not row.tunes,
-        known=row.known,
         points=curve_points(values),
         best_of=best_of_searches(values[:, 0]) if direct else (),
     )

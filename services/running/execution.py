@@ -79,14 +79,9 @@ def claim(
 ) -> tuple[Claim, ...]:
     """Claim up to `limit` queued repetitions in the order of turns, and return them with their logs.
 
-    Args:
-        store: the database.
-        owner: the supervisor.
-        limit: largest number of repetitions.
-        under: provenance of the supervisor; this process's if left out. An experiment that was begun under another
-            engine, plug-in, architecture or version of the spec is left alone, and says so.
-        refused: why processes of the supervisor refuse plug-ins, by kind and name; experiments that name them are left
-            alone as well, and so are those whose plug-ins are not available here.
+    An experiment that was begun under another engine, plug-in, architecture or version of the spec than `under`, which
+    is this process's provenance if left out, is left alone, and says so. So are those that name plug-ins that are not
+    available here, or that processes of the supervisor refuse, by kind and name.
     """
     try:
         return store.write(_claim, owner, limit, under or present_provenance(), refused) if limit > 0 else ()
@@ -123,15 +118,10 @@ def give_way(
     under: Provenance | None = None,
     refused: Mapping[str, str] = provenance.NONE,
 ) -> tuple[Claim, ...]:
-    """Hand back claims of repetitions that should not start now, and return them.
+    """Hand back claims of repetitions that wait for a core and should not start now, and return them.
 
-    The reason is a request to pause or stop, or another experiment's turn.
-
-    Args:
-        store: the database.
-        waiting: claims whose repetition waits for a core; a running one is never interrupted for another.
-        under: as in `claim`.
-        refused: as in `claim`.
+    The reason is a request to pause or stop, or another experiment's turn, for which a running one is never
+    interrupted. `under` and `refused` are as in `claim`.
     """
     claims = tuple(waiting)
     if not claims:

@@ -33,9 +33,6 @@ class Silences(Generic[K]):
     A time in the database says too little about hardware: if somebody sets the database's clock, every lease seems to
     have expired, and a second holder would move a robot that the first still moves. So a supervisor waits until a
     heartbeat has not changed for a whole lease of its own monotonic clock.
-
-    Args:
-        clock: returns seconds, and is never set.
     """
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
@@ -97,13 +94,7 @@ class Leases(Generic[L]):
         return store.write(self.renew, held) if held else ()
 
     def complete(self, store: Store, *leases: L, **results: Any) -> tuple[L, ...]:  # noqa: ANN401 - columns of any type
-        """End work as COMPLETED, and return the leases that were valid.
-
-        Args:
-            store: the database.
-            leases: leases of the completed work.
-            results: columns to set.
-        """
+        """End work as COMPLETED, set columns of results, and return the leases that were valid."""
         if not leases:
             return ()
         change = Change(State.COMPLETED, Ending.COMPLETED, values={"error": None} | results)
@@ -126,13 +117,7 @@ class Leases(Generic[L]):
         return tuple(lease for lease in leases if lease.id in given)
 
     def hand_back_unheard(self, store: Store, owner: str, known: Iterable[L]) -> int:
-        """Hand back claims whose reply never reached their owner, and return their number.
-
-        Args:
-            store: the database.
-            owner: the supervisor.
-            known: all leases that the supervisor knows of.
-        """
+        """Hand back claims that an owner does not know, since no reply reached it, and return their number."""
         ids = [lease.id for lease in known]
         return len(store.write(self._hand_back, (self.table.owner == owner) & self.table.id.not_in(ids)))
 
@@ -141,12 +126,8 @@ class Leases(Generic[L]):
     ) -> int:
         """Queue work again whose holder was silent for too long, and return the number of rows.
 
-        A heartbeat from the future was sent before the clock was set back, and says nothing about the present.
-
-        Args:
-            store: the database.
-            stale_after_s: seconds of silence.
-            silences: silences of the holders of hardware; left out: the database's clock says how long those are too.
+        A heartbeat from the future was sent before the clock was set back, and says nothing about the present. Without
+        `silences` of the holders of hardware, the database's clock says how long those are too.
         """
         return len(store.write(self._requeue_lost, stale_after_s, silences))
 
@@ -182,13 +163,7 @@ class Leases(Generic[L]):
         """Free what an ended lease still holds once its holder is silent; nothing by default."""
 
     def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[Any]:
-        """End valid leases, and return the ids of their rows.
-
-        Args:
-            session: session of a transaction that writes.
-            which: condition on the rows; rows without a valid lease stay unchanged.
-            change: change of the rows.
-        """
+        """End the valid leases of some rows, change these rows, and return their ids."""
         return move(session, self.table, which & (self.table.state == State.RUNNING), change.to, **change.values)
 
     def renew(self, session: Session, leases: Sequence[L], /, **values: Any) -> tuple[L, ...]:  # noqa: ANN401 - columns of any type

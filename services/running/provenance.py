@@ -80,12 +80,8 @@ def decisive(under: Provenance, spec: Mapping[str, Any]) -> str:
 def permitted(session: Session, under: Provenance, refused: Mapping[str, str] = NONE) -> ColumnElement[bool]:
     """SQL condition: the supervisor may claim the experiment's repetitions.
 
-    Its spec can be read, its plug-ins can be used, and it has not started, or started with the same versions.
-
-    Args:
-        session: of a transaction.
-        under: provenance of the supervisor.
-        refused: why processes of the supervisor refuse plug-ins, by kind and name.
+    Its spec can be read, its plug-ins can be used, and it has not started, or started with the same versions. `refused`
+    says why processes of the supervisor refuse plug-ins, by kind and name.
     """
     row = ExperimentRow
     begun = row.claimable.is_(True) & row.computed_with.is_not(None)

@@ -22,7 +22,12 @@ class PulsePipe:
 
     Args:
         descriptor: to write to; None without a keeper.
+
+    Attributes:
+        trouble: why nothing runs although this supervisor lives; told with each sign of life.
     """
+
+    trouble = ""
 
     def __init__(self, descriptor: int | None = None) -> None:
         self._descriptor = descriptor
@@ -41,7 +46,7 @@ class PulsePipe:
         """Give a sign of life."""
         if monotonic() - self._beaten >= EVERY_S:
             self._beaten = monotonic()
-            self._write(_BEAT)
+            self._write(_BEAT + self.trouble)
 
     def name(self, owner: str) -> None:
         """Tell the name of this supervisor in the database."""
@@ -49,12 +54,12 @@ class PulsePipe:
 
     def explain(self, reason: str) -> None:
         """Tell why this supervisor ends."""
-        self._write(_REASON + " ".join(reason.split())[:500])
+        self._write(_REASON + reason)
 
     def _write(self, line: str) -> None:
         if self._descriptor is not None:
             with suppress(OSError):  # the keeper is gone, or stands still with a full pipe
-                os.write(self._descriptor, f"{line}\n".encode())
+                os.write(self._descriptor, f"{' '.join(line.split())[:500]}\n".encode())
 
 
 class Heard:
@@ -64,12 +69,13 @@ class Heard:
         owner: name of the supervisor in the database; None before it is told.
         reason: why the supervisor ends; None before it is told.
         begun: whether it has given a sign of life.
+        trouble: why nothing runs; empty if all is well.
     """
 
     def __init__(self, descriptor: int) -> None:
         self.owner: str | None = None
         self.reason: str | None = None
-        self.begun = False
+        self.begun, self.trouble = False, ""
         self._descriptor = descriptor
         self._rest = b""
         self._latest = monotonic()
@@ -96,4 +102,4 @@ class Heard:
             case "r":
                 self.reason = line[1:]
             case _:
-                self.begun = True
+                self.begun, self.trouble = True, line[1:]

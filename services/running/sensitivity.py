@@ -54,10 +54,7 @@ def complete(store: Store, lease: CheckClaim, found: Sequence[Sensitivity]) -> b
 def claim(session: Session, owner: str, refused: Mapping[str, str] = NONE) -> CheckClaim | None:
     """Claim the oldest queued check that no other supervisor is claiming; None if there is none.
 
-    Args:
-        session: of a transaction that writes.
-        owner: the supervisor.
-        refused: why its processes refuse plug-ins, by kind and name; checks that name one stay queued, and tell why.
+    Checks that name a plug-in that the supervisor's processes refuse stay queued, and tell why.
     """
     row = SensitivityRow
     queued = session.execute(select(row.id, row.spec).where(row.state == State.QUEUED).order_by(row.created_at, row.id))

@@ -18,13 +18,8 @@ FORGET_AFTER = timedelta(days=1)
 def heartbeat(session: Session, owner: str, last: datetime | None = None) -> datetime:
     """Record that the supervisor is alive now, with or without work, and return the time of the record.
 
-    Args:
-        session: session of a transaction that writes.
-        owner: the supervisor.
-        last: time of its previous heartbeat; None for the first.
-
     Raises:
-        StoreChanged: the previous heartbeat is missing, so this is not the database that it was written to.
+        StoreChanged: the `last` heartbeat is missing, so this is not the database that it was written to.
     """
     row = SupervisorRow
     noted = update(row).where(row.owner == owner).values(heartbeat_at=now()).returning(row.heartbeat_at)

@@ -79,18 +79,10 @@ OPERATOR = "gaplab"
 
 
 def refuse(session: Session, claim: Claim, request: RequestRow) -> AnswerRow | None:
-    """Answer a request as failed if its forecast exceeds the limits and the spec says to refuse that.
+    """Answer a request as failed if its forecast exceeds the limits and the spec says to refuse that; else return None.
 
-    The controller then counts as tried, and teaches nothing. A person who voids the answer overrules it: the controller
-    is offered, and never refused in this repetition again.
-
-    Args:
-        session: session of a transaction that writes.
-        claim: claim of the repetition that asked.
-        request: request, which no answer counts for.
-
-    Returns:
-        The answer; None if the controller is to be offered.
+    No answer counts for it yet. The controller then counts as tried, and teaches nothing. A person who voids the answer
+    overrules it: the controller is offered, and never refused in this repetition again.
     """
     beyond = (request.safety or {}).get("beyond", ())
     if claim.spec.reality.beyond != "refuse" or not beyond or _overruled(session, request):

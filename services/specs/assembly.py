@@ -32,8 +32,8 @@ from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.rollouts import hardware_of
 from gaplab.services.specs.simulation import Simulation
 
-WARM_ENGINES = 8
-"""Most engines that a process keeps; each keeps worlds."""
+WARM_ENGINES = 4
+"""Most engines that a process keeps; each keeps worlds, of 34 MB each in Bullet. A repetition has two at most."""
 
 
 class HiddenReality:

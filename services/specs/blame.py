@@ -71,8 +71,7 @@ def _places(frame: FrameType) -> tuple[type, str | None]:
 def _plugins(_package: ModuleType | None) -> dict[type | str | None, str]:
     """Return the kind and name of each plug-in, by its class and by its module; of several in a module, the first.
 
-    Args:
-        _package: the package of external plug-ins, another one after each import of them.
+    The package of external plug-ins is another one after each import of them.
     """
     found: dict[type | str | None, str] = {}
     for registry in REGISTRIES.values():

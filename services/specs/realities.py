@@ -39,17 +39,12 @@ def simulated_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine
 
 def physical_reality(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
     """Return a physical reality with every field."""
-    given = spec.reality
-    return ResolvedReality(
-        kind="physical",
+    return ResolvedReality.filled_from(
+        spec.reality,
         engine=None,
         parameters={},
-        bench=given.bench or robot.label,
-        repeats=given.repeats,
-        probes=given.probes or ("never" if spec.iterations == 0 else PHYSICAL_PROBES),
-        samples=given.samples,
-        limits=given.limits,
-        beyond=given.beyond,
+        bench=spec.reality.bench or robot.label,
+        probes=spec.reality.probes or ("never" if spec.iterations == 0 else PHYSICAL_PROBES),
     )
 
 

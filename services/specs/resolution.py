@@ -80,9 +80,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         *budget_violations(budget, strategy, len(spec.tunables), (controllers, simulators), tuner, divisor),
     ]:
         raise InvalidSpec(violations)
-    return ResolvedSpec(
-        priority=spec.priority,
-        max_parallel=spec.max_parallel,
+    return ResolvedSpec.filled_from(
+        spec,
         name=spec.name or _label(strategy, preset),
         iterations=iterations,
         repetitions=spec.repetitions or preset.repetitions,
@@ -90,10 +89,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         controller_optimizer=completed(optimizers, spec.controller_optimizer or spec.optimizer),
         engine=completed(engines, simulated),
         tunables=tuple(with_bounds(ref, robot) for ref in spec.tunables),
-        held_out=spec.held_out,
         reality=physical_reality(spec, robot) if physical else simulated_reality(spec, robot, real, reality_engine),
         budget=budget,
-        seed=spec.seed,
     )
 
 
@@ -153,15 +150,7 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
     """
     shared = shared_fields(spec, SharedSettings.model_fields)
     resolved = resolve_experiment(ExperimentSpec(**shared, strategy=PluginRef(name="random")))
-    return Checked(
-        robot=resolved.robot,
-        controller=resolved.controller,
-        task=resolved.task,
-        engine=resolved.engine,
-        tunables=resolved.tunables,
-        points=spec.points,
-        evaluations=spec.evaluations,
-    )
+    return Checked.filled_from(resolved, points=spec.points, evaluations=spec.evaluations)
 
 
 def is_direct(spec: ExperimentSpec) -> bool:
@@ -196,10 +185,6 @@ def _label(strategy: Strategy, preset: Preset) -> str:
 
 
 def _budget(spec: ExperimentSpec, preset: Preset) -> ResolvedBudget:
-    return ResolvedBudget(
-        preset=spec.budget.preset,
-        controller_evaluations=spec.budget.controller_evaluations or preset.controller_evaluations,
-        selection_evaluations=spec.budget.selection_evaluations or preset.selection_evaluations,
-        simulator_evaluations=spec.budget.simulator_evaluations or preset.simulator_evaluations,
-        reuse_transfer=spec.budget.reuse_transfer,
-    )
+    searches = ("controller_evaluations", "selection_evaluations", "simulator_evaluations")
+    given = {name: getattr(spec.budget, name) or getattr(preset, name) for name in searches}
+    return ResolvedBudget.filled_from(spec.budget, **given)

@@ -1,5 +1,6 @@
 """Database engines, with the settings on which durability and locking depend."""
 
+import re
 import sqlite3
 from typing import Any
 
@@ -20,6 +21,10 @@ PATIENCE_S = 30
 """Longest wait of a transaction for another's lock, in SQLite."""
 
 _INVALID = "the database URL is not valid; write one like sqlite:///gaplab.db or postgresql://user@host/db"
+_PERCENT = "a SQLite URL has no options, and no letter as %41: in its path write ? as %3F and % as %25"
+_MISREAD = re.compile(r"\?|%(00|3\d|[46][1-9a-f]|[57][\da])", re.IGNORECASE)
+"""What a URL means otherwise than a path does: the beginning of options, NUL, and encoded letters and digits."""
+
 _ENCODED = "in a user or a password write @ as %40, : as %3A, / as %2F and % as %25, or set PGPASSWORD instead"
 
 _WAL_IS_SOUND = (3, 51, 3)
@@ -71,6 +76,8 @@ def parse(url: str) -> URL:
         return parsed.set(drivername="postgresql+psycopg")
     if parsed.get_backend_name() not in {"sqlite", "postgresql"}:
         raise StoreUnavailable(f"the database is {parsed.get_backend_name()!r}; it may be sqlite or postgresql")
+    if parsed.get_backend_name() == "sqlite" and _MISREAD.search(url):
+        raise StoreUnavailable(_PERCENT)
     return parsed
 
 

@@ -34,12 +34,7 @@ Source: https://www.postgresql.org/docs/current/libpq-connect.html.
 
 
 def postgres_engine(url: URL, *, answer_s: float | None) -> Engine:
-    """Return an engine of Postgres, without connecting.
-
-    Args:
-        url: with its driver.
-        answer_s: longest time of a statement; None lets statements take any time, as a migration's must.
-    """
+    """Return an engine of Postgres, without connecting; None as `answer_s` lets statements take any time."""
     engine = create_engine(
         url, pool_pre_ping=True, pool_size=10, max_overflow=20, connect_args=_NOTICED, hide_parameters=True
     )

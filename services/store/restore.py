@@ -42,14 +42,10 @@ class Restored:
 
 
 def restore(url: str, source: Path) -> Restored:
-    """Put a backup in the place of the database, which keeps its content under another name.
+    """Put a backup, which stays as it is, in the place of the database, which keeps its content under another name.
 
     The backup is copied, and checked, before anything is replaced. A crash leaves either the former database or the
     restored one under the name.
-
-    Args:
-        url: of the database.
-        source: the backup, which stays as it is.
 
     Raises:
         Unsupported: the database is a Postgres; the message says what restores one.

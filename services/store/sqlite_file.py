@@ -21,6 +21,9 @@ HINT = "end the service and run `gaplab restore BACKUP`"
 
 _DAMAGED = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
 
+LONGEST_PATH, LONGEST_NAME = 504, 247
+"""Bytes of a database's path and name, which are 8 longer for its journal. Source: os_unix.c, and man 5 ext4."""
+
 COMPANIONS = ("-journal", "-wal", "-shm")
 """Endings of the files that SQLite keeps beside a database; the first two hold transactions that are not in it yet."""
 
@@ -29,11 +32,23 @@ def file_of(url: URL) -> Path | None:
     """Return the file of a SQLite URL, at the end of symbolic links; None for Postgres, and for a database in memory.
 
     Its lock, its journals and what a restore replaces are beside this file, whichever link leads to it.
+
+    Raises:
+        StoreUnavailable: the path is too long.
     """
     name = url.database or ""
-    if url.get_backend_name() != "sqlite" or name in {"", ":memory:"} or name.startswith("file:"):
+    if url.get_backend_name() != "sqlite" or name in {"", ":memory:"}:
         return None
-    return Path(os.path.realpath(name))
+    file = Path(os.path.realpath(name))
+    if len(os.fsencode(file)) > LONGEST_PATH or len(os.fsencode(file.name)) > LONGEST_NAME:
+        limits = f"at most {LONGEST_PATH} bytes, and {LONGEST_NAME} of its name"
+        raise StoreUnavailable(f"the path of the database is too long ({limits}): {str(file)[:100]}…")
+    return file
+
+
+def url_of(file: Path) -> str:
+    """Return the URL of a SQLite database, whatever characters its path has."""
+    return URL.create("sqlite", database=str(file)).render_as_string()
 
 
 def identity(file: Path) -> tuple[int, int] | None:

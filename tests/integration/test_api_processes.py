@@ -93,7 +93,10 @@ def test_a_thread_of_a_plug_in_keeps_no_process(
             process.kill()
 
 
-@pytest.mark.parametrize("how", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.release)])
+@pytest.mark.parametrize(
+    "how",
+    [signal.SIGHUP, *(pytest.param(each, marks=pytest.mark.release) for each in (signal.SIGTERM, signal.SIGINT))],
+)
 def test_a_service_migrates_its_database_answers_and_ends_in_order(
     tmp_path: Path, port: int, how: signal.Signals
 ) -> None:

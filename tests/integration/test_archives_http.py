@@ -1,5 +1,6 @@
 """Archives over HTTP and by the command."""
 
+import stat
 from io import BytesIO
 from pathlib import Path
 from typing import IO
@@ -10,6 +11,7 @@ from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
 from gaplab.api.clients.archives import Archives
+from gaplab.api.clients.client import Client
 from gaplab.api.commands import archives as archive_commands
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
@@ -68,6 +70,13 @@ def test_a_study_goes_the_same_way(api: TestClient) -> None:
 @pytest.mark.parametrize("path", ["/experiments/none/export", "/studies/none/export"])
 def test_what_there_is_not_cannot_be_exported(api: TestClient, path: str) -> None:
     assert api.get(path).status_code == 404
+
+
+def test_only_its_owner_can_read_an_archive(url: str, submitted: str, tmp_path: Path) -> None:
+    with Client(url) as client:
+        client.export(submitted, tmp_path / "new.zip")
+
+    assert stat.S_IMODE((tmp_path / "new.zip").stat().st_mode) == 0o600
 
 
 def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: str, tmp_path: Path) -> None:

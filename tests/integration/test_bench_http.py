@@ -147,6 +147,7 @@ def test_an_answer_in_the_journal_is_sent_when_the_driver_starts_again(client: C
     (request,) = client.bench.pending(wait_s=60)
     with Journal(tmp_path / "journal") as journal:
         journal.answer(request.id, {"values": [0.5]})
+    assert (tmp_path / "journal").stat().st_mode & 0o777 == 0o600
     for following in client.requests(journal=tmp_path / "journal"):
         assert following.id != request.id
         break

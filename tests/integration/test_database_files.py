@@ -7,13 +7,14 @@ import shutil
 import sqlite3
 import stat
 from collections.abc import Iterator
+from contextlib import closing
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import text, update
+from sqlalchemy import event, text, update
 
 from gaplab import migrations
 from gaplab.api.app import create_app
@@ -26,6 +27,7 @@ from gaplab.services.running import execution, supervisors
 from gaplab.services.store import guard
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
+from gaplab.services.store.sqlite_file import url_of
 from tests.experiments import some_log, toy
 
 
@@ -230,6 +232,60 @@ def test_only_the_owner_can_open_a_new_database_and_its_journal(tmp_path: Path) 
 
     assert {"new.db", "new.db-journal", "new.db-wal", "new.db-shm"} <= modes.keys()
     assert set(modes.values()) == {0o600}
+
+
+@pytest.mark.parametrize("name", ["50% of?.db", "a%41b.db", "#é b.db", "file:x.db"])
+def test_a_database_has_any_name(tmp_path: Path, name: str) -> None:
+    url = url_of(tmp_path / name)
+
+    migrations.upgrade(url)
+    with Store(url) as store:
+        store.check()
+
+    assert store.file == tmp_path / name
+    assert stat.S_IMODE((tmp_path / name).stat().st_mode) == 0o600
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("what?.db", "write . as %3F"),
+        ("a%41b.db", "and % as %25"),
+        ("%00", "and % as %25"),
+        ("x" * 248, "at most 504 bytes, and 247 of its name"),
+        ("/".join(["x"] * 253), "at most 504 bytes"),
+    ],
+    ids=["options", "letter", "NUL", "name", "path"],
+)
+def test_a_path_that_a_url_or_a_journal_would_change_is_refused(here: Path, path: str, said: str) -> None:
+    with pytest.raises(StoreUnavailable, match=said):
+        migrations.upgrade(f"sqlite:///{path}")
+
+    assert not list(here.iterdir())
+
+
+def test_a_write_that_failed_is_told_until_another_succeeds(sqlite_store: Store, file: Path) -> None:
+    submission.submit_experiment(sqlite_store, toy())
+    with closing(sqlite3.connect(file)) as connection:
+        (pages,) = connection.execute("PRAGMA page_count").fetchone()
+
+    @event.listens_for(sqlite_store._engine, "begin")
+    def fill(connection: Any) -> None:
+        connection.exec_driver_sql(f"PRAGMA max_page_count={pages}")
+
+    sqlite_store.write(lambda session: None)
+    api = TestClient(create_app(sqlite_store))
+    while (refused := api.post("/experiments", json={"robot": "toy_function", "strategy": "random"})).is_success:
+        pass
+    told = api.get("/readyz").json()
+    pages += 1_000
+    room = api.post("/experiments", json={"robot": "toy_function", "strategy": "random"})
+
+    assert refused.status_code == 503
+    assert told["status"] == "degraded"
+    assert "full" in told["warnings"][0]
+    assert room.is_success
+    assert "full" not in api.get("/readyz").text
 
 
 def test_a_database_that_others_can_open_is_warned_about(

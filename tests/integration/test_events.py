@@ -54,7 +54,7 @@ from gaplab.services.store.queries.experiments import insert_experiment
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, some_log, toy
 from tests.integration import test_bench_safety
-from tests.integration.test_bench import compute, fall_silent, measure
+from tests.integration.test_bench import bench, compute, fall_silent, measure
 from tests.waiting import wait_until
 
 DEADLINE_S = 180
@@ -580,6 +580,27 @@ def test_a_poll_may_wait_for_what_comes(sqlite_store: Store) -> None:
     assert [each["kind"] for each in found["items"]] == ["cancelled"]
     assert nothing["items"] == []
     assert nothing["last"] == 2
+
+
+def test_who_waits_for_a_request_looks_at_the_database_when_something_happened(sqlite_store: Store) -> None:
+    id_ = submission.submit_experiment(sqlite_store, bench()).id
+    with (
+        served(sqlite_store) as (url, feed),
+        httpx2.Client(base_url=url, timeout=DEADLINE_S) as http,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        answer = pool.submit(http.get, "/requests?wait_s=60")
+        wait_until(lambda: feed.open == 1)
+        compute(sqlite_store)
+        (request,) = answer.result(DEADLINE_S).json()["items"]
+        taking.take(sqlite_store, request["id"], TakeSpec(operator="o"), FREELY)
+        never = pool.submit(http.get, f"/requests?experiment={id_}&conflicts=true&wait_s=60")
+        wait_until(lambda: feed.open == 1)
+        cancel(sqlite_store, id_)
+        ended = never.result(DEADLINE_S).json()
+
+    assert request["experiment"] == id_
+    assert ended["items"] == []
 
 
 def test_events_of_a_study_are_those_of_its_experiments(sqlite_store: Store) -> None:

@@ -39,7 +39,7 @@ from gaplab.services.store.session import Session, Store
 from gaplab.workers import checkpoints, permits
 from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
-from gaplab.workers.run import Run
+from gaplab.workers.run import Run, stuck
 from tests.fakes import flat, install
 from tests.without_ray import Here, HereRepetitions, HereRun
 
@@ -454,6 +454,15 @@ def test_a_hung_rollout_and_a_hung_step_are_told_but_hardware_takes_as_long_as_i
     assert reason(Pulse(3, True, 1e9, 1e9), permits=object()) is None
     assert "a step took 1001 s; GAPLAB_STEP_LIMIT_S" in str(reason(Pulse(3, False, 0.0, 1_001.0)))
     assert reason(Pulse(3, False, 101.0, 101.0), begun=False) is None
+
+
+def test_it_is_told_that_no_worker_begins() -> None:
+    claim = SimpleNamespace(spec=resolve_experiment(small()), experiment_id="x", number=0)
+    waiting, begun = Run(claim, None), Run(claim, None, begun=True)  # type: ignore[arg-type]
+    waiting.heard_at -= 100.0
+
+    assert "no worker has begun for 1" in stuck([waiting], 90.0)
+    assert stuck([waiting], 1e6) == stuck([waiting, begun], 90.0) == stuck([], 90.0) == ""
 
 
 def test_a_repetition_that_does_nothing_gives_signs_of_life(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,16 +1,23 @@
 """Limits: beyond each there is a problem that names it, and what is within is let in."""
 
+import asyncio
+import sqlite3
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import httpx2
 import pytest
+from fastapi import Request
+from fastapi.responses import JSONResponse
 from fastapi.testclient import TestClient
 from sqlalchemy import update
+from starlette.types import Message, Receive, Scope, Send
 
 from gaplab.api.app import create_app
-from gaplab.api.http.limits import Streams
+from gaplab.api.http.limits import BodyLimit, Streams
 from gaplab.schemas.access import Role
 from gaplab.services.access import create_token
 from gaplab.services.core.errors import LimitReached
@@ -20,8 +27,11 @@ from gaplab.services.settings import Limits, Settings, variable_of
 from gaplab.services.store.models import AttachmentRow, RepetitionRow
 from gaplab.services.store.queries.attachments import UNNAMED_LIVE
 from gaplab.services.store.session import Store
+from gaplab.services.waiting_line import WaitingLine
+from tests.commands import served as served_by
 from tests.experiments import run
 from tests.integration.test_bench import compute
+from tests.waiting import LONGEST_S, wait_until
 
 TOY = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 3}
 STUDY = {
@@ -141,6 +151,90 @@ def test_a_body_has_the_limit_that_is_set(sqlite_store: Store) -> None:
     assert "GAPLAB_MAX_BODY_BYTES" in refused.json()["detail"]
 
 
+def test_bodies_that_do_not_end_share_the_room_for_large_ones() -> None:
+    """Two clients of three send all but the end of their body."""
+    large, small = b"x" * 100_000, b"x" * 1_000
+
+    async def read(scope: Scope, receive: Receive, send: Send) -> None:
+        await JSONResponse(len(await Request(scope, receive).body()))(scope, receive, send)
+
+    async def status(api: BodyLimit, *parts: bytes, leaves: asyncio.Event | None = None) -> Any:
+        """The status of the answer to these parts; with `leaves`, the body does not end, and the client leaves then."""
+        messages = [{"type": "http.request", "body": each, "more_body": True} for each in parts]
+        told: list[Message] = []
+
+        async def receive() -> Message:
+            if messages:
+                return messages.pop(0)
+            if leaves is None:
+                return {"type": "http.request", "body": b"", "more_body": False}
+            await leaves.wait()
+            return {"type": "http.disconnect"}
+
+        async def send(message: Message) -> None:
+            told.append(message)
+
+        scope = {"type": "http", "method": "POST", "path": "/attachments", "headers": []}
+        await api(scope, receive, send)
+        return [each["status"] for each in told if "status" in each]
+
+    async def found() -> Any:
+        api, leaves = BodyLimit(read, most_bytes=1, most_at_once=250_000), asyncio.Event()
+        waiting = [asyncio.create_task(status(api, large, leaves=leaves)) for _ in range(2)]
+        await asyncio.sleep(0)
+        during = [await status(api, large), await status(api, small)]
+        leaves.set()
+        return during, [await each for each in waiting], await status(api, large)
+
+    assert asyncio.run(found()) == ([[503], [200]], [[], []], [200])
+
+
+def test_an_export_waits_for_its_turn_and_is_refused_if_that_does_not_come(sqlite_store: Store) -> None:
+    app = create_app(sqlite_store)
+    app.state.exports = WaitingLine("exports", longest_s=0.0)
+    api = TestClient(app)
+    path = f"/experiments/{api.post('/experiments', json=TOY).json()['id']}/export"
+
+    with app.state.exports.turn():
+        refused = api.get(path)
+
+    assert refused.status_code == 429
+    assert api.get(path).status_code == 200
+
+
+def test_who_waits_for_a_lock_on_the_database_holds_up_no_reader(sqlite_store: Store) -> None:
+    """Another process writes; more requests write than the service has threads."""
+    assert sqlite_store.file
+    app = create_app(sqlite_store)
+    with (
+        served_by(app) as url,
+        httpx2.Client(base_url=url, timeout=LONGEST_S) as http,
+        closing(sqlite3.connect(sqlite_store.file, isolation_level=None)) as other,
+        ThreadPoolExecutor(60) as pool,
+    ):
+        other.execute("BEGIN IMMEDIATE")
+        writes = [pool.submit(http.post, "/experiments", json=TOY) for _ in range(60)]
+        wait_until(lambda: "are writing, and others wait" in http.get("/readyz").text)
+        read = http.get("/experiments")
+        other.execute("ROLLBACK")
+        for each in writes:
+            each.result()
+        room = http.post("/experiments", json=TOY)
+
+    assert read.json()["items"] == []
+    assert room.status_code == 202
+
+
+def test_a_database_that_does_not_answer_is_told_at_once(sqlite_store: Store) -> None:
+    assert sqlite_store.file
+    with closing(sqlite3.connect(sqlite_store.file, isolation_level=None)) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        told = TestClient(create_app(sqlite_store)).get("/readyz")
+
+    assert told.status_code == 503
+    assert "has not answered for 3 s" in told.json()["detail"]
+
+
 def test_streams_are_limited_for_a_token_and_in_all_and_a_closed_one_makes_room() -> None:
     streams = Streams(Limits(streams_per_token=2, streams=3))
     with streams.open("a"), streams.open("a"):
@@ -159,15 +253,16 @@ def test_streams_are_limited_for_a_token_and_in_all_and_a_closed_one_makes_room(
         pass
 
 
-def test_who_waits_for_events_has_a_stream_open_and_who_does_not_wait_has_none(sqlite_store: Store) -> None:
+@pytest.mark.parametrize("path", ["/events/page", "/requests"])
+def test_who_waits_for_news_has_a_stream_open_and_who_does_not_wait_has_none(sqlite_store: Store, path: str) -> None:
     app = create_app(sqlite_store, limits=Limits(streams_per_token=1))
     api = TestClient(app)
     wait = {"wait_s": 0.05}
 
     with app.state.streams.open(None):
-        refused = api.get("/events/page", params=wait)
-        at_once = api.get("/events/page")
-    room = api.get("/events/page", params=wait), api.get("/events/page", params=wait)
+        refused = api.get(path, params=wait)
+        at_once = api.get(path)
+    room = api.get(path, params=wait), api.get(path, params=wait)
 
     assert refused.status_code == 429
     assert "GAPLAB_MAX_STREAMS_PER_TOKEN" in refused.json()["detail"]

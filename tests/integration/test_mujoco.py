@@ -228,6 +228,8 @@ def test_a_robot_of_large_models_keeps_few_of_them(engine: MuJoCo, monkeypatch: 
 
     assert len(models._kept) == 3
     assert [each.world for each in models[worlds]] == worlds
+    models[worlds[:1]]
+    assert len(models._kept) == 3
 
 
 @pytest.mark.release

@@ -16,6 +16,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from ray._common.utils import try_to_create_directory
 from sqlalchemy import select
 
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
@@ -26,6 +27,7 @@ from gaplab.services.experiments import reading, submission
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.running import execution
 from gaplab.services.running.leases import Silences
+from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
 from gaplab.workers import watch
@@ -34,7 +36,7 @@ from gaplab.workers.supervisor import Supervisor
 from tests.experiments import toy
 from tests.integration.test_bench import bench, compute, pending
 from tests.waiting import wait_until
-from tests.without_ray import Here
+from tests.without_ray import Here, Stop
 
 DEADLINE_S = 180
 
@@ -91,13 +93,30 @@ def test_a_ray_that_answers_no_more_or_lost_a_part_is_told_from_one_that_works(m
         watched.cores()
 
 
+def test_a_supervisor_that_waits_for_the_database_says_so_with_its_signs_of_life(sqlite_url: str) -> None:
+    file = Path(sqlite_url.removeprefix("sqlite:///"))
+    heard, told = os.pipe()
+    aside = file.rename(file.with_suffix(".aside"))
+    with Store(sqlite_url) as store, os.fdopen(heard) as lines, os.fdopen(told, "w"):
+        here = Here(store)
+        here.serve(Stop(2), PulsePipe(told))  # type: ignore[arg-type]
+        aside.rename(file)
+        here.serve(Stop(2), PulsePipe(told))  # type: ignore[arg-type]
+        os.write(told, b"end\n")
+        found = list(iter(lines.readline, "end\n"))
+
+    (first, second, *_, last) = (each for each in found if each.startswith("."))
+    assert (first, last) == (".\n", ".\n")
+    assert "the database cannot be used now" in second
+
+
 def test_ray_keeps_its_files_where_only_their_owner_looks_and_removes_them(tmp_path: Path) -> None:
-    with ray_folder() as folder:
-        (folder / "session").mkdir()
-        mode = folder.stat().st_mode & 0o777
+    with ray_folder() as place:
+        try_to_create_directory(place)  # as Ray does
+        mode = place.parent.stat().st_mode & 0o777
 
     assert mode == 0o700
-    assert not folder.exists()
+    assert not place.parent.exists()
 
 
 def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start() -> None:
@@ -108,7 +127,8 @@ def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start()
             folder.mkdir()
             (folder / "lock").touch()
         os.utime(left, (0, 0))
-        with ray_folder(parent) as held:
+        with ray_folder(parent) as place:
+            held = place.parent
             os.utime(held, (0, 0))
             with ray_folder(parent):
                 found = sorted(parent.iterdir())
@@ -123,8 +143,8 @@ def test_a_folder_that_ray_cannot_have_is_told_with_the_remedy() -> None:
 
 
 def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path) -> None:
-    with ray_folder(tmp_path / ("long" * 20)) as folder:
-        assert folder.parent == Path("/tmp")
+    with ray_folder(tmp_path / ("long" * 20)) as place:
+        assert place.parent.parent == Path("/tmp")
 
 
 @pytest.mark.parametrize("how", ["migrated", "replaced", "restored in place"])

@@ -47,6 +47,12 @@ pulse.beat()
 pulse.explain("Ray died on this machine")
 sys.exit(1)
 """
+WAITS = """
+for pulse.trouble in ["disk is full", "", "no worker\\nbegins"]:
+    time.sleep(1.0)
+    pulse.beat()
+time.sleep(1000)
+"""
 LIVES = """
 while True:
     pulse.beat()
@@ -81,7 +87,7 @@ def keep(tmp_path: Path, notes: Path, sqlite_store: Store) -> Iterator[Callable[
     def keep(script: str, **times: float) -> SupervisorProcess:
         (tmp_path / "scripted.py").write_text(BEATING + script)
         root = Path(__file__).parents[2]
-        environment = {"PYTHONPATH": f"{tmp_path}:{root}", "NOTES": str(notes)}
+        environment = {"PYTHONPATH": f"{tmp_path}:{root / 'src'}:{root}", "NOTES": str(notes)}
         environment["GAPLAB_DATABASE_URL"] = f"sqlite:///{sqlite_store.file}"
         given: dict[str, Any] = {"silence": SOON, "store": sqlite_store, "longest_pause_s": 0.1}
         kept.append(SupervisorProcess(environment, module="scripted", **given | times))
@@ -136,6 +142,13 @@ def test_one_that_dies_again_and_again_is_told_with_its_reason(
     wait_until(lambda: "times in a row" in readyz(app).text)
     wait_until(lambda: "exit code 1: Ray died on this machine" in readyz(app).text)
     wait_until(lambda: readyz(app).status_code == 503)
+
+
+def test_one_that_lives_and_runs_nothing_tells_why(keep: Callable[..., SupervisorProcess], app: FastAPI) -> None:
+    app.state.supervisor = keep(WAITS, silence=Silence())
+
+    wait_until(lambda: readyz(app).json().get("detail") == "the supervisor waits: no worker begins")
+    assert readyz(app).status_code == 503
 
 
 @pytest.mark.release

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from gaplab.api.clients.drivers import DriverBroken, Robot, measure
+from gaplab.api.clients.journal import Journal
+from gaplab.api.clients.takes import TakeLost
 from gaplab.schemas.records import SensorsRead
 
 SENSORS = SensorsRead(names=("roll", "height"), units=("rad", "m"), noises=(0.02, 0.005), times_s=(0.5, 1.0, 1.5))
@@ -90,6 +92,26 @@ def test_what_fits_is_told_after_the_last_run(sensors: SensorsRead | None, answe
 
     assert (driver.runs, task.told) == (2, told)
     assert said[-1] == "doubtful: 0.4 is 5 times what was expected; correct a1, or confirm it"
+
+
+@pytest.mark.parametrize(("refused", "kept"), [("Bo has taken it since", []), (None, [(0.4, None)])])
+def test_repeats_are_forgotten_if_somebody_else_may_have_moved_the_robot_meanwhile(
+    refused: str | None, kept: Any
+) -> None:
+    task, said = Task(None), list[str]()
+    journal, left = Journal(), iter([None])
+    journal.repeat("r", 0.4)
+
+    def ask() -> None:
+        if next(left, "lost"):
+            raise TakeLost(refused or "no sign of life")
+
+    task.take = SimpleNamespace(lost=None, refused=refused, ask=ask)
+    task.forget = lambda: journal.forget("r")
+    measure(task, Robot(Driver(0.4)), None, said.append)  # type: ignore[arg-type]
+
+    assert (len(task.noted), task.told, said[-1]) == (1, [], f"stopped: {refused or 'no sign of life'}")
+    assert journal.repeats("r") == kept
 
 
 def test_a_repeat_of_a_journal_whose_readings_do_not_fit_is_measured_again() -> None:

@@ -109,7 +109,7 @@ REFUSED: dict[str, tuple[Callable[[Any], None], str, str]] = {
     "vertices": (
         edit(*BASE, "shape", 4, "shape", "points_m", to=[[0.01 * i, 0.1 * i * i, i**3] for i in range(65)]),
         "/world/bodies/0/shape/4/shape/points_m",
-        "4 to 64 points, not 65",
+        "at most 64 items, not 65",
     ),
     "flat": (
         edit(*BASE, "shape", 4, "shape", "points_m", to=[[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]),
@@ -145,6 +145,7 @@ REFUSED: dict[str, tuple[Callable[[Any], None], str, str]] = {
     "step": (edit(*WORLD, "time_step_s", to=1e-6), "/world/time_step_s", "1e-05 to 0.1"),
     "delay": (edit(*WORLD, "noise", to={"latency_s": 11}), "/world/noise/latency_s", "0 to 10"),
     "bodies": (edit(*WORLD, "bodies", to=[]), "/world/bodies", "1 to 200 bodies"),
+    "joints": (edit(*WORLD, "joints", to=[{}] * 14_000), "/world/joints", "at most 200, not 14,000"),
     "edits": (edit(*WORLD, "origin", to=None), "/world/origin", "no field of a robot file"),
     "version": (edit("format_version", to=2), "/format_version", "at most 1"),
     "name": (edit("name", to="A robot"), "/name", "must match"),
@@ -164,6 +165,16 @@ def test_an_error_names_the_place_and_what_is_permitted(case: str) -> None:
     violations = {violation.pointer: violation.message for violation in caught.value.violations}
     assert message in violations[pointer]
     assert all("tagged-union" not in each and "tuple[" not in each for each in violations)
+
+
+def test_the_first_hundred_violations_are_told() -> None:
+    content = file_of(EVERYTHING).content
+    content["world"]["bodies"] = [{}] * 200
+
+    with pytest.raises(InvalidSpec) as caught:
+        read_robot_file(json.dumps(content))
+
+    assert len(caught.value.violations) == 100
 
 
 def test_a_text_that_is_too_long_or_no_json_is_refused() -> None:

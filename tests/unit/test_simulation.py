@@ -1,11 +1,14 @@
 """What a robot says of a trajectory, and what is made of it."""
 
+import gc
+import weakref
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
@@ -13,7 +16,7 @@ from gaplab.services.core.robots.base import Sensors
 from gaplab.services.core.robots.toy_function import ToyFunction
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
-from gaplab.services.specs.assembly import MeasuredReality, setting, simulated
+from gaplab.services.specs.assembly import WARM_ENGINES, MeasuredReality, edits_of, engine_of, setting, simulated
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.simulation import Simulation
 from tests.experiments import toy
@@ -48,6 +51,31 @@ def test_a_fitness_that_is_not_finite_is_physics_that_failed_in_simulation_and_i
     np.testing.assert_array_equal(fitnesses, np.where(failed, np.nan, expected))
     assert answers.cost.failures == failed.sum()
     assert np.isnan(MeasuredReality(broken, np.empty(0))(genomes[failed[:, 0]][0]).fitness)
+
+
+def test_the_worlds_of_a_simulation_end_with_it_without_the_help_of_the_collector() -> None:
+    simulation = Simulation(ToyFunction(), Analytic(), edits_of(["static_friction"]))
+    world = weakref.ref(simulation.world(np.array([0.5])))
+    assert world() is not None
+
+    gc.disable()
+    try:
+        del simulation
+        assert world() is None
+    finally:
+        gc.enable()
+
+
+def test_a_process_keeps_few_engines() -> None:
+    importing, *refs = (PluginRef(name="mujoco", options={"threads": 1 + number}) for number in range(WARM_ENGINES + 2))
+    engine_of(importing)  # MuJoCo keeps the frames of its first import
+    first = weakref.ref(engine_of(refs[0]))
+
+    for ref in refs[1:]:
+        engine_of(ref)
+
+    gc.collect()
+    assert first() is None
 
 
 class Whole(ToyFunction):

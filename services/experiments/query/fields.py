@@ -118,11 +118,7 @@ def flag(is_set: Condition, meaning: str) -> Field:
 def fitness(experiment: Column, points: Select[Any], value: ColumnElement[Any], meaning: str) -> Field:
     """Return the field of a fitness that is averaged over repetitions; `none` asks for experiments without one.
 
-    Args:
-        experiment: id of the experiment.
-        points: ids of experiments with a fitness, grouped by id.
-        value: fitness of a repetition in these groups.
-        meaning: which fitness it is.
+    `points` selects ids of experiments with a fitness, grouped by id; `value` is that of a repetition in these groups.
     """
 
     def meets(operator: str, wanted: Value) -> Condition:

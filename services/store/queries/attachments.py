@@ -1,12 +1,13 @@
 """Attachments, and the answers that name them."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from datetime import timedelta
 from itertools import chain
 from typing import Any
 
 from sqlalchemy import ScalarSelect, delete, func, select, text
 
+from gaplab.services.core.errors import Violation
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import AnswerRow, AttachmentRow
 from gaplab.services.store.session import Session
@@ -27,6 +28,13 @@ def present(session: Session, names: Collection[str]) -> set[str]:
     return set(session.scalars(select(row.id).where(row.id.in_(names)).with_for_update(read=True, key_share=True)))
 
 
+def missing(session: Session, names: Sequence[str], place: str) -> list[Violation]:
+    """Return a violation for each of the ids, at `place` in a request, that is not stored."""
+    stored = present(session, names)
+    message = "no attachment with this hash is stored; send the file first"
+    return [Violation(f"{place}/{at}", name, message) for at, name in enumerate(names) if name not in stored]
+
+
 def named(session: Session, repetitions: ScalarSelect[int] | None = None) -> set[str]:
     """Return the ids that answers name: all answers, or the answers of some repetitions."""
     chosen = select(AnswerRow.attachments)
@@ -36,13 +44,9 @@ def named(session: Session, repetitions: ScalarSelect[int] | None = None) -> set
 
 
 def remove_unnamed(session: Session, once_named: Collection[str]) -> None:
-    """Remove files that no answer names.
+    """Remove files that no answer names; `once_named` are those that deleted answers named.
 
     A file that no answer has named yet is kept for `UNNAMED_LIVE`, since its answer may be on its way.
-
-    Args:
-        session: session of a transaction that writes.
-        once_named: ids that deleted answers named.
     """
     row = AttachmentRow
     old = row.created_at < moment(session) - UNNAMED_LIVE

@@ -81,13 +81,7 @@ def work_spans(session: Session, experiments: Sequence[str]) -> dict[str, list[t
 
 
 def attempts_of(session: Session, experiment: str, number: int, *, secret: bool = True) -> tuple[AttemptRead, ...]:
-    """Return the attempts at a repetition, by number.
-
-    Args:
-        session: of a transaction.
-        experiment: its id.
-        number: of the repetition.
-        secret: keep what reality's code said about an error to itself.
+    """Return the attempts at a repetition, by number; `secret` leaves out what reality's code said about an error.
 
     Raises:
         NotFound: the experiment has no such repetition.
@@ -97,13 +91,8 @@ def attempts_of(session: Session, experiment: str, number: int, *, secret: bool 
         raise NotFound(f"experiment {experiment!r} has no repetition {number}")
     row = AttemptRow
     return tuple(
-        AttemptRead(
-            number=each.epoch,
-            owner=each.owner,
-            started_at=each.started_at,
-            ended_at=each.ended_at,
-            ending=each.ending,
-            reason=each.reason if secret else each.hidden_reason or each.reason,
+        AttemptRead.filled_from(
+            each, number=each.epoch, reason=each.reason if secret else each.hidden_reason or each.reason
         )
         for each in session.scalars(select(row).where(row.repetition_id == id_).order_by(row.epoch))
     )

@@ -17,12 +17,7 @@ _KINDS = ("selection", "measurement", "tuning", "transfer", "probe")
 
 
 def fresh(delivered: Iterable[Delivered], step: int, parts: int) -> list[Checkpoint]:
-    """Return the delivered parts of the current step that are not stored yet.
-
-    Args:
-        delivered: deliveries, in order.
-        step: place of the current step in the log.
-        parts: number of its stored parts.
+    """Return the delivered parts of the current step, at its place in the log, that follow the stored parts.
 
     Raises:
         Conflict: parts or steps before a delivered part are missing.

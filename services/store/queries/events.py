@@ -40,12 +40,7 @@ _INSERT_ON_POSTGRES = text(
 def note(session: Session, kind: EventKind, experiment: str, repetition: int | None = None, /, **body: Any) -> None:  # noqa: ANN401
     """Add an event to the session's transaction, which stores it at its commit.
 
-    Args:
-        session: session of a transaction that writes.
-        kind: kind of the event.
-        experiment: id of the experiment.
-        repetition: number of the repetition, for an event of a repetition.
-        body: a few JSON values, of which long texts are cut; never reality's parameters.
+    The body has a few JSON values, of which long texts are cut; never reality's parameters.
     """
     short = {name: brief(value) if isinstance(value, str) else value for name, value in body.items()}
     values = {"kind": kind.value, "experiment_id": experiment, "repetition": repetition, "body": short}

@@ -64,16 +64,7 @@ def insert_experiment(
     position: int = 0,
     token: str | None = None,
 ) -> ExperimentRow:
-    """Add an experiment with its repetitions, all QUEUED.
-
-    Args:
-        session: session of a transaction that writes.
-        spec: resolved spec.
-        extent: size of each repetition.
-        study: study that the experiment belongs to.
-        position: position within the study.
-        token: id of the token that submitted it.
-    """
+    """Add an experiment with its repetitions, all QUEUED; `token` is the id of the token that submitted it."""
     experiment = ExperimentRow(
         id=new_id(),
         study_id=study.id if study else None,

@@ -78,15 +78,9 @@ def oldest(
     limit: int,
     states: Collection[RequestState] | None = None,
 ) -> Sequence[RequestRow]:
-    """Return the oldest requests that fulfil conditions.
+    """Return the oldest requests that fulfil conditions, in these states; None for any.
 
     Each state is asked for by itself: an index has the order within a state, so that nothing is sorted but the result.
-
-    Args:
-        session: session of a transaction.
-        conditions: which requests.
-        limit: most requests.
-        states: only requests in these states; None for any.
     """
     row, key = RequestRow, (RequestRow.created_at, RequestRow.id)
     query = select(row).where(*conditions)

@@ -102,18 +102,14 @@ def _simulator(
 ) -> SimulatorRead:
     names, fit = [each["name"] for each in tunables], fit_of(row.fit)
     pairs = intervals(row.parameters, row.lower, row.upper, fit, tunables)
-    return SimulatorRead(
+    return SimulatorRead.filled_from(
+        row,
         repetition=repetition,
-        iteration=row.iteration,
-        rank=row.rank,
         parameters=dict(zip(names, row.parameters, strict=True)),
-        squared_error=row.squared_error,
         error=per_sample(row.squared_error, samples, discrepancy),
         intervals=None if pairs is None else dict(zip(names, map(tuple, pairs.tolist()), strict=True)),
         expected_error=None if fit is None else per_sample(fit.expected_error, samples, discrepancy),
         surprise=None if fit is None else fit.surprise,
-        weight=row.weight,
-        held_out_error=row.held_out_error,
     )
 
 

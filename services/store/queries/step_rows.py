@@ -40,13 +40,7 @@ class StepRows:
         self._measurements: dict[tuple[Key, MeasurementKind], Row] = {}
 
     def add(self, repetition: int, timed: TimedStep, measured_by: str) -> None:
-        """Add a step of a repetition.
-
-        Args:
-            repetition: its id.
-            timed: the step.
-            measured_by: engine or operator of its measurement, if it is one.
-        """
+        """Add a step of a repetition; `measured_by` is the engine or operator of its measurement, if it is one."""
         step, key = timed.step, (repetition, timed.step.iteration)
         columns = self._columns[key]
         columns.update(iteration_columns(step))

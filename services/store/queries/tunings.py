@@ -66,12 +66,7 @@ def intervals(
 ) -> FloatArray | None:
     """Return the 95 % intervals `(p, 2)`, widened if the samples differ more than they should; None without any.
 
-    Args:
-        parameters: of the simulator.
-        lower: lower ends as the tuner gave them; None if it gives none.
-        upper: their upper ends.
-        fit: how well it reproduces the samples; None if it is not known.
-        tunables: of the resolved spec.
+    Lower and upper ends are as the tuner gave them. `fit` says how well the simulator reproduces the samples.
     """
     if lower is None or upper is None:
         return None

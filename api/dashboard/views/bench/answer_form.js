@@ -12,7 +12,7 @@ import { readableName } from "../../lib/format.js";
 import { filesField } from "./files_field.js";
 
 const ASK_MS = 5000;
-const EVALUATE_MS = 60_000;
+const EVALUATE_MS = 600_000;
 
 /** @typedef {{ values: string[], note: string, failed: string, files?: import("./files_field.js").Kept[], traces?: import("./files_field.js").Kept[] }} Draft */
 
@@ -87,6 +87,7 @@ function make(request, view) {
     }
     const measured = recorded.length ? { traces: recorded } : { values };
     const isConfirmed = asked === JSON.stringify(measured);
+    setText(doubt, recorded.length ? "Evaluating the traces…" : "");
     const doubts = isConfirmed ? [] : await doubtsAbout(id, measured, unit);
     asked = JSON.stringify(measured);
     setText(doubt, doubts.length ? `${doubts.join("; ")}. Send ${recorded.length ? "the traces" : "it all the same"}?` : "");
