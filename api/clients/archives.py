@@ -21,11 +21,7 @@ class Archives:
         self._records = records
 
     def export(self, id: str, file: str | Path | IO[bytes]) -> None:
-        """Write a study or an experiment into a file, as one archive.
-
-        Args:
-            id: id of the study or the experiment.
-            file: new file, or an open one.
+        """Write a study or an experiment into a new file or an open one, as one archive.
 
         Raises:
             OSError: the file exists already, or cannot be written.

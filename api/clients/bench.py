@@ -115,26 +115,14 @@ class Bench:
         dry_run: bool = False,
         **details: Unpack[Details],
     ) -> Consequences:
-        """Replace the values of a measurement; return what follows.
+        """Replace the values of an answer that counts; with `dry_run` only return what would follow.
 
-        Args:
-            answer: id of the answer that counts.
-            values: the right values; None if it `failed`.
-            reason: why it is corrected.
-            dry_run: return what would follow, and change nothing.
-            details: `failed`, `readings`, `unit` and `operator`.
+        Permitted details are `failed` (why there are no values), `readings`, `unit` and `operator`.
         """
         return self._after(answer, "corrections", _body(values, details) | {"reason": reason}, dry_run=dry_run)
 
     def void(self, answer: str, *, reason: str, operator: str | None = None, dry_run: bool = False) -> Consequences:
-        """Void a measurement, whose controller is asked for again; return what follows.
-
-        Args:
-            answer: id of the answer that counts.
-            reason: why it is worth nothing.
-            operator: name of the person who voids it.
-            dry_run: return what would follow, and change nothing.
-        """
+        """Void an answer whose controller is then asked for again; with `dry_run` only return what would follow."""
         return self._after(answer, "void", {"reason": reason, "operator": operator}, dry_run=dry_run)
 
     def decide(
@@ -146,17 +134,14 @@ class Bench:
         operator: str | None = None,
         dry_run: bool = False,
     ) -> Consequences:
-        """Let an answer in conflict count, or the other one; with `dry_run` return what would follow alone."""
+        """Let an answer in conflict count, or the other one; with `dry_run` only return what would follow."""
         body = {"counts": counts, "reason": reason, "operator": operator}
         return self._after(answer, "decision", body, dry_run=dry_run)
 
     def reopen(self, id: str, *, reason: str | None = None, operator: str | None = None) -> RequestRead:
         """Offer a request again that was taken too often without an answer.
 
-        Args:
-            id: id of the request.
-            reason: why a take that goes on ends, like "her phone is dead"; left out: none is ended.
-            operator: who ends it.
+        With a `reason`, like "her phone is dead", the `operator` ends a take that goes on.
         """
         path = f"/requests/{segment(id)}"
         if reason is None:

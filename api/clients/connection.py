@@ -125,11 +125,7 @@ class Connection:
     def post(self, kind: type[T], path: str, body: object, *, key: str | None = None) -> T:
         """Return the answer to a POST that may be repeated: with its idempotency key, the service does it only once.
 
-        Args:
-            kind: type of the answer.
-            path: address.
-            body: JSON.
-            key: the key of an earlier try; left out: a new one.
+        The key is that of an earlier try; left out: a new one.
         """
         headers = {"Idempotency-Key": key or uuid4().hex}
         return self.read(kind, self._repeat("POST", path, json=body, headers=headers))

@@ -151,10 +151,9 @@ def measure(task: TakenRequest, robot: Robot, limit_s: float | None, tell: Calla
         DriverBroken: the driver hangs or answers nonsense. If the robot may still move, the take is left to its lease.
         ServiceError: the service refuses the answer, and would refuse the next one.
     """
-    motion, sensors = task.motion, task.sensors
-    limit_s = limit_s or 60.0 + 10.0 * motion.observe_s[-1]
+    limit_s = limit_s or 60.0 + 10.0 * task.motion.observe_s[-1]
     try:
-        _answer(task, lambda: robot.run(motion, task.take, limit_s), sensors, tell)
+        _answer(task, robot, limit_s, tell)
     except ServiceError as error:
         if error.problem.status not in {404, 409}:
             raise
@@ -172,18 +171,16 @@ def measure(task: TakenRequest, robot: Robot, limit_s: float | None, tell: Calla
         tell(f"stopped: {error}")
 
 
-def _answer(
-    task: TakenRequest, run: Callable[[], Any], sensors: SensorsRead | None, tell: Callable[[str], None]
-) -> None:
+def _answer(task: TakenRequest, robot: Robot, limit_s: float, tell: Callable[[str], None]) -> None:
     """Measure the repeats that are missing, and answer."""
-    found = [(value, readings) for value, readings in task.known if not _mistake_of(readings, sensors)]
+    found = [(value, readings) for value, readings in task.known if not _mistake_of(readings, task.sensors)]
     if found:
         tell(f"{len(found)} of {task.repeats} repeats are in the journal already")
     try:
         while len(found) < task.repeats:
             task.take.ask()
-            value, readings = _checked(run())
-            if mistake := _mistake_of(readings, sensors):
+            value, readings = _checked(robot.run(task.motion, task.take, limit_s))
+            if mistake := _mistake_of(readings, task.sensors):
                 raise DriverBroken(f"the driver's run returned {mistake}")
             task.note(value, readings)
             found.append((value, readings))

@@ -1,4 +1,4 @@
-"""The loop of a driver: requests are taken one after the other, and answered once."""
+"""The loop of a driver, which is an operator: requests are taken one after the other, and answered once."""
 
 import socket
 import time
@@ -7,10 +7,10 @@ from functools import cached_property
 from typing import Any
 
 from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
-from gaplab.api.clients.connection import Connection
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
-from gaplab.api.clients.journal import PAUSE_S, Deliveries, Journal, log
-from gaplab.api.clients.motions import DriverMotion, motion_of
+from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final, is_of_gaplab, refuses_sender
+from gaplab.api.clients.journal import PAUSE_S, Journal, log
+from gaplab.api.clients.motions import DriverMotion
 from gaplab.api.clients.records import Records
 from gaplab.api.clients.takes import Take
 from gaplab.schemas.measurements import AnswerRead, AnswerState, RequestRead, RequestState
@@ -21,6 +21,12 @@ WAIT_S = 20.0
 
 _NOT_THIS_ONE = {404, 409, 429}
 """Statuses after which a driver tries the next request: it is deleted, somebody else was faster, or too many ask."""
+
+INVALID = 422
+"""Status of an answer with a mistake, like too few values: what was measured is still good."""
+
+ENDED = 409
+"""Status of an answer to a request that is wanted no more. Any other refusal may come from a service without it."""
 
 
 class TakenRequest:
@@ -42,7 +48,8 @@ class TakenRequest:
         Raises:
             ServiceError: the controller observes while it acts, or the robot has no actuators: run the genome.
         """
-        return motion_of(self._driving.connection, self.id)
+        path = f"/requests/{segment(self.id)}/motion"
+        return self._driving.connection.get(DriverMotion, path, format="json")
 
     @cached_property
     def sensors(self) -> SensorsRead | None:
@@ -71,13 +78,13 @@ class TakenRequest:
     @property
     def known(self) -> list[tuple[float, Any]]:
         """Repeats that an earlier run of the driver measured and journalled, with their readings."""
-        return self._driving.deliveries.journal.repeats(self.id, self._void)[: self.repeats]
+        return self._driving.journal.repeats(self.id, self._void)[: self.repeats]
 
     def note(self, value: float, readings: Any = None) -> None:  # noqa: ANN401 - JSON
         """Journal one repeat, so that a power cut before the last one loses nothing; its errors are those of `tell`."""
         (number,) = numbers_of([value], "/values")
         noted = json_of(readings_of(readings), "/readings")
-        self._driving.deliveries.journal.repeat(self.id, number, noted, self._void)
+        self._driving.journal.repeat(self.id, number, noted, self._void)
 
     @property
     def _void(self) -> list[str]:
@@ -86,7 +93,7 @@ class TakenRequest:
 
     def forget(self) -> None:
         """Forget the repeats that were noted: others may have had the robot meanwhile."""
-        self._driving.deliveries.journal.forget(self.id)
+        self._driving.journal.forget(self.id)
 
     def tell(self, values: float | Sequence[float], readings: Any = None, note: str | None = None) -> AnswerRead:  # noqa: ANN401 - JSON
         """Answer with the value, or the values of all repeats.
@@ -109,12 +116,11 @@ class TakenRequest:
         return self._answer({"failed": str(reason) or type(reason).__name__})
 
     def _answer(self, answer: dict[str, Any]) -> AnswerRead:
-        deliveries = self._driving.deliveries
         given = {name: value for name, value in answer.items() if value is not None} | {"take": self.request.takes}
-        key = deliveries.journal.answer(self.id, given)
+        key = self._driving.journal.answer(self.id, given)
         if self.take.lost:
             self.take.release()
-        answered = deliveries.deliver(self.id, given, key)
+        answered = self._driving.deliver(self.id, given, key)
         self.take.over.set()
         return answered
 
@@ -125,13 +131,12 @@ class Driving:
     def __init__(
         self, connection: Connection, records: Records, journal: Journal, lease_s: float, operator: str | None
     ) -> None:
-        self.connection, self.records = connection, records
+        self.connection, self.records, self.journal = connection, records, journal
         self._lease_s, self._operator = lease_s, operator or socket.gethostname()
-        self.deliveries = Deliveries(connection, journal, self._operator)
 
     def tasks(self, experiment: str | None, bench: str | None) -> Iterator[TakenRequest]:
         """Yield taken requests until the experiment has ended; send first what an earlier run left in the journal."""
-        self.deliveries.send_leftovers()
+        self._send_leftovers()
         while True:
             task = self._next(experiment, bench)
             if task is None:
@@ -139,11 +144,7 @@ class Driving:
                     return
                 continue
             with task.take.kept():
-                try:
-                    yield task
-                finally:
-                    if not task.take.over.is_set():
-                        task.take.release()
+                yield task
 
     def _next(self, experiment: str | None, bench: str | None) -> TakenRequest | None:
         """Take the oldest open request; None if there is none, or others have the bench.
@@ -153,9 +154,10 @@ class Driving:
             UnknownService: what answers is no gaplab of this version.
         """
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": WAIT_S}
-        request = None
+        pause_s = 0.0
         try:
             for request in self.connection.items(Page[RequestRead], "/requests", **parameters):
+                pause_s = PAUSE_S
                 is_free = request.state is RequestState.OPEN and not request.busy
                 if is_free and (taken := self._take(request)):
                     return taken
@@ -163,10 +165,8 @@ class Driving:
             if is_final(error):
                 raise
             log.warning("no answer: %s", error)
-            time.sleep(PAUSE_S)
-            return None
-        if request is not None:
-            time.sleep(PAUSE_S)
+            pause_s = PAUSE_S
+        time.sleep(pause_s)
         return None
 
     def _take(self, request: RequestRead) -> TakenRequest | None:
@@ -184,3 +184,41 @@ class Driving:
             return self.records.experiment(experiment).state.ended
         except (ServiceError, ServiceUnreachable):
             return False
+
+    def _send_leftovers(self) -> None:
+        """Send the answers that an earlier run left in the journal; one that is refused does not stop the others.
+
+        Raises:
+            ServiceError: the service refuses the token of the driver; the answers stay in the journal.
+        """
+        for request, answer, key in self.journal.unsent():
+            try:
+                self.deliver(request, answer, key)
+            except ServiceError as error:
+                if refuses_sender(error):
+                    raise
+                log.error("the answer %s in the journal, to request %s, is refused: %s", answer, request, error)
+
+    def deliver(self, request: str, answer: dict[str, Any], key: str) -> AnswerRead:
+        """Send a journalled answer until the service has it; it stays in the journal if the service never saw it.
+
+        Raises:
+            ServiceError: the service refuses it.
+        """
+        path = f"/requests/{segment(request)}/measurements"
+        while True:
+            try:
+                given = self.connection.post(AnswerRead, path, answer | {"operator": self._operator}, key=key)
+            except ServiceUnreachable as error:
+                log.warning("not sent yet: %s", error)
+            except ServiceError as error:
+                if is_final(error):
+                    status = error.problem.status
+                    if is_of_gaplab(error) and status in {INVALID, ENDED}:
+                        self.journal.sent(key, refused=status == INVALID)
+                    raise
+                log.warning("not taken yet: %s", error)
+            else:
+                self.journal.sent(key)
+                return given
+            time.sleep(PAUSE_S)

@@ -3,18 +3,16 @@
 import json
 import logging
 import os
-import time
 from collections.abc import Iterator, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any, Self
 from uuid import uuid4
 
-from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_of_gaplab, refuses_sender
-from gaplab.schemas.measurements import AnswerRead
-
 log = logging.getLogger("gaplab.driver")
+
+PAUSE_S = 2.0
+"""Pause after a request that the service could not serve."""
 
 
 class Journal:
@@ -76,13 +74,12 @@ class Journal:
         self._write({"request": request, "answer": answer, "key": key})
         return key
 
-    def sent(self, key: str) -> None:
-        """Note that the service has an answer, or does not want it any more."""
-        self._write({"sent": key})
+    def sent(self, key: str, *, refused: bool = False) -> None:
+        """Note that an answer is not sent again: the service has it, or wants none, or refused it for a mistake.
 
-    def refused(self, key: str) -> None:
-        """Note that an answer has a mistake, so that it is not sent again; its repeats may be in another."""
-        self._write({"sent": key, "refused": True})
+        The repeats of one with a mistake may be in another.
+        """
+        self._write({"sent": key, "refused": refused})
 
     def unsent(self) -> list[tuple[str, dict[str, Any], str]]:
         """Return the requests, answers and keys that the service may not have."""
@@ -121,61 +118,3 @@ def _is_line(line: Any) -> bool:  # noqa: ANN401 - JSON
         case {"request": str(), "answer": dict(), "key": str()} | {"request": str(), "forgotten": True}:
             return True
     return isinstance(line, dict) and isinstance(line.get("sent"), str)
-
-
-PAUSE_S = 2.0
-"""Pause after a request that the service could not serve."""
-
-INVALID = 422
-"""Status of an answer with a mistake, like too few values: what was measured is still good."""
-
-ENDED = 409
-"""Status of an answer to a request that is wanted no more. Any other refusal may come from a service without it."""
-
-
-class Deliveries:
-    """The answers of a driver, which is their operator."""
-
-    def __init__(self, connection: Connection, journal: Journal, operator: str) -> None:
-        self.journal = journal
-        self._connection, self._operator = connection, operator
-
-    def send_leftovers(self) -> None:
-        """Send the answers that an earlier run left in the journal; one that is refused does not stop the others.
-
-        Raises:
-            ServiceError: the service refuses the token of the driver; the answers stay in the journal.
-        """
-        for request, answer, key in self.journal.unsent():
-            try:
-                self.deliver(request, answer, key)
-            except ServiceError as error:
-                if refuses_sender(error):
-                    raise
-                log.error("the answer %s in the journal, to request %s, is refused: %s", answer, request, error)
-
-    def deliver(self, request: str, answer: dict[str, Any], key: str) -> AnswerRead:
-        """Send a journalled answer until the service has it; it stays in the journal if the service never saw it.
-
-        Raises:
-            ServiceError: the service refuses it.
-        """
-        path = f"/requests/{segment(request)}/measurements"
-        while True:
-            try:
-                given = self._connection.post(AnswerRead, path, answer | {"operator": self._operator}, key=key)
-            except ServiceUnreachable as error:
-                log.warning("not sent yet: %s", error)
-                time.sleep(PAUSE_S)
-            except ServiceError as error:
-                if error.problem.status < 500 and error.problem.status != 429:
-                    if is_of_gaplab(error) and error.problem.status == INVALID:
-                        self.journal.refused(key)
-                    elif is_of_gaplab(error) and error.problem.status == ENDED:
-                        self.journal.sent(key)
-                    raise
-                log.warning("not taken yet: %s", error)
-                time.sleep(PAUSE_S)
-            else:
-                self.journal.sent(key)
-                return given

@@ -38,11 +38,7 @@ class LifeCycle:
     ) -> ExperimentRead | StudyRead:
         """Extend a completed experiment, or those of a study that are smaller, to these totals.
 
-        Args:
-            id: id of the experiment or the study.
-            iterations: new total; left out: unchanged.
-            repetitions: new total; left out: unchanged.
-            yes: extend it whatever it costs.
+        A total that is left out stays. With `yes`, it is extended whatever it costs.
         """
         totals = {"iterations": iterations, "repetitions": repetitions}
         given = {name: total for name, total in totals.items() if total is not None}

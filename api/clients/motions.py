@@ -1,10 +1,7 @@
 """Motions as drivers get them."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-
-from gaplab.api.clients.connection import Connection, segment
 
 
 @dataclass(frozen=True)
@@ -26,16 +23,3 @@ class DriverMotion:
     targets: tuple[tuple[float, ...], ...]
     observe_s: tuple[float, ...]
     start: Mapping[str, float] = field(default_factory=dict)
-
-
-def motion_of(connection: Connection, request: str) -> DriverMotion:
-    """Return the motion that a request asks for; see `TakenRequest.motion`."""
-    found = json.loads(connection.get_bytes(f"/requests/{segment(request)}/motion", format="json"))
-    return DriverMotion(
-        actuators=tuple(found["actuators"]),
-        units=tuple(found["units"]),
-        times_s=tuple(found["times_s"]),
-        targets=tuple(map(tuple, found["targets"])),
-        observe_s=tuple(found["observe_s"]),
-        start=found["start"],
-    )

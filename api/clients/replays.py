@@ -15,22 +15,17 @@ class Replays:
         self._connection = connection
 
     def replay(self, id: str, /, **choice: int | str | None) -> Replay:
-        """Return the motion of a controller in its simulator and in reality.
+        """Return the motion of a controller of an experiment in its simulator and in reality.
 
-        Args:
-            id: id of an experiment.
-            choice: repetition, iteration (left out: the last that was measured), kind ("transfer" or "sample") and
-                simulator, as in the API.
+        Its choice, as in the API: repetition, iteration (left out: the last that was measured), kind ("transfer" or
+        "sample") and simulator.
         """
         return self._connection.get(Replay, f"/experiments/{segment(id)}/replay", **choice)
 
     def video(self, id: str, file: str | Path, /, **choice: int | str | None) -> Path:
-        """Write a replay into a file with the suffix .gif, .webp or .mp4.
+        """Write a replay into a file with the suffix .gif, .webp or .mp4; missing folders are created.
 
-        Args:
-            id: id of an experiment.
-            file: file to write; missing folders are created.
-            choice: as for `replay`, and width in pixels.
+        The choice is that of `replay`, and `width` in pixels.
         """
         path = Path(file)
         if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
@@ -40,11 +35,7 @@ class Replays:
     def robot_picture(self, name: str, file: str | Path, *, theme: str = "light", width: int = 640) -> Path:
         """Write a picture of a robot of the catalogue, as it stands at the start, into a PNG file.
 
-        Args:
-            name: name of the robot.
-            file: file to write; missing folders are created.
-            theme: `light` or `dark`.
-            width: width in pixels; the height is three quarters of it.
+        The theme is `light` or `dark`. The height is three quarters of the width, in pixels. Missing folders are made.
         """
         path = Path(file)
         if path.suffix.lower() != ".png":

@@ -32,11 +32,7 @@ class Reports:
     ) -> Path:
         """Write the report on a study or an experiment into a file with the suffix .html or .pdf.
 
-        Args:
-            id: id of the study or the experiment.
-            file: file to write; missing folders are created.
-            margin: difference in the unit of fitness within which strategies are equivalent; left out: not tested.
-            margin_of_direct: the same margin as a share of the direct baseline's mean fitness, like 0.03.
+        The margins are those of `verdict`. Missing folders are created.
         """
         path = Path(file)
         if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
@@ -48,11 +44,7 @@ class Reports:
         """Write what an experiment found into a file with the suffix .zip, or a page to print into one with .html.
 
         The zip has the best measured controller with its motion, the tuned simulator with its intervals, the verdict,
-        samples, spec, provenance and the page.
-
-        Args:
-            id: id of the experiment.
-            file: file to write; missing folders are created.
+        samples, spec, provenance and the page. Missing folders are created.
         """
         path = Path(file)
         if (format_ := path.suffix.removeprefix(".").lower()) not in ("zip", "html"):

@@ -29,11 +29,8 @@ class Submission:
     def submit(self, spec: Spec, *, yes: bool = False) -> ExperimentRead | StudyRead:
         """Queue an experiment if the spec names a `strategy`, else a study.
 
-        In a terminal or a notebook, the estimated cost is shown first, and above an hour a person is asked.
-
-        Args:
-            spec: spec of an experiment or a study.
-            yes: submit without estimate and question, whatever it costs.
+        In a terminal or a notebook, the estimated cost is shown first, and above an hour a person is asked. With `yes`,
+        it is submitted without estimate and question, whatever it costs.
 
         Raises:
             NotSubmitted: the person declined.
@@ -56,9 +53,7 @@ class Submission:
     def check(self, spec: Spec | SensitivitySpec, *, every_s: float = 0.5) -> SensitivityRead:
         """Return the effect of the tunables of a spec on fitness; the service computes it if it is not known yet.
 
-        Args:
-            spec: spec of an experiment, a study or a sensitivity check.
-            every_s: interval between requests until the check ends.
+        The spec is one of an experiment, a study or a check, which is asked for every `every_s` seconds until it ends.
         """
         body = {name: value for name, value in _body(spec).items() if name not in NOT_CHECKED}
         check = self._connection.post(SensitivityRead, "/sensitivity", body)

@@ -47,12 +47,8 @@ class Tables:
         """Return the real-world evaluations of an experiment, with a column for each gene.
 
         `repeats` is the number of values whose mean is the fitness, 0 if the measurement failed. `standard_error` is
-        nan without repeats. Without evaluations there are no columns of genes.
-
-        Args:
-            id: id of the experiment.
-            repetition: only this repetition.
-            kind: only "sample" (learned from) or "probe" (only recorded).
+        nan without repeats. Without evaluations there are no columns of genes. With a `repetition` or a `kind`,
+        "sample" (learned from) or "probe" (only recorded), the table has only those.
         """
         samples = self._samples(id, repetition, kind)
         columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at", "standard_error")
@@ -66,13 +62,8 @@ class Tables:
     def readings(self, id: str, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
         """Return what the sensors said in the real-world evaluations of an experiment, with a column for each sensor.
 
-        A row is one time of one evaluation. Values are in the sensors' units, nan where a sensor failed. The table is
-        empty if the robot has no sensors.
-
-        Args:
-            id: id of the experiment.
-            repetition: only this repetition.
-            kind: only "sample" (learned from) or "probe" (only recorded).
+        A row is one time of one evaluation; choose them as for `samples`. Values are in the sensors' units, nan where a
+        sensor failed. The table is empty if the robot has no sensors.
 
         Raises:
             LookupError: the robot or its task is not installed in the service, so the sensors are unknown.
@@ -96,12 +87,8 @@ class Tables:
         `squared_error` is a sum over samples and grows with them; `error` is per sample, in the unit of the
         discrepancy; by default the root mean square. A tuner that gives 95 % intervals has the columns `NAME_lower` and
         `NAME_upper` of each tunable, and one that gives shares of the posterior probability the column `weight`.
-        Without simulators there are no columns of tunables.
-
-        Args:
-            id: id of the experiment.
-            repetition: only this repetition.
-            iteration: only this iteration; 0 is the untuned start.
+        Without simulators there are no columns of tunables. With a `repetition` or an `iteration`, 0 for the untuned
+        start, the table has only those.
         """
         path = f"/experiments/{segment(id)}/simulators"
         filters = {"limit": PAGE, "repetition": repetition, "iteration": iteration}
@@ -114,15 +101,10 @@ class Tables:
         """Return the fitness of each sample in reality, and in simulation before and after it was measured.
 
         The service computes predictions at the first request, and this method waits for it. If there are very many
-        samples, the table has those of the first repetitions.
-
-        Args:
-            id: id of the experiment.
-            every_s: interval between requests until all predictions are computed.
-            timeout_s: longest wait.
+        samples, the table has those of the first repetitions. It asks every `every_s` seconds.
 
         Raises:
-            TimeoutError: it takes longer; computed predictions are kept, so ask again.
+            TimeoutError: it takes longer than `timeout_s`; computed predictions are kept, so ask again.
         """
         pandas_library()
         deadline, path = time.monotonic() + timeout_s, f"/experiments/{segment(id)}/predictions"

@@ -55,13 +55,14 @@ class Take:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Show signs of life from another thread, until the take is over or lost."""
+        """Show signs of life from another thread, until the take is over or lost; then release what is not over."""
         thread = Thread(target=self._beat, name="heartbeat", daemon=True)
         thread.start()
         try:
             yield
         finally:
-            self.over.set()
+            if not self.over.is_set():
+                self.release()
             thread.join()
 
     def release(self) -> None:
@@ -70,13 +71,12 @@ class Take:
         while True:
             try:
                 self._let_go()
+                return
             except (ServiceError, ServiceUnreachable) as error:
                 if is_final(error) or not self._may_overlap:
                     return
                 log.warning("not told yet that others may have had the robot: %s", error)
                 time.sleep(PAUSE_S)
-            else:
-                return
 
     def leave(self) -> None:
         """Leave the take of a robot that may still move to its lease; if others may have it already, tell so."""

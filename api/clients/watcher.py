@@ -26,12 +26,9 @@ class Watcher:
         self._results = results
 
     def watch(self, id: str, *, every_s: float = 1.0, patience_s: float = 60.0) -> Iterator[ExperimentRead | StudyRead]:
-        """Yield a study or an experiment again and again, until it has ended.
+        """Yield a study or an experiment every `every_s` seconds, until it has ended.
 
-        Args:
-            id: id of the study or the experiment.
-            every_s: interval between requests.
-            patience_s: longest time without a service before the error is raised.
+        A service that is away for longer than `patience_s` is an error.
         """
         for snapshot in Snapshots(self._records).of(id, every_s=every_s, patience_s=patience_s):
             if not snapshot.away_s:

@@ -8,10 +8,9 @@ import typer
 from gaplab.api.clients.bench import Details
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import if_found
-from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import BENCH, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import echo, print_json, print_result
+from gaplab.api.commands.json_output import echo, print_result
 from gaplab.api.commands.measured_values import ValuesCommand, numbers
 from gaplab.api.commands.questions import confirmed
 from gaplab.api.commands.request_words import print_safety, request_table, request_words, stored_words
@@ -52,13 +51,8 @@ def requests(
                 return
         read = client.bench.history if all_ else client.bench.pending
         items = read(id, bench=bench)
-        if not items and not as_json:
-            echo(_nothing(client, id, bench, all_=all_))
-            return
-    if as_json:
-        print_json([each.model_dump(mode="json") for each in items])
-    else:
-        console().print(request_table(items, with_answers=all_))
+        nothing = "" if items or as_json else _nothing(client, id, bench, all_=all_)
+    print_result(items, nothing or request_table(items, with_answers=all_), as_json=as_json)
 
 
 @app.command(rich_help_panel=BENCH)
@@ -208,11 +202,9 @@ def _words_of(found: TracesRead) -> str:
 
 
 def _print_request(found: RequestRead, *, as_json: bool) -> None:
-    if as_json:
-        print_json(found)
-        return
-    echo("\n".join(request_words(found)))
-    print_safety(found)
+    print_result(found, *request_words(found), as_json=as_json)
+    if not as_json:
+        print_safety(found)
 
 
 def _nothing(client: Client, experiment: str | None, bench: str | None, *, all_: bool) -> str:

@@ -97,9 +97,8 @@ def _run_study(name: str, spec: dict[str, Any], client: Client, folder: Path, co
 def _submitted(name: str, spec: dict[str, Any], client: Client, console: Console) -> StudyRead:
     if name == SIZED:
         client.wait(client.submit(demo_size.trial(spec), yes=True).id, progress=False)
-        sized = demo_size.sized(spec, client.estimate)
-        spec = sized.spec
-        console.print(f"\n[bold]{name}[/]: {sized.reason}; the study is sized for this machine")
+        spec, reason = demo_size.sized(spec, client.estimate)
+        console.print(f"\n[bold]{name}[/]: {reason}; the study is sized for this machine")
     study = client.submit(spec, yes=True)
     assert isinstance(study, StudyRead)  # the specs name no `strategy`
     return study

@@ -1,7 +1,6 @@
 """The size of the demo's study with physics: what this machine computes while a person waits."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from gaplab.schemas.estimates import EstimateRead
@@ -33,19 +32,6 @@ SEARCHES = ("controller_evaluations", "selection_evaluations", "simulator_evalua
 Spec = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class Sized:
-    """A study that suits a machine.
-
-    Attributes:
-        spec: its spec, with every number, so that it gives the same curves on any machine.
-        reason: the pace of the machine and the expected duration, in words.
-    """
-
-    spec: dict[str, Any]
-    reason: str
-
-
 def trial(spec: Spec) -> dict[str, Any]:
     """Return the spec of a small experiment, from which the service learns the duration of a rollout."""
     same = {name: spec[name] for name in ("robot", "engine", "reality", "seed") if name in spec}
@@ -53,8 +39,11 @@ def trial(spec: Spec) -> dict[str, Any]:
     return same | size | {"name": "how long a rollout takes here"}
 
 
-def sized(spec: Spec, estimate: Callable[[Spec], EstimateRead]) -> Sized:
-    """Return the largest version of the study that is estimated to fit into the time, or the smallest version."""
+def sized(spec: Spec, estimate: Callable[[Spec], EstimateRead]) -> tuple[dict[str, Any], str]:
+    """Return the largest version of the study that is estimated to fit into the time, or the smallest version.
+
+    It has every number, so it gives the same curves on any machine. The text has the machine's pace, and the duration.
+    """
     for smaller in _versions(spec):
         found = estimate(smaller)
         rollout_s = max(cost.seconds_per_rollout for cost in found.engines)
@@ -63,7 +52,7 @@ def sized(spec: Spec, estimate: Callable[[Spec], EstimateRead]) -> Sized:
             break
     pace = f"{rollout_s * 1000:.0f} ms a rollout"
     named = smaller | {"name": f"{spec['name']}, sized for {pace}"}
-    return Sized(named, f"{pace} on {found.cores} cores: about {expected_s:.0f} s")
+    return named, f"{pace} on {found.cores} cores: about {expected_s:.0f} s"
 
 
 def _versions(spec: Spec) -> Iterator[dict[str, Any]]:

@@ -7,11 +7,10 @@ import typer
 from rich.markup import escape
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.progress.text import console
 from gaplab.api.clients.records import experiments_of
 from gaplab.api.commands import completion, tables
 from gaplab.api.commands.app import RESULTS, AsJson, Url, app, connect
-from gaplab.api.commands.json_output import echo, print_json
+from gaplab.api.commands.json_output import print_result
 from gaplab.schemas.differences import SpecDiff, Values
 
 if TYPE_CHECKING:
@@ -37,13 +36,10 @@ def diff(of: Compared, as_json: AsJson = False, url: Url = None) -> None:
     else:
         with connect(url) as client:
             found = client.diff(*of)
-    if as_json:
-        print_json(found)
-        return
     columns = ("setting", *(escape(column.name) for column in found.columns))
     rows = ((escape(each.setting), *map(_cell, each.values)) for each in found.settings)
-    console().print(tables.table(columns, rows) if found.settings else "No setting differs.")
-    echo(_equal(found))
+    shown = tables.table(columns, rows) if found.settings else "No setting differs."
+    print_result(found, shown, _equal(found), as_json=as_json)
 
 
 def _with_files(names: list[str], url: str | None) -> SpecDiff:

@@ -5,8 +5,9 @@ from typing import Any
 
 import typer
 from pydantic import TypeAdapter
+from rich.table import Table
 
-from gaplab.api.clients.progress.text import printable
+from gaplab.api.clients.progress.text import console, printable
 
 
 def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
@@ -14,12 +15,16 @@ def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
     typer.echo(printable(text), err=err, nl=nl)
 
 
-def print_result(value: object, text: str, *, as_json: bool) -> None:
-    """Print the value as JSON, or the text for people."""
+def print_result(value: object, *shown: str | Table, as_json: bool) -> None:
+    """Print the value as JSON, or for people the lines and tables that show it."""
     if as_json:
         print_json(value)
-    else:
-        echo(text)
+        return
+    for each in shown:
+        if isinstance(each, Table):
+            console().print(each)
+        else:
+            echo(each)
 
 
 def print_json(value: object, *, line: bool = False) -> None:

@@ -5,10 +5,9 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from gaplab.api.clients.progress.text import console
 from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands.app import KEEPING, RESULTS, AsJson, Id, Url, app, connect
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import print_result
 from gaplab.api.commands.questions import demand_yes
 from gaplab.api.commands.tables import table
 from gaplab.schemas.records import StudyRead
@@ -93,12 +92,10 @@ def list_views(context: typer.Context, as_json: AsJson = False, url: Url = None)
         return
     with connect(url) as client:
         found = client.views()
-    if as_json:
-        print_json(found)
-        return
     rows = [(escape(view.name), view.shows, escape(view.query or "all"), view.sort) for view in found]
     columns = ("name", "shows", "query", "sort")
-    console().print(table(columns, rows) if found else "No views yet; `gaplab views save NAME --query Q` saves one.")
+    shown = table(columns, rows) if found else "No views yet; `gaplab views save NAME --query Q` saves one."
+    print_result(found, shown, as_json=as_json)
 
 
 @views.command()

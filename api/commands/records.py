@@ -39,11 +39,8 @@ def list_(
         raise typer.BadParameter("a saved view says what it lists; leave it out", param_hint="--experiments")
     with connect(url) as client:
         newest = _of_view(client, view, query, limit) if view else _newest(client, query, limit, alone=experiments)
-    if as_json:
-        print_json(newest)
-        return
     nothing = "Nothing fits." if view or query else "Nothing yet; `gaplab submit` starts something."
-    console().print(tables.overview(newest) if newest else nothing)
+    print_result(newest, tables.overview(newest) if newest else nothing, as_json=as_json)
 
 
 @app.command(rich_help_panel=RESULTS)

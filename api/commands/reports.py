@@ -10,7 +10,7 @@ from gaplab.api.clients.reports import FORMATS
 from gaplab.api.commands.app import BENCH, RESULTS, AsJson, ExperimentId, Id, Url, app, connect
 from gaplab.api.commands.comparisons import MarginOption, margins
 from gaplab.api.commands.figures import named_option
-from gaplab.api.commands.json_output import echo, print_json, print_result
+from gaplab.api.commands.json_output import echo, print_result
 from gaplab.schemas.replays import ReplayWorld
 
 
@@ -34,12 +34,8 @@ def report(
     with connect(url) as client:
         verdict = client.verdict(id, margin=width, margin_of_direct=share)
         files = [client.reports.save(id, file, margin=width, margin_of_direct=share) for file in save or []]
-    if as_json:
-        print_json(verdict)
-    else:
-        echo(verdict.headline)
-        for sentence in () if files else verdict.sentences:
-            echo(f"- {sentence}")
+    sentences = () if files else verdict.sentences
+    print_result(verdict, verdict.headline, *(f"- {each}" for each in sentences), as_json=as_json)
     for file in files:
         echo(f"Wrote {file}.", err=as_json)
 
@@ -90,11 +86,8 @@ def replay(
         choice = dict(map(named_option, options or []))
         found = client.replay(id, **choice)
         file = client.video(id, save, **choice) if save else None
-    if as_json:
-        print_json(found)
-    else:
-        for name, world in (("in its simulator", found.simulation), ("in reality", found.reality)):
-            echo(f"{name}: {_told(world, found.unit)}")
+    worlds = (("in its simulator", found.simulation), ("in reality", found.reality))
+    print_result(found, *(f"{name}: {_told(world, found.unit)}" for name, world in worlds), as_json=as_json)
     if file:
         echo(f"Wrote {file}.", err=as_json)
 

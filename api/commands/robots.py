@@ -13,7 +13,7 @@ from rich.table import Table
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import echo, print_json, print_result
+from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.tables import minute
 from gaplab.schemas.mistakes import sentence
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
@@ -66,10 +66,7 @@ def import_file(  # noqa: PLR0913, PLR0917 - each is an option of the command
     try:
         imported = _imported(file, chosen)
     except InvalidRobot as error:
-        echo(f"gaplab: {file} cannot be imported:", err=True)
-        for reason in error.reasons:
-            echo(f"  - {reason}", err=True)
-        raise typer.Exit(Exit.INVALID) from error
+        raise CommandError("\n  - ".join([f"{file} cannot be imported:", *error.reasons]), Exit.INVALID) from error
     written = output or Path(f"{imported.robot.name}.json")
     if written.exists() and not force:
         raise FileExistsError(None, "a file of this name is there already; --force replaces it", str(written))
@@ -199,11 +196,9 @@ def list_(as_json: AsJson = False, url: Url = None) -> None:
     """List the robots from files that the service has, the newest of a name first."""
     with connect(url) as client:
         found = client.robots()
-    if as_json:
-        print_json(found)
-        return
     table = Table("name", "sha256", "bodies", "actuators", "kg", "file", "stored", box=None)
     for each in found:
         size = str(each.bodies), str(each.actuators), f"{each.mass_kg:.4g}"
         table.add_row(escape(each.name), each.sha256[:12], *size, escape(each.file or "-"), minute(each.created_at))
-    console().print(table if found else "No robot is stored; `gaplab robot add FILE` stores one.")
+    shown = table if found else "No robot is stored; `gaplab robot add FILE` stores one."
+    print_result(found, shown, as_json=as_json)

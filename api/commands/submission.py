@@ -15,7 +15,7 @@ from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import echo, print_json
+from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.api.commands.questions import keyboard
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import State
@@ -44,12 +44,10 @@ def submit(
             _print_estimate(client.estimate(content), as_json=as_json)
             return
         record = submit_confirmed(client, content, yes=yes)
-        if not as_json:
-            echo(record.id)
+        if not (as_json and watch):
+            print_result(record, record.id, as_json=as_json)
         if watch:
             _watch(client, record.id, as_json=as_json)
-    if as_json and not watch:
-        print_json(record)
 
 
 def submit_confirmed(client: Client, spec: Mapping[str, Any], *, yes: bool) -> Record:
@@ -89,14 +87,10 @@ def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> Non
     """Check the tunables of a spec: whether they change fitness, how much, and how smoothly."""
     with connect(url) as client:
         check = client.check(read_spec(spec))
-    if as_json:
-        print_json(check)
+    if as_json or check.state is State.COMPLETED:
+        print_result(check, tables.sensitivity(check), *check.warnings, as_json=as_json)
     if check.state is not State.COMPLETED:
         raise CommandError(f"the check {check.id} ended as {check.state}: {check.reason}", Exit.FAILED)
-    if not as_json:
-        console().print(tables.sensitivity(check))
-        for warning in check.warnings:
-            echo(warning)
 
 
 def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  # noqa: ANN401 - those of `show`
@@ -106,10 +100,7 @@ def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  
     except KeyboardInterrupt:
         msg = f"the service continues with it; `gaplab watch {id}` shows the progress again"
         raise CommandError(msg, Exit.INTERRUPTED) from None
-    if as_json:
-        print_json(record)
-    else:
-        echo(f"{record.name}: {state_text(record)}; {counts(record.progress)}.")
+    print_result(record, f"{record.name}: {state_text(record)}; {counts(record.progress)}.", as_json=as_json)
     for reason in sorted({reason for experiment in experiments_of(record) for reason in experiment.reasons}):
         echo(f"  {reason}", err=True)
     print_warnings(record)

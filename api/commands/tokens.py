@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import OTHERS, AsJson, app
-from gaplab.api.commands.json_output import echo, print_json, print_result
+from gaplab.api.commands.json_output import echo, print_result
 from gaplab.api.commands.tables import minute, table
 from gaplab.schemas.access import Role, TokenRead
 from gaplab.services.settings import Settings
@@ -38,11 +37,9 @@ def create(
     migrate(Settings.from_environment().database_url, only_new=True)  # an older service may run on an existing one
     with _store() as store:
         made = access.create_token(store, role, name)
-    if as_json:
-        print_json({"token": made.token, "secret": made.secret})
-        return
-    echo(f"{made.token.id} ({made.token.name}, {role.value}); this is shown once, for GAPLAB_TOKEN:", err=True)
-    echo(made.secret)
+    if not as_json:
+        echo(f"{made.token.id} ({made.token.name}, {role.value}); this is shown once, for GAPLAB_TOKEN:", err=True)
+    print_result({"token": made.token, "secret": made.secret}, made.secret, as_json=as_json)
 
 
 @tokens.command("list")
@@ -52,11 +49,9 @@ def list_(as_json: AsJson = False) -> None:
 
     with _store() as store:
         found = access.list_tokens(store)
-    if as_json:
-        print_json(found)
-        return
     columns = ("id", "name", "role", "created", "last used", "revoked")
-    console().print(table(columns, map(_row, found)) if found else "No tokens yet; `gaplab token create` makes one.")
+    shown = table(columns, map(_row, found)) if found else "No tokens yet; `gaplab token create` makes one."
+    print_result(found, shown, as_json=as_json)
 
 
 @tokens.command()

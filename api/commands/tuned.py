@@ -13,7 +13,7 @@ from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, lines_of
 from gaplab.api.commands.app import RESULTS, AsJson, ExperimentId, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import echo, print_json
+from gaplab.api.commands.json_output import echo, print_result
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.results import SimulatorRead
 from gaplab.services.core.errors import InvalidRobot
@@ -59,15 +59,9 @@ def simulator(
     try:
         written, *distances_m = _written(id, spec, best, (output, original), partial=partial)
     except InvalidRobot as error:
-        echo(f"gaplab: {output} was not written:", err=True)
-        for reason in error.reasons:
-            echo(f"  - {reason}", err=True)
-        raise typer.Exit(Exit.INVALID) from error
-    if as_json:
-        print_json(_facts(output, best, written, distances_m))
-    else:
-        for line in _lines(output, best, written, distances_m):
-            echo(line)
+        raise CommandError("\n  - ".join([f"{output} was not written:", *error.reasons]), Exit.INVALID) from error
+    found = output, best, written, distances_m
+    print_result(_facts(*found), *_lines(*found), as_json=as_json)
 
 
 def _written(
@@ -179,12 +173,8 @@ def try_tunables(
     """
     with connect(url) as client:
         tried = list(_tried(client, id, further or FURTHER))
-    if as_json:
-        print_json(tried)
-        return
-    for each in tried:
-        error = f"{each['error'] or nan:.3g} {each['unit']}"
-        echo(f"{error} with {each['added']}, by {each['tuner']}: {each['experiment']}")
+    line = "{:.3g} {unit} with {added}, by {tuner}: {experiment}"
+    print_result(tried, *(line.format(each["error"] or nan, **each) for each in tried), as_json=as_json)
 
 
 def _tried(client: Client, id: str, further: Sequence[str]) -> Iterator[dict[str, Any]]:

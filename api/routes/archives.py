@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
 
-from gaplab.api.http.dependencies import Confirmation, Id, LimitedDep, StoreDep, of_app
+from gaplab.api.http.dependencies import Id, LimitedDep, StoreDep, of_app
 from gaplab.api.http.problems import Responses, documented
+from gaplab.api.routes.studies import Confirming
 from gaplab.schemas.archives import ImportRead
 from gaplab.services import archives
 from gaplab.services.archives import Archive
@@ -59,7 +60,7 @@ def export_study(id: Id, store: StoreDep, line: LineDep) -> Response:
     openapi_extra={"requestBody": {"required": True, "content": {MEDIA_TYPE: _BINARY}}},
 )
 def import_archive(
-    store: StoreDep, admitted: LimitedDep, query: Annotated[Confirmation, Query()], request: Request, response: Response
+    store: StoreDep, admitted: LimitedDep, query: Confirming, request: Request, response: Response
 ) -> ImportRead:
     """Store all of an exported archive, or nothing.
 

@@ -44,6 +44,12 @@ from gaplab.services.store.session import Store
 
 router = APIRouter(prefix="/requests", tags=["bench"])
 
+TakeBody = Annotated[TakeSpec, Body(openapi_examples=TakeSpec.EXAMPLES)]
+Holder = Annotated[HolderSpec, Body(openapi_examples=HolderSpec.EXAMPLES)]
+Release = Annotated[ReleaseSpec, Body(openapi_examples=ReleaseSpec.EXAMPLES)]
+Measurement = Annotated[MeasurementSpec, Body(openapi_examples=MeasurementSpec.EXAMPLES)]
+Traces = Annotated[TracesSpec, Body(openapi_examples=TracesSpec.EXAMPLES)]
+
 _NEWS = frozenset(EventKind) - frozenset(
     {EventKind.SELECTED, EventKind.MEASURED, EventKind.TUNED, EventKind.TRANSFERRED, EventKind.PROBED}
 )
@@ -140,29 +146,19 @@ def read_motion(id: Id, query: Annotated[MotionQuery, Query()], store: StoreDep)
 
 
 @router.post("/{id}/take", summary="Take a request", responses=documented(404, 409, 413, 415, 422))
-def take_request(
-    id: Id,
-    spec: Annotated[TakeSpec, Body(openapi_examples=TakeSpec.EXAMPLES)],
-    store: StoreDep,
-    admitted: AdmissionDep,
-    response: Response,
-) -> RequestRead:
+def take_request(id: Id, spec: TakeBody, store: StoreDep, admitted: AdmissionDep, response: Response) -> RequestRead:
     """Take a request: nobody else can take it, or another of its bench, until the take ends or runs out."""
     return once_answered(taking.take(store, id, spec, admitted), response)
 
 
 @router.post("/{id}/heartbeat", summary="Keep a request", responses=documented(404, 409, 413, 415, 422))
-def keep_request(
-    id: Id, holder: Annotated[HolderSpec, Body(openapi_examples=HolderSpec.EXAMPLES)], store: StoreDep
-) -> RequestRead:
+def keep_request(id: Id, holder: Holder, store: StoreDep) -> RequestRead:
     """Extend a take by its lease."""
     return taking.heartbeat(store, id, holder)
 
 
 @router.post("/{id}/release", summary="Release a request", responses=documented(404, 409, 413, 415, 422))
-def release_request(
-    id: Id, spec: Annotated[ReleaseSpec, Body(openapi_examples=ReleaseSpec.EXAMPLES)], store: StoreDep
-) -> RequestRead:
+def release_request(id: Id, spec: Release, store: StoreDep) -> RequestRead:
     """End a take without an answer; with `operator` and `reason` that of somebody else, whose phone is dead."""
     return taking.release(store, id, spec)
 
@@ -181,12 +177,7 @@ def reopen_request(id: Id, store: StoreDep) -> RequestRead:
     responses=documented(404, 409, 413, 415, 422, 429),
 )
 def answer_request(
-    id: Id,
-    spec: Annotated[MeasurementSpec, Body(openapi_examples=MeasurementSpec.EXAMPLES)],
-    store: StoreDep,
-    admitted: AdmissionDep,
-    request: Request,
-    response: Response,
+    id: Id, spec: Measurement, store: StoreDep, admitted: AdmissionDep, request: Request, response: Response
 ) -> AnswerRead:
     """Store what was measured, or why nothing could be. An answer that is in conflict with another one is kept too.
 
@@ -198,20 +189,13 @@ def answer_request(
 
 
 @router.post("/{id}/doubts", summary="Check an answer", responses=documented(404, 413, 415, 422))
-def check_answer(
-    id: Id, spec: Annotated[MeasurementSpec, Body(openapi_examples=MeasurementSpec.EXAMPLES)], store: StoreDep
-) -> DoubtsRead:
+def check_answer(id: Id, spec: Measurement, store: StoreDep) -> DoubtsRead:
     """Say what is unlikely about an answer before it is given, and store nothing."""
     return doubts.read(store, id, spec)
 
 
 @router.post("/{id}/traces", summary="Evaluate traces", responses=documented(404, 409, 413, 415, 422, 429))
-def evaluate_traces(
-    id: Id,
-    spec: Annotated[TracesSpec, Body(openapi_examples=TracesSpec.EXAMPLES)],
-    store: StoreDep,
-    process: RolloutProcessDep,
-) -> TracesRead:
+def evaluate_traces(id: Id, spec: Traces, store: StoreDep, process: RolloutProcessDep) -> TracesRead:
     """Compute fitness and readings from the recorded motion of the base, and store nothing.
 
     A trace is a CSV file with the columns `time_s`, `x`, `y`, `z` (metres, z upwards from the ground) and `qx`, `qy`,

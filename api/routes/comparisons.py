@@ -24,15 +24,12 @@ router = APIRouter(tags=["curves"])
 Evaluations = Annotated[int | None, Field(ge=0, le=1_000)]
 Width = Annotated[float | None, Field(gt=0, le=1e6, allow_inf_nan=False)]
 
-_TABLE = {"schema": {"type": "string"}, "example": "first,first_name,second,second_name,from_evaluations,…\n"}
-_TABLES: Responses = {
-    200: {
-        "content": {
-            "text/csv": _TABLE,
-            "application/x-latex": {"schema": {"type": "string"}, "example": "\\begin{table}…"},
-        }
-    }
+_TEXT = {"type": "string"}
+_CONTENT = {
+    "text/csv": {"schema": _TEXT, "example": "first,first_name,second,second_name,from_evaluations,…\n"},
+    "application/x-latex": {"schema": _TEXT, "example": "\\begin{table}…"},
 }
+_TABLES: Responses = {200: {"content": _CONTENT}}
 
 
 class MarginQuery(Parameters):

@@ -19,16 +19,17 @@ class Rehearsal(Parameters):
     dry_run: bool = Field(default=False, description="only say what would follow")
 
 
+Rehearsing = Annotated[Rehearsal, Query()]
+Correction = Annotated[CorrectionSpec, Body(openapi_examples=CorrectionSpec.EXAMPLES)]
+Void = Annotated[VoidSpec, Body(openapi_examples=VoidSpec.EXAMPLES)]
+Decision = Annotated[ConflictSpec, Body(openapi_examples=ConflictSpec.EXAMPLES)]
+
+
 @router.post(
     "/measurements/{id}/corrections", summary="Correct a measurement", responses=documented(404, 409, 413, 415, 422)
 )
 def correct_measurement(
-    id: Id,
-    spec: Annotated[CorrectionSpec, Body(openapi_examples=CorrectionSpec.EXAMPLES)],
-    query: Annotated[Rehearsal, Query()],
-    store: StoreDep,
-    admitted: AdmissionDep,
-    response: Response,
+    id: Id, spec: Correction, query: Rehearsing, store: StoreDep, admitted: AdmissionDep, response: Response
 ) -> Consequences:
     """Replace the values that count. What was computed from them is computed again; the old steps stay readable."""
     return once_answered(corrections.correct(store, id, spec, admitted, dry_run=query.dry_run), response)
@@ -36,12 +37,7 @@ def correct_measurement(
 
 @router.post("/measurements/{id}/void", summary="Void a measurement", responses=documented(404, 409, 413, 415, 422))
 def void_measurement(
-    id: Id,
-    spec: Annotated[VoidSpec, Body(openapi_examples=VoidSpec.EXAMPLES)],
-    query: Annotated[Rehearsal, Query()],
-    store: StoreDep,
-    admitted: AdmissionDep,
-    response: Response,
+    id: Id, spec: Void, query: Rehearsing, store: StoreDep, admitted: AdmissionDep, response: Response
 ) -> Consequences:
     """Say that the values are worth nothing, and ask for the controller again."""
     return once_answered(corrections.void(store, id, spec, admitted, dry_run=query.dry_run), response)
@@ -51,12 +47,7 @@ def void_measurement(
     "/measurements/{id}/decision", summary="Decide about a conflict", responses=documented(404, 409, 413, 415, 422)
 )
 def decide_measurement(
-    id: Id,
-    spec: Annotated[ConflictSpec, Body(openapi_examples=ConflictSpec.EXAMPLES)],
-    query: Annotated[Rehearsal, Query()],
-    store: StoreDep,
-    admitted: AdmissionDep,
-    response: Response,
+    id: Id, spec: Decision, query: Rehearsing, store: StoreDep, admitted: AdmissionDep, response: Response
 ) -> Consequences:
     """Let an answer in conflict count in place of the other, or dismiss it."""
     return once_answered(corrections.decide(store, id, spec, admitted, dry_run=query.dry_run), response)

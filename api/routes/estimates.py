@@ -2,12 +2,13 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body
+from fastapi import APIRouter
 
 from gaplab.api.http.dependencies import LimitsDep, StoreDep, of_app
 from gaplab.api.http.problems import Responses, documented
+from gaplab.api.routes.experiments import Experiment
+from gaplab.api.routes.studies import Study
 from gaplab.schemas.estimates import EstimateRead
-from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments import estimates
 
 _experiment = APIRouter(prefix="/experiments", tags=["experiments"])
@@ -20,12 +21,7 @@ _RESPONSES: Responses = documented(413, 415, 422)
 
 
 @_study.post("/estimate", summary="Estimate a study", response_description=_COST, responses=_RESPONSES)
-def estimate_study(
-    spec: Annotated[StudySpec, Body(openapi_examples=StudySpec.EXAMPLES)],
-    store: StoreDep,
-    limits: LimitsDep,
-    cores: CoresDep,
-) -> EstimateRead:
+def estimate_study(spec: Study, store: StoreDep, limits: LimitsDep, cores: CoresDep) -> EstimateRead:
     """Check a study as on submission, and return its rollouts and the time they take here; nothing is stored.
 
     A reader's token suffices. The seconds per rollout are those that this service measured in its newest experiments
@@ -35,16 +31,9 @@ def estimate_study(
 
 
 @_experiment.post("/estimate", summary="Estimate an experiment", response_description=_COST, responses=_RESPONSES)
-def estimate_experiment(
-    spec: Annotated[ExperimentSpec, Body(openapi_examples=ExperimentSpec.EXAMPLES)],
-    store: StoreDep,
-    limits: LimitsDep,
-    cores: CoresDep,
-) -> EstimateRead:
+def estimate_experiment(spec: Experiment, store: StoreDep, limits: LimitsDep, cores: CoresDep) -> EstimateRead:
     """Check an experiment as on submission, and return its rollouts and the time they take here; nothing is stored."""
     return estimates.estimate(store, spec, limits=limits, cores=cores)
 
 
-router = APIRouter()
-router.include_router(_study)
-router.include_router(_experiment)
+router = APIRouter(routes=_study.routes + _experiment.routes)

@@ -7,20 +7,9 @@ from pydantic import Field
 
 from gaplab.api.http import conditional, links
 from gaplab.api.http.attachments import attachment
-from gaplab.api.http.dependencies import (
-    AdmissionDep,
-    CallerDep,
-    Confirmation,
-    Id,
-    Paging,
-    Parameters,
-    Revealing,
-    StoreDep,
-    created,
-)
+from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Id, Paging, Parameters, StoreDep, created
 from gaplab.api.http.problems import Responses, documented
-from gaplab.api.routes.studies import RecordFilter
-from gaplab.schemas.editing import Edit
+from gaplab.api.routes.studies import Confirming, EditBody, RecordFilter, RevealingQuery
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.records import (
@@ -39,6 +28,7 @@ from gaplab.services.results.misfit import misfit, misfit_csv
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
 
+Experiment = Annotated[ExperimentSpec, Body(openapi_examples=ExperimentSpec.EXAMPLES)]
 Repetition = Annotated[
     int | None, Field(ge=0, le=1_000_000, description="number of a repetition, from 0; left out: all")
 ]
@@ -91,12 +81,7 @@ class SimulatorFilter(Paging):
     responses={202: links.leading_to(*links.FROM_EXPERIMENT), **documented(404, 413, 415, 422, 429)},
 )
 def submit_experiment(
-    spec: Annotated[ExperimentSpec, Body(openapi_examples=ExperimentSpec.EXAMPLES)],
-    store: StoreDep,
-    admitted: AdmissionDep,
-    query: Annotated[Confirmation, Query()],
-    request: Request,
-    response: Response,
+    spec: Experiment, store: StoreDep, admitted: AdmissionDep, query: Confirming, request: Request, response: Response
 ) -> ExperimentRead:
     """Queue an experiment. Whatever the spec leaves out has the paper's value."""
     done = submission.admit_experiment(store, spec, query.given(admitted))
@@ -121,9 +106,7 @@ def list_experiments(store: StoreDep, query: Annotated[ExperimentFilter, Query()
     response_description="State, progress, time left",
     responses=conditional.CACHED | documented(404, 422),
 )
-def read_experiment(
-    id: Id, store: StoreDep, caller: CallerDep, request: Request, query: Annotated[Revealing, Query()]
-) -> Response:
+def read_experiment(id: Id, store: StoreDep, caller: CallerDep, request: Request, query: RevealingQuery) -> Response:
     """Return an experiment with its resolved spec; reality's parameters are null until it has ended."""
     experiment = with_sensors(reading.read_experiment(store, id, reveal=query.permitted(caller)))
     return conditional.tagged(request, experiment, experiment.edits)
@@ -137,15 +120,10 @@ def read_experiment(
     responses=conditional.TAGGED | documented(404, 412, 413, 415, 422, 428),
 )
 def edit_experiment(
-    id: Id,
-    edit: Annotated[Edit, Body(openapi_examples=Edit.EXAMPLES)],
-    store: StoreDep,
-    request: Request,
-    if_match: conditional.IfMatch = None,
+    id: Id, edit: EditBody, store: StoreDep, request: Request, if_match: conditional.IfMatch = None
 ) -> Response:
     """Change its name, notes or tags. `If-Match` names the `ETag` of what you edit; progress does not invalidate it."""
-    expected = conditional.starting_from(if_match)
-    experiment = editing.edit_experiment(store, id, edit, starting_from=expected)
+    experiment = editing.edit_experiment(store, id, edit, starting_from=conditional.starting_from(if_match))
     return conditional.tagged(request, experiment, experiment.edits)
 
 

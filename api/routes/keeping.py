@@ -88,6 +88,4 @@ def delete_study(id: Id, store: StoreDep, deleter: DeleterDep) -> DeletionRead:
     return deletion.delete_study(store, id, deleter)
 
 
-router = APIRouter()
-router.include_router(_experiment)
-router.include_router(_study)
+router = APIRouter(routes=_experiment.routes + _study.routes)

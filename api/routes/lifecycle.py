@@ -2,16 +2,19 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query
+from fastapi import APIRouter, Body
 
-from gaplab.api.http.dependencies import Confirmation, Id, LimitedDep, StoreDep
+from gaplab.api.http.dependencies import Id, LimitedDep, StoreDep
 from gaplab.api.http.problems import documented
+from gaplab.api.routes.studies import Confirming
 from gaplab.schemas.lifecycle import ExtensionSpec, ScheduleChange, Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.services.experiments import extension, lifecycle
 
 _experiment = APIRouter(prefix="/experiments/{id}", tags=["experiments"])
 _study = APIRouter(prefix="/studies/{id}", tags=["studies"])
+
+Totals = Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)]
 
 _VERBS = {
     Verb.PAUSE: (
@@ -79,11 +82,7 @@ for _verb, _told in _VERBS.items():
     responses=documented(404, 409, 413, 415, 422, 429),
 )
 def extend_experiment(
-    id: Id,
-    totals: Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)],
-    store: StoreDep,
-    admitted: LimitedDep,
-    query: Annotated[Confirmation, Query()],
+    id: Id, totals: Totals, store: StoreDep, admitted: LimitedDep, query: Confirming
 ) -> ExperimentRead:
     """Set new totals of iterations or repetitions for a completed experiment.
 
@@ -113,13 +112,7 @@ def schedule_experiment(
     response_description="QUEUED again",
     responses=documented(404, 409, 413, 415, 422, 429),
 )
-def extend_study(
-    id: Id,
-    totals: Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)],
-    store: StoreDep,
-    admitted: LimitedDep,
-    query: Annotated[Confirmation, Query()],
-) -> StudyRead:
+def extend_study(id: Id, totals: Totals, store: StoreDep, admitted: LimitedDep, query: Confirming) -> StudyRead:
     """Set new totals of iterations or repetitions for the completed experiments of a study that are smaller.
 
     Existing results stay. An experiment that is larger keeps its size, and one that takes no samples has no iterations
@@ -128,6 +121,4 @@ def extend_study(
     return extension.extend_study(store, id, totals, query.given(admitted))
 
 
-router = APIRouter()
-router.include_router(_experiment)
-router.include_router(_study)
+router = APIRouter(routes=_experiment.routes + _study.routes)

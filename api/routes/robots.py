@@ -14,12 +14,8 @@ router = APIRouter(prefix="/robots", tags=["catalogue"])
 
 _EXAMPLES: dict[str, Any] = {"hopper": {"summary": "A trunk on one leg", "value": EXAMPLE}}
 
-_FILE: Responses = {
-    200: {
-        "description": "the robot file",
-        "content": {"application/json": {"schema": {"type": "object"}, "example": EXAMPLE}},
-    }
-}
+_CONTENT = {"application/json": {"schema": {"type": "object"}, "example": EXAMPLE}}
+_FILE: Responses = {200: {"description": "the robot file", "content": _CONTENT}}
 
 Named = Annotated[str, Path(description="hash or name of the robot", max_length=100)]
 

@@ -12,6 +12,8 @@ from gaplab.services.experiments import checks
 
 router = APIRouter(prefix="/sensitivity", tags=["sensitivity"])
 
+Check = Annotated[SensitivitySpec, Body(openapi_examples=SensitivitySpec.EXAMPLES)]
+
 
 @router.post(
     "",
@@ -21,11 +23,7 @@ router = APIRouter(prefix="/sensitivity", tags=["sensitivity"])
     responses={202: links.leading_to(*links.FROM_CHECK), **documented(413, 415, 422)},
 )
 def submit_sensitivity(
-    spec: Annotated[SensitivitySpec, Body(openapi_examples=SensitivitySpec.EXAMPLES)],
-    store: StoreDep,
-    admitted: AdmissionDep,
-    request: Request,
-    response: Response,
+    spec: Check, store: StoreDep, admitted: AdmissionDep, request: Request, response: Response
 ) -> SensitivityRead:
     """Queue a check of whether each tunable changes fitness, how much, and how smoothly.
 

@@ -1,18 +1,15 @@
 """Specs of what was submitted, to submit it again."""
 
-from typing import Annotated
+from fastapi import APIRouter
 
-from fastapi import APIRouter, Query
-
-from gaplab.api.http.dependencies import CallerDep, Id, Revealing, StoreDep
+from gaplab.api.http.dependencies import CallerDep, Id, StoreDep
 from gaplab.api.http.problems import Responses, documented
+from gaplab.api.routes.studies import RevealingQuery
 from gaplab.schemas.spec import SpecRead
 from gaplab.services.experiments import reading
 
 _experiment = APIRouter(prefix="/experiments/{id}", tags=["experiments"])
 _study = APIRouter(prefix="/studies/{id}", tags=["studies"])
-
-RevealingQuery = Annotated[Revealing, Query()]
 
 _AGAIN = "To submit it again"
 _RESPONSES: Responses = documented(404, 422)
@@ -30,6 +27,4 @@ def read_experiment_spec(id: Id, store: StoreDep, caller: CallerDep, query: Reve
     return reading.read_spec(store, "experiment", id, reveal=query.permitted(caller))
 
 
-router = APIRouter()
-router.include_router(_study)
-router.include_router(_experiment)
+router = APIRouter(routes=_study.routes + _experiment.routes)

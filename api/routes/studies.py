@@ -19,6 +19,12 @@ from gaplab.services.experiments.listing import ListFilter
 router = APIRouter(prefix="/studies", tags=["studies"])
 
 
+Confirming = Annotated[Confirmation, Query()]
+RevealingQuery = Annotated[Revealing, Query()]
+Study = Annotated[StudySpec, Body(openapi_examples=StudySpec.EXAMPLES)]
+EditBody = Annotated[Edit, Body(openapi_examples=Edit.EXAMPLES)]
+
+
 class RecordFilter(Paging):
     """The studies or experiments to list, and their order."""
 
@@ -60,12 +66,7 @@ class StudyFilter(RecordFilter):
     responses={202: links.leading_to(*links.FROM_STUDY), **documented(404, 413, 415, 422, 429)},
 )
 def submit_study(
-    spec: Annotated[StudySpec, Body(openapi_examples=StudySpec.EXAMPLES)],
-    store: StoreDep,
-    admitted: AdmissionDep,
-    query: Annotated[Confirmation, Query()],
-    request: Request,
-    response: Response,
+    spec: Study, store: StoreDep, admitted: AdmissionDep, query: Confirming, request: Request, response: Response
 ) -> StudyRead:
     """Queue one experiment for each strategy, all else equal. Whatever the spec leaves out has the paper's value."""
     done = submission.admit_study(store, spec, query.given(admitted))
@@ -85,9 +86,7 @@ def list_studies(store: StoreDep, query: Annotated[StudyFilter, Query()]) -> Pag
     response_description="The study with its experiments",
     responses=conditional.CACHED | documented(404, 422),
 )
-def read_study(
-    id: Id, store: StoreDep, caller: CallerDep, request: Request, query: Annotated[Revealing, Query()]
-) -> Response:
+def read_study(id: Id, store: StoreDep, caller: CallerDep, request: Request, query: RevealingQuery) -> Response:
     """Return a study with its experiments, their states and progress, and the time left."""
     study = reading.read_study(store, id, reveal=query.permitted(caller))
     return conditional.tagged(request, study, study.edits)
@@ -101,13 +100,8 @@ def read_study(
     responses=conditional.TAGGED | documented(404, 412, 413, 415, 422, 428),
 )
 def edit_study(
-    id: Id,
-    edit: Annotated[Edit, Body(openapi_examples=Edit.EXAMPLES)],
-    store: StoreDep,
-    request: Request,
-    if_match: conditional.IfMatch = None,
+    id: Id, edit: EditBody, store: StoreDep, request: Request, if_match: conditional.IfMatch = None
 ) -> Response:
     """Change its name, notes or tags. `If-Match` names the `ETag` of what you edit; progress does not invalidate it."""
-    expected = conditional.starting_from(if_match)
-    study = editing.edit_study(store, id, edit, starting_from=expected)
+    study = editing.edit_study(store, id, edit, starting_from=conditional.starting_from(if_match))
     return conditional.tagged(request, study, study.edits)

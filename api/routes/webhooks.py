@@ -54,6 +54,4 @@ def drop_study_webhook(id: Id, store: StoreDep, notify: NotifyDep) -> WebhookRea
     return webhooks.set_webhook(store, "study", id, None, notify.permitted_hosts)
 
 
-router = APIRouter()
-router.include_router(_experiment)
-router.include_router(_study)
+router = APIRouter(routes=_experiment.routes + _study.routes)

@@ -31,17 +31,17 @@ class Service:
 
 @pytest.mark.parametrize("rollout_ms", [2, 6, 13, 26])
 def test_the_study_fits_into_the_time(sqlite_store: Store, rollout_ms: int) -> None:
-    found = sized(QUADRUPED, Service(sqlite_store, rollout_ms / 1000).estimate)
+    found, reason = sized(QUADRUPED, Service(sqlite_store, rollout_ms / 1000).estimate)
 
-    again = Service(sqlite_store, rollout_ms / 1000).estimate(found.spec)
+    again = Service(sqlite_store, rollout_ms / 1000).estimate(found)
     assert again.seconds <= SECONDS
-    assert found.spec["name"] == f"quadruped, sized for {rollout_ms} ms a rollout"
-    assert found.reason.startswith(f"{rollout_ms} ms a rollout on 2 cores: about ")
+    assert found["name"] == f"quadruped, sized for {rollout_ms} ms a rollout"
+    assert reason.startswith(f"{rollout_ms} ms a rollout on 2 cores: about ")
 
 
 def test_a_fast_machine_computes_the_whole_study_and_a_slow_one_the_smallest(sqlite_store: Store) -> None:
-    whole = sized(QUADRUPED, Service(sqlite_store, 0.002).estimate).spec
-    small = sized(QUADRUPED, Service(sqlite_store, 1.0).estimate).spec
+    whole, _ = sized(QUADRUPED, Service(sqlite_store, 0.002).estimate)
+    small, _ = sized(QUADRUPED, Service(sqlite_store, 1.0).estimate)
 
     assert whole | {"name": QUADRUPED["name"]} == QUADRUPED
     assert (small["repetitions"], small["iterations"]) == SIZES[-1][:2]
