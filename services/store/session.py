@@ -161,7 +161,7 @@ class Store:
 
 @contextmanager
 def private_store(file: Path) -> Iterator[Store]:
-    """Open a new SQLite database with the present tables, for a computation that no other process sees."""
+    """Open a new SQLite database for a private computation, with the present tables; the caller deletes its file."""
     create(file)
     file.write_bytes(_without_rows())
     with Store(f"sqlite:///{file}") as store:
