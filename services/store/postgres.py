@@ -34,7 +34,7 @@ Source: https://www.postgresql.org/docs/current/libpq-connect.html.
 
 
 def postgres_engine(url: URL, *, answer_s: float | None) -> Engine:
-    """Return an engine of Postgres, whose URL has its driver; without `answer_s`, statements take any time."""
+    """Return an engine of a URL with its driver, without connecting; without `answer_s`, statements take any time."""
     engine = create_engine(
         url, pool_pre_ping=True, pool_size=10, max_overflow=20, connect_args=_NOTICED, hide_parameters=True
     )

@@ -21,7 +21,7 @@ from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION, Base
 from gaplab.services.store.models.base import other_schema
 from gaplab.services.store.queries import events, robots
-from gaplab.services.store.sqlite_file import create, file_of
+from gaplab.services.store.sqlite_file import create, file_of, url_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -47,10 +47,12 @@ class Store:
         file: of a SQLite database; None for Postgres.
         errors: number of times that the database could not be used.
         retries: number of transactions that Postgres aborted for others, and that ran again.
+        unwritten: why the latest transaction that writes failed; None if it did not.
     """
 
     def __init__(self, url: str, *, answer_s: float = ANSWER_S, pinned: bool = False) -> None:
         self.errors = self.retries = 0
+        self.unwritten: str | None = None
         self._engine = open_engine(url, answer_s=answer_s)
         self._guard = Guard(self._engine, pinned=pinned)
         self.file = file_of(self._engine.url)
@@ -74,7 +76,7 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        with self._named(), self._writer.begin() as session:
+        with self._named(writes=True), self._writer.begin() as session:
             yield session
 
     @contextmanager
@@ -95,7 +97,7 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        with self._named():
+        with self._named(writes=True):
             for attempt in range(1, _TRIES):
                 try:
                     with self._writer.begin() as session:
@@ -141,8 +143,8 @@ class Store:
             self._guard.change(other_schema(revisions))
 
     @contextmanager
-    def _named(self) -> Iterator[None]:
-        """Name and count errors of the database."""
+    def _named(self, *, writes: bool = False) -> Iterator[None]:
+        """Name and count errors of the database, and note whether a transaction that writes had one."""
         try:
             self._guard.admit()
             try:
@@ -150,9 +152,11 @@ class Store:
                     yield
             except StoreDamaged as error:
                 self._guard.damage(error)
-        except StoreUnavailable:
+        except StoreUnavailable as error:
             self.errors += 1
+            self.unwritten = str(error) if writes else self.unwritten
             raise
+        self.unwritten = None if writes else self.unwritten
 
     def dispose(self) -> None:
         """Close the idle connections; the store may be used again."""
@@ -161,10 +165,10 @@ class Store:
 
 @contextmanager
 def private_store(file: Path) -> Iterator[Store]:
-    """Open a new SQLite database for a private computation, with the present tables; the caller deletes its file."""
+    """Open a new SQLite database in a file that the caller deletes, with the present tables, to compute privately."""
     create(file)
     file.write_bytes(_without_rows())
-    with Store(f"sqlite:///{file}") as store:
+    with Store(url_of(file)) as store:
         yield store
 
 
