@@ -9,6 +9,7 @@ has a database of its own: a copy of one that was migrated once. All test proces
 
 import os
 import shutil
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, chdir, contextmanager
 from itertools import count
@@ -67,6 +68,13 @@ def _server() -> Iterator[str]:
 
 
 @pytest.hookimpl(optionalhook=True)
+def pytest_configure() -> None:
+    """Let programs that tests start obey signals that this process ignores, as under `nohup` or in the background."""
+    for number in (signal.SIGHUP, signal.SIGQUIT):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)  # a program that is started has no handlers
+
+
 def pytest_configure_node(node: Any) -> None:
     """Start the server that all test processes share, and tell a new process where it is."""
     stash = node.config.stash

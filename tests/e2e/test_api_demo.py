@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from gaplab.services.store.sqlite_file import url_of
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.release
@@ -73,7 +74,7 @@ def test_a_demo_killed_outright_leaves_nothing_running_and_goes_on_when_run_agai
     assert "evolved in reality itself" in said
     assert "real-world evaluation" in said
     (serve,) = [line for line in said.splitlines() if line.endswith("gaplab serve")]
-    assert serve.startswith(f"  GAPLAB_DATABASE_URL='sqlite:///{folder}/gaplab.db' ")
+    assert serve.startswith(f"  GAPLAB_DATABASE_URL='{url_of(folder / 'gaplab.db')}' ")
     assert subprocess.run(["sh", "-c", f"{serve.removesuffix('serve')}--version"], check=False).returncode == 0
     for name in ("toy", "quadruped"):
         assert f"  {folder / name}.html" in said.splitlines()
