@@ -99,6 +99,9 @@ class Ray:
         self.looks = 0
         self.lost = False
 
+    def options(self) -> Any:
+        return self
+
     def remote(self, spec: Any, expected: Any) -> Any:
         self.looks = 2
         return spec

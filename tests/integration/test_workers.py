@@ -321,20 +321,18 @@ def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store: Store, monkey
     assert read.warnings[0].endswith("ZeroDivisionError: the check is broken")
 
 
-def killed_once(mark: str, spec: Any) -> Any:
-    if not os.path.exists(mark):
-        Path(mark).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return check(subject(spec), SteadyState(), Effort(spec.points, spec.evaluations))
-
-
 @pytest.mark.release
 def test_a_sensitivity_check_whose_worker_is_killed_runs_again(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    mark = str(tmp_path / "killed")
-    killed: Any = ray.remote(num_cpus=0, max_retries=0)(lambda spec, _: killed_once(mark, spec))
-    monkeypatch.setattr(checking, "check", killed)
+    @ray.remote(num_cpus=0, max_retries=0)
+    def killed_once(spec: Any, expected: Any) -> Any:
+        if not (tmp_path / "killed").exists():
+            (tmp_path / "killed").touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return check(subject(spec), SteadyState(), Effort(spec.points, spec.evaluations))
+
+    monkeypatch.setattr(checking, "check", killed_once)
     check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
 
     found = checked(sqlite_store, check_id, Supervisor(sqlite_store, lambda: 2))
