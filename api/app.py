@@ -142,9 +142,10 @@ def create_app(
     app.add_middleware(SecurityHeaders)
     app.add_middleware(RequestCounter, metrics=app.state.metrics)
     problems.install(app)
+    shared = [Depends(refuse_wrong_parameters), Depends(take_place)]
     for module in MODULES:
-        first = [refuse_wrong_parameters, take_place, *([] if module in WITHOUT_PLUGINS else [reload_plugins])]
-        app.include_router(module.router, dependencies=[Depends(each) for each in first])
+        reloading = [] if module in WITHOUT_PLUGINS else [Depends(reload_plugins)]
+        app.include_router(module.router, dependencies=[*shared, *reloading])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)
