@@ -9,7 +9,7 @@ from fastapi.middleware.gzip import GZipMiddleware
 
 from gaplab.api.http import documentation, problems
 from gaplab.api.http.access import Access
-from gaplab.api.http.dependencies import WRITERS, refuse_wrong_parameters, reload_plugins, take_place
+from gaplab.api.http.dependencies import WRITERS, reload_plugins, take_place
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import SPARE, BodyLimit, RequestLimit, Streams, most_requests
 from gaplab.api.http.metrics import Metrics, RequestCounter
@@ -142,10 +142,9 @@ def create_app(
     app.add_middleware(SecurityHeaders)
     app.add_middleware(RequestCounter, metrics=app.state.metrics)
     problems.install(app)
-    shared = [Depends(refuse_wrong_parameters), Depends(take_place)]
     for module in MODULES:
         reloading = [] if module in WITHOUT_PLUGINS else [Depends(reload_plugins)]
-        app.include_router(module.router, dependencies=[*shared, *reloading])
+        app.include_router(module.router, dependencies=[Depends(take_place), *reloading])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

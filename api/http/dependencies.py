@@ -107,8 +107,8 @@ async def refuse_wrong_parameters(request: Request) -> None:
         raise InvalidSpec(wrong)
 
 
-async def take_place(request: Request) -> AsyncIterator[None]:
-    """Let a few requests that may write in at once; others wait without a thread, and not for ever.
+async def take_place(request: Request, _: Annotated[None, Depends(refuse_wrong_parameters)]) -> AsyncIterator[None]:
+    """Let a few valid requests that may write in at once; others wait without a thread, and not for ever.
 
     Raises:
         StoreUnavailable: no place became free in time.
