@@ -9,7 +9,7 @@ from fastapi.middleware.gzip import GZipMiddleware
 
 from gaplab.api.http import documentation, problems
 from gaplab.api.http.access import Access
-from gaplab.api.http.dependencies import WRITERS, refuse_malformed, reload_plugins, take_place
+from gaplab.api.http.dependencies import WRITERS, reload_plugins, take_place
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import SPARE, BodyLimit, RequestLimit, Streams, most_requests
 from gaplab.api.http.metrics import Metrics, RequestCounter
@@ -144,7 +144,7 @@ def create_app(
     problems.install(app)
     for module in MODULES:
         reloading = [] if module in WITHOUT_PLUGINS else [Depends(reload_plugins)]
-        app.include_router(module.router, dependencies=[Depends(refuse_malformed), Depends(take_place), *reloading])
+        app.include_router(module.router, dependencies=[Depends(take_place), *reloading])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

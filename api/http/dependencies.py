@@ -112,8 +112,8 @@ async def refuse_malformed(request: Request) -> None:
             refuse_too_deep(await request.json())
 
 
-async def take_place(request: Request) -> AsyncIterator[None]:
-    """Let a few requests that may write in at once; others wait without a thread, and not for ever.
+async def take_place(request: Request, _: Annotated[None, Depends(refuse_malformed)]) -> AsyncIterator[None]:
+    """Let a few valid requests that may write in at once; others wait without a thread, and not for ever.
 
     Raises:
         StoreUnavailable: no place became free in time.
