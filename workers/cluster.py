@@ -43,8 +43,8 @@ class Cluster:
     def capacity(self) -> int:
         """Return the number of repetitions to submit to Ray at once; it changes as nodes join or leave.
 
-        There are two for each core: while one runs, the next one waits in Ray, so no core idles between them, and an
-        autoscaler sees a demand. So it is also without cores.
+        There are two for each core: while one runs, the next one waits in Ray, so no core idles between them. There are
+        two without any core: a demand that an autoscaler sees.
 
         Raises:
             RayGone: this process can run nothing any more.

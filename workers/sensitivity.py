@@ -23,7 +23,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers.nodes import Versions, check_here, process_for
 from gaplab.workers.patience import Patience
 from gaplab.workers.plugins import Plugins
-from gaplab.workers.task import told
+from gaplab.workers.task import give_back_memory, told
 
 LOOK_S = 1.0
 """Shortest interval between checks of the queue."""
@@ -48,6 +48,8 @@ def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...] | Fai
         return check_tunables(subject(checked), SteadyState(), Effort(checked.points, checked.evaluations))
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
         return Failure(describe(error))
+    finally:
+        give_back_memory()
 
 
 class Checks:

@@ -46,8 +46,13 @@ def run(claim: Claim, expected: Versions, checkpoint_s: float, permits: Handle |
     check_here(expected)
     yield ()
     yield from delivered(lambda: _prepared(claim, expected, permits), claim, checkpoint_s)
+    give_back_memory()
+
+
+def give_back_memory() -> None:
+    """Give the system what was freed: glibc keeps hundreds of MB of what engines had."""
     with suppress(AttributeError, OSError, TypeError):  # another C library
-        CDLL(None).malloc_trim(0)  # gives the system what was freed, of which glibc else keeps hundreds of MB
+        CDLL(None).malloc_trim(0)
 
 
 def delivered(prepare: Callable[[], Setting], claim: Claim, checkpoint_s: float) -> Iterator[Batch]:
