@@ -14,6 +14,11 @@ LEASE_SHARE = 0.8
 """Part of a lease after which a take without a sign of life is lost: the robot stops before others may move it."""
 
 
+def _now() -> float:
+    """Return seconds of a clock that nobody sets, and that goes on while a laptop sleeps."""
+    return time.clock_gettime(getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC))
+
+
 class TakeLost(Exception):
     """Others may move the robot, now or soon: it must stand still, and nothing is measured."""
 
@@ -32,7 +37,7 @@ class Take:
 
     def __init__(self, connection: Connection, request: str, operator: str, lease_s: float) -> None:
         self._connection, self._path = connection, f"/requests/{segment(request)}"
-        self._operator, self._lease_s, self._shown = operator, lease_s, time.monotonic()
+        self._operator, self._lease_s, self._shown = operator, lease_s, _now()
         body = {"operator": operator, "lease_s": lease_s}
         self.request = connection.post(RequestRead, f"{self._path}/take", body)
         self.refused: str | None = None
@@ -42,7 +47,7 @@ class Take:
     def lost(self) -> str | None:
         """Why others may move the robot, now or soon; None if they may not."""
         silence_s = LEASE_SHARE * self._lease_s
-        if self.refused is None and time.monotonic() - self._shown > silence_s:
+        if self.refused is None and _now() - self._shown > silence_s:
             return f"no sign of life has reached the service for {silence_s:g} s"
         return self.refused
 
@@ -87,17 +92,17 @@ class Take:
 
     @property
     def _may_overlap(self) -> bool:
-        return self.refused is not None or time.monotonic() - self._shown > self._lease_s
+        return self.refused is not None or _now() - self._shown > self._lease_s
 
     def _let_go(self) -> None:
-        self._send("release", moved_s=time.monotonic() - self._shown, operator=self._operator)
+        self._send("release", moved_s=_now() - self._shown, operator=self._operator)
 
     def _beat(self) -> None:
         while not self.over.wait(self._lease_s / 3) and not self.lost:
             self._show()
 
     def _show(self) -> None:
-        now = time.monotonic()
+        now = _now()
         try:
             self._send("heartbeat")
         except (ServiceError, ServiceUnreachable) as error:
