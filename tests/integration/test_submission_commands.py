@@ -90,6 +90,7 @@ def test_further_tunables_are_tried_on_readings_of_a_robot_on_a_bench(gaplab: Ga
     with working(sqlite_store):
         said = gaplab("try-tunables", id, "mass", "kp", "--json")
 
+    assert said.code == 0, said.err
     tried = {each["added"]: each for each in json.loads(said.out)}
     assert "kp is not tried: " in said.err
     assert {name: each["unit"] for name, each in tried.items()} == {"nothing": "× noise", "mass": "× noise"}
