@@ -121,8 +121,7 @@ def _other_files(wanted: Versions) -> dict[str, str]:
     folders.find()
     here = read() if wanted else Contents()
     files = {plugin: here.text_of(text.partition(" ")[0]) or "none" for plugin, text in wanted.items()}
-    wrong = [plugin for plugin, file in files.items() if not wanted[plugin].startswith(file)]
-    return {plugin: _sentence(files[plugin], wanted[plugin]) for plugin in wrong}
+    return {each: _sentence(file, wanted[each]) for each, file in files.items() if not wanted[each].startswith(file)}
 
 
 def _different(wanted: Versions) -> dict[str, str]:

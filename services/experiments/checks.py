@@ -47,16 +47,7 @@ class CheckSummary:
     warnings: tuple[str, ...] = ()
 
 
-def submit(store: Store, spec: SensitivitySpec) -> SensitivityRead:
-    """Queue the check of these settings, unless it exists and has not FAILED.
-
-    Raises:
-        InvalidSpec: they are invalid; the error has every violation.
-    """
-    return admit(store, spec, FREELY).answer
-
-
-def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[SensitivityRead]:
+def admit(store: Store, spec: SensitivitySpec, admitted: Admission = FREELY) -> Once[SensitivityRead]:
     """Submit the check, once for each idempotency key.
 
     Raises:

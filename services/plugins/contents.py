@@ -52,7 +52,7 @@ class Contents:
 
     def text_of(self, file: str) -> str | None:
         """Return a file with its hash, followed by those of all that it imports; None if it is gone."""
-        top = _top(file)
+        top = module_of(file)
         reached, new = {top}, {top}
         while new := {name for each in new for name in self.imports.get(each, ())} - reached:
             reached |= new
@@ -91,14 +91,9 @@ def read() -> Contents:
             continue
         digests[file] = sha256(content).hexdigest()[:12]
         if path.suffix == ".py":
-            imports[_top(file)] = imports.get(_top(file), frozenset()) | _imports(content, file)
-    tops = frozenset(map(_top, digests))
+            imports[module_of(file)] = imports.get(module_of(file), frozenset()) | _imports(content, file)
+    tops = frozenset(map(module_of, digests))
     return Contents(digests, {top: tops if ANY in named else named & tops for top, named in imports.items()})
-
-
-def module_of(files: str) -> str:
-    """Return the module or package of the first file of a text that `text_of` returned."""
-    return _top(files.partition(" ")[0])
 
 
 def _files() -> Iterator[tuple[str, Path]]:
@@ -110,7 +105,8 @@ def _files() -> Iterator[tuple[str, Path]]:
                 yield "/".join(parts), path
 
 
-def _top(file: str) -> str:
+def module_of(file: str) -> str:
+    """Return the module or package of a file."""
     return file.partition("/")[0].removesuffix(".py")
 
 

@@ -41,7 +41,7 @@ def use(files: Iterable[str]) -> None:
     The files are as `imported_files` has them: those of each plug-in, the first its own, with their hashes.
     """
     find()
-    if external_plugins.chosen() != (modules := frozenset(map(module_of, files))):
+    if external_plugins.chosen() != (modules := frozenset(module_of(text.split()[0]) for text in files)):
         external_plugins.set_folders(external_plugins.named_folders(), modules)
     leave_threads()
     imported.contents()

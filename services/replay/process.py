@@ -63,8 +63,7 @@ class RolloutProcess:
     """A subprocess that executes one call at a time.
 
     It starts with the first call, and again after a crash or a timeout. It ends with its parent, even if that
-    is killed: the parent's end of the pipe closes, and the next read fails. A call with other external plug-ins than
-    the one before gets another process.
+    is killed: the parent's end of the pipe closes, and the next read fails. Other plug-ins get another one.
 
     Args:
         longest_s: time limit of one call.

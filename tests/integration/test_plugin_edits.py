@@ -327,8 +327,8 @@ def test_a_name_that_reads_like_a_reason_holds_up_nothing(store: Store, put: Any
 
 def test_a_check_whose_robot_is_broken_waits_and_others_are_done(store: Store, put: Any) -> None:
     put(slippery=SLIPPERY)
-    waiting = checks.submit(store, SensitivitySpec(robot="slippery", engine="analytic")).id
-    other = checks.submit(store, SensitivitySpec(robot="toy_function")).id
+    waiting = checks.admit(store, SensitivitySpec(robot="slippery", engine="analytic")).answer.id
+    other = checks.admit(store, SensitivitySpec(robot="toy_function")).answer.id
 
     put(slippery="1 / 0")
 

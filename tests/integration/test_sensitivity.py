@@ -66,9 +66,9 @@ def test_the_same_robot_engine_and_tunables_are_checked_once(store: Store) -> No
     second = submission.submit_experiment(
         store, toy(strategy="random", seed=7, budget="desk", reality={"parameters": {"static_friction": SECRET}})
     )
-    asked = checks.submit(store, settings(seed=3))
+    asked = checks.admit(store, settings(seed=3)).answer
     narrower = submission.submit_experiment(store, toy(tunables=[{"name": "static_friction", "upper": 1.0}]))
-    finer = checks.submit(store, settings(points=33))
+    finer = checks.admit(store, settings(points=33)).answer
 
     assert first.sensitivity == second.sensitivity == asked.id
     assert set(stored_checks(store)) == {asked.id, narrower.sensitivity, finer.id}
@@ -85,10 +85,10 @@ def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_thei
 
     edited("own.py 0123456789ab")
     before = submission.submit_experiment(store, toy())
-    asked_before = checks.submit(store, settings())
+    asked_before = checks.admit(store, settings()).answer
     edited("own.py ba9876543210")
     after = submission.submit_experiment(store, toy())
-    asked_after = checks.submit(store, settings())
+    asked_after = checks.admit(store, settings()).answer
     other = submission.submit_experiment(store, toy(tunables=["static_friction"], robot="toy_function"))
 
     assert before.sensitivity == asked_before.id != after.sensitivity == asked_after.id
@@ -170,10 +170,10 @@ def test_a_failed_check_fails_no_experiment_and_says_why(store: Store) -> None:
 
 
 def test_a_failed_check_is_queued_again_when_it_is_asked_for_again(store: Store) -> None:
-    check_id = checks.submit(store, settings()).id
+    check_id = checks.admit(store, settings()).answer.id
     sensitivity.fail(store, sensitivity.claim(store, "me"), "out of luck")
 
-    again = checks.submit(store, settings())
+    again = checks.admit(store, settings()).answer
 
     assert (again.id, again.state, again.reason, again.ended_at) == (check_id, State.QUEUED, None, None)
     assert sensitivity.claim(store, "me").epoch == 2
@@ -181,7 +181,7 @@ def test_a_failed_check_is_queued_again_when_it_is_asked_for_again(store: Store)
 
 @pytest.mark.dialects
 def test_a_check_is_claimed_once_the_oldest_first(store: Store) -> None:
-    first, second = (checks.submit(store, settings(points=points)).id for points in (20, 21))
+    first, second = (checks.admit(store, settings(points=points)).answer.id for points in (20, 21))
 
     with ThreadPoolExecutor(4) as pool:
         claims = [each for each in pool.map(lambda owner: sensitivity.claim(store, owner), "abcd") if each]
@@ -192,7 +192,7 @@ def test_a_check_is_claimed_once_the_oldest_first(store: Store) -> None:
 
 
 def test_a_lost_check_is_queued_again_and_its_old_holder_can_write_no_more(store: Store) -> None:
-    check_id = checks.submit(store, settings()).id
+    check_id = checks.admit(store, settings()).answer.id
     old = sensitivity.claim(store, "first")
 
     assert sensitivity.requeue_lost(store) == 0
@@ -209,7 +209,7 @@ def test_a_lost_check_is_queued_again_and_its_old_holder_can_write_no_more(store
 
 
 def test_a_check_that_loses_its_worker_again_and_again_is_what_kills_them(store: Store) -> None:
-    check_id = checks.submit(store, settings()).id
+    check_id = checks.admit(store, settings()).answer.id
 
     for _ in range(MAX_LOSSES):
         assert sensitivity.release(store, sensitivity.claim(store, "me"), "killed")
@@ -220,7 +220,7 @@ def test_a_check_that_loses_its_worker_again_and_again_is_what_kills_them(store:
 
 
 def test_a_check_that_is_handed_back_is_queued_as_if_it_had_not_been_claimed(store: Store) -> None:
-    check_id = checks.submit(store, settings()).id
+    check_id = checks.admit(store, settings()).answer.id
 
     assert sensitivity.hand_back(store, sensitivity.claim(store, "me"))
 
@@ -238,10 +238,10 @@ def test_an_unknown_check_is_not_found(store: Store, name: Any) -> None:
 
 def test_settings_that_no_experiment_could_have_are_refused_with_every_violation(store: Store) -> None:
     with pytest.raises(InvalidSpec) as caught:
-        checks.submit(store, settings(engine="pybullet", tunables=["grip"], optimizer="no_such"))
+        checks.admit(store, settings(engine="pybullet", tunables=["grip"], optimizer="no_such"))
 
     assert {each.pointer for each in caught.value.violations} == {"/optimizer"}
     with pytest.raises(InvalidSpec) as caught:
-        checks.submit(store, settings(tunables=["grip", {"name": "restitution", "upper": 7.0}]))
+        checks.admit(store, settings(tunables=["grip", {"name": "restitution", "upper": 7.0}]))
     assert {each.pointer for each in caught.value.violations} == {"/tunables/0", "/tunables/1/upper"}
     assert stored_checks(store) == []

@@ -357,7 +357,7 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_st
 
 
 def test_a_check_that_was_taken_over_is_dropped(sqlite_store: Store) -> None:
-    check_id = checks.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
+    check_id = checks.admit(sqlite_store, SensitivitySpec(robot="toy_function")).answer.id
     first = checking.Checks(sqlite_store, "first")
     first.step()
 
@@ -370,7 +370,7 @@ def test_a_check_that_was_taken_over_is_dropped(sqlite_store: Store) -> None:
 
 
 def test_a_check_on_a_node_with_other_versions_is_not_stored(sqlite_store: Store) -> None:
-    check_id = checks.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
+    check_id = checks.admit(sqlite_store, SensitivitySpec(robot="toy_function")).answer.id
     supervisor = Supervisor(sqlite_store, lambda: 2, {"gaplab": "0.0.1"})
 
     with pytest.raises(ClusterUnusable, match=r"the supervisor has gaplab 0\.0\.1"):

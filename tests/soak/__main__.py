@@ -35,7 +35,6 @@ def main() -> Any:
     parser.add_argument("--database", choices=KINDS, help="left out: both at once, each in a process")
     parser.add_argument("--at-once", type=int, default=8, help="faults that may come together")
     parser.add_argument("--plug-ins", choices=MISBEHAVIOURS, default="all", help="that misbehave")
-    parser.add_argument("--minutes", type=float, default=0.0, help="that it lasts at least; --faults 0: without any")
     parser.add_argument("--folder", type=Path, help="for logs and histories; left out: they are not kept")
     given = parser.parse_args()
     given.seed = SystemRandom().randrange(10**6) if given.seed is None else given.seed
@@ -48,13 +47,13 @@ def main() -> Any:
 def here(given: Any) -> Any:
     """Hurt a service on one database."""
     console = Console()
-    expected = max(given.faults * FAULT_S, given.minutes * 60) + 120
+    expected = given.faults * FAULT_S + 120
     console.print(f"{given.faults} faults with --seed {given.seed} on {given.database}: about {_duration(expected)}")
     folder = given.folder / given.database
     folder.mkdir(parents=True)
     kind, tell = KINDS[given.database], partial(console.print, style="dim", soft_wrap=True)
-    much = {"minutes": given.minutes, "misbehaviours": MISBEHAVIOURS[given.plug_ins]}
-    outcome = soak(folder, kind, given.faults, given.seed, given.at_once, tell, **much)
+    harm = MISBEHAVIOURS[given.plug_ins]
+    outcome = soak(folder, kind, given.faults, given.seed, given.at_once, tell, misbehaviours=harm)
     show(console, outcome)
     return 1 if outcome.violations else 0
 
@@ -62,7 +61,7 @@ def here(given: Any) -> Any:
 def side_by_side(given: Any) -> Any:
     """Hurt a service on each database, in processes of their own."""
     common = ["--seed", str(given.seed), "--at-once", str(given.at_once), "--folder", str(given.folder)]
-    common += ["--plug-ins", given.plug_ins, "--minutes", str(given.minutes)]
+    common += ["--plug-ins", given.plug_ins]
     running = []
     try:
         for index, name in enumerate(KINDS):

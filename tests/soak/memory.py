@@ -54,7 +54,8 @@ def tell(service: Any, minutes: Any, experiments: Any) -> None:
         found[pid] = pages * 4096 // 2**20, name.split("/")[-1][:40]
     large = sorted((each for each in found.values() if each[0] > 50), reverse=True)
     text = ", ".join(f"{name} {mb}" for mb, name in large)
-    Console().print(f"{minutes:.0f} min, {experiments} experiments, {sum(mb for mb, _ in found.values())} MB: {text}")
+    total = sum(mb for mb, _ in found.values())
+    Console().print(f"{minutes:.0f} min, {experiments} experiments, {total} MB: {text}", soft_wrap=True)
 
 
 if __name__ == "__main__":

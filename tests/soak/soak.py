@@ -55,14 +55,13 @@ class Outcome:
     def faults(self) -> Any:
         return sum(map(len, self.recoveries.values()))
 
-    def measure(self, stage: Any, say: Any, every_s: float = 300.0) -> float:
-        """Say how much memory the service has, if that is due, as a row of a table; seconds since the beginning."""
+    def measure(self, stage: Any, say: Any, every_s: float = 300.0) -> None:
+        """Say how much memory the service has, if that is due, as a row of a table."""
         now = time.monotonic() - self.begun
         if now - self.measured_s >= every_s:
             self.measured_s, (each, largest) = now, stage.memory()
             sizes = f"{len(each)} processes | {sum(each):.0f} MB | largest {max(each):.0f} MB: {largest}"
             say(f"| {self.database} | {now / 60:.0f} min | {self.faults} faults | {sizes} |")
-        return now
 
 
 def soak(
@@ -73,7 +72,6 @@ def soak(
     at_once: Any = 4,
     say: Any = lambda sentence: None,
     *,
-    minutes: Any = 0.0,
     misbehaviours: Any = misbehaviour.HARMLESS,
 ) -> Any:
     """Run so many faults on a service in this folder, and check it; the evidence stays there.
@@ -85,7 +83,6 @@ def soak(
         seed: of their order and of what clients do.
         at_once: faults that the service has to bear together.
         say: is told of every volley.
-        minutes: that it lasts at least; once all faults are over, without any.
         misbehaviours: kinds of strategies that do harm.
     """
     folder = Path(folder)
@@ -101,7 +98,6 @@ def soak(
         stage.clients = clients
         clients.start()
         _attack(stage, store, outcome, number, faults.volleys(kinds, random.Random(seed), at_once), say)
-        until(lambda: outcome.measure(stage, say) > 60 * minutes, 60 * minutes, every_s=1.0)
         clients.stop()
         _peace(clients, store, outcome)
         outcome.measure(stage, say, 0.0)
