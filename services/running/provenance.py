@@ -36,7 +36,7 @@ def read(session: Session, experiment_id: str) -> ProvenanceRead:
     """Return the versions that computed the experiment, and those of a supervisor that skipped it.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: the experiment does not exist.
         StoreUnavailable: the database cannot be used now.
     """
     experiment = get_experiment(session, experiment_id)
@@ -50,7 +50,7 @@ def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
     """Let the next supervisor continue the experiment under any versions; the experiment is then bound to those.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: the experiment does not exist.
         Conflict: it has ended, or has not started.
         StoreUnavailable: the database cannot be used now.
     """
