@@ -58,7 +58,7 @@ class Plugins:
         return self._under, refused
 
     def expected(self, spec: ResolvedSpec | Checked) -> Versions:
-        """Return the versions that a process must have to compute a spec, as they were at the last call of `present`."""
+        """Return the versions that a process must have to compute a spec, as `present` last found them."""
         return with_plugins(self._shared, self._under, spec.model_dump(mode="json"))
 
     def refuse(self, refused: PluginDiffers) -> None:
