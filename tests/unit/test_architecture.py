@@ -219,7 +219,7 @@ def at_the_top(path: Path) -> set[str]:
     return {name.partition(".")[0] for name in names}
 
 
-def test_a_module_stays_under_250_lines_and_a_function_under_40() -> None:
+def test_a_module_stays_under_400_lines_and_a_function_under_40() -> None:
     own = [path for path in MODULES if "versions" not in path.parts]
     functions = [
         (str(path), node.name)
@@ -228,7 +228,7 @@ def test_a_module_stays_under_250_lines_and_a_function_under_40() -> None:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.end_lineno - node.body[0].lineno >= 40
     ]
 
-    assert [str(path) for path in own if len((ROOT / path).read_text().splitlines()) > 250] == []
+    assert [str(path) for path in own if len((ROOT / path).read_text().splitlines()) > 400] == []
     assert functions == []
 
 
