@@ -85,7 +85,7 @@ def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(
     curve = page.locator(".figure-curves")
     expect(curve.locator(".point")).to_have_count(3)
     before = curve.locator(".js-line").count()
-    curve.get_by_label("Each repetition").check()
+    curve.get_by_role("checkbox", name="Each repetition").check()
     expect(curve).to_contain_text("Faint lines: single repetitions")
     assert curve.locator(".js-line").count() > before
     curve.get_by_label("Band").select_option("interval")
