@@ -74,7 +74,7 @@ def driving(
 
 def kill_after_a_repeat(service: LocalService, experiment: str, journal: Path) -> None:
     """Kill a driver whose take ends soon after it. On a busy machine one may lose so short a take; another tries."""
-    drivers = []
+    drivers: list[subprocess.Popen[str]] = []
 
     def repeated() -> bool:
         if not drivers or drivers[-1].poll() is not None:
