@@ -39,7 +39,7 @@ docs: .venv/installed-dev  ## generate docs/reference/ from the code
 pictures: .venv/prepared  ## take the pictures of docs/ from the page as it is now
 	$(BIN)/python -m docs.take_pictures
 
-soak: .venv/installed-dev  ## inject a thousand random faults into the real service and check every acknowledgement: three quarters of an hour
+soak: .venv/installed-dev  ## inject a thousand random faults into the real service and check every acknowledgement: an hour and a half
 	$(BIN)/python -m tests.soak $(if $(FAULTS),--faults $(FAULTS)) $(if $(SEED),--seed $(SEED))
 
 clean:  ## remove the environment and caches; results stay

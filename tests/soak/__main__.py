@@ -24,7 +24,7 @@ KINDS = {"sqlite": Sqlite, "postgres": Postgres}
 MISBEHAVIOURS = {"none": (), "harmless": HARMLESS, "all": (*HARMLESS, *HARMFUL)}
 """Strategies that do harm, by the choice of the command."""
 
-FAULT_S = 5.5
+FAULT_S = 10.0
 """That a fault took on two cores, with what came after it, while the other database had its own."""
 
 
