@@ -254,8 +254,8 @@ def test_a_driver_that_wakes_beside_another_stops_its_robot_and_no_measurement_o
         driver.send_signal(signal.SIGCONT)
 
         wait_until(lambda: pending(sqlite_store)[0].takes > take)
+        wait_until(lambda: commands(tmp_path)[-1] == "stopped")
         told = commands(tmp_path)
-        assert told[-1] == "stopped"
         answer = answering.answer(sqlite_store, request.id, MeasurementSpec(values=(0.5,), take=take), FREELY).answer
         assert (take, answer.state) == (2, "conflict")
         assert (commands(tmp_path), driver.poll()) == (told, None)  # it waits for its turn
