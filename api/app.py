@@ -23,24 +23,20 @@ from gaplab.api.routes import (
     corrections,
     curves,
     dashboard,
-    estimates,
     events,
     experiments,
     figures,
     health,
     keeping,
     lifecycle,
-    provenance,
     replay_figures,
     replays,
     reports,
     robots,
     samples,
     sensitivity,
-    specs,
     studies,
     views,
-    webhooks,
 )
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.settings import Limits, Notify, Settings
@@ -51,13 +47,14 @@ DESCRIPTION = """
 Closes the *reality gap*: tunes a robot simulator from a handful of real-world evaluations, and compares the strategies
 that choose them.
 
-Submit a **study** (`POST /studies`), follow it (`GET /studies/{id}`), read its **curves** (`GET /studies/{id}/curves`).
-Whatever a spec leaves out has the paper's value. Errors are problem details (RFC 9457); for an invalid spec they name
-each place, what is permitted there, and the nearest valid name.
+Submit a **study** (`POST /studies`), follow it (`GET /studies/{id}`), read its **curves** (`GET /curves?study={id}`).
+`POST /experiments` submits one experiment, which is a study of one. Where an id is that of a study, that of one of its
+experiments means that one alone. Whatever a spec leaves out has the paper's value. Errors are problem details
+(RFC 9457); for an invalid spec they name each place, what is permitted there, and the nearest valid name.
 """
 
 TAGS = [
-    {"name": "studies", "description": "experiments to be compared"},
+    {"name": "studies", "description": "experiments to be compared, or one alone"},
     {"name": "experiments", "description": "one strategy with one set of settings, repeated"},
     {"name": "bench", "description": "measurements of a robot on a bench: requests, takes, answers, corrections"},
     {"name": "views", "description": "saved queries of lists"},
@@ -66,7 +63,7 @@ TAGS = [
     {"name": "figures", "description": "for the browser, for notebooks and for papers"},
     {"name": "reports", "description": "one document with figures, tables, tests and a verdict in words"},
     {"name": "events", "description": "what happens to experiments, as it happens"},
-    {"name": "archives", "description": "an experiment or a study with everything in it as one file"},
+    {"name": "archives", "description": "a study with everything in it as one file"},
     {"name": "sensitivity", "description": "the effect of each tunable on fitness, checked before tuning"},
     {"name": "catalogue", "description": "the plug-ins that a spec may name"},
     {"name": "health", "description": "for monitoring the service"},
@@ -74,9 +71,7 @@ TAGS = [
 
 MODULES = (
     studies,
-    estimates,
     experiments,
-    specs,
     lifecycle,
     bench,
     corrections,
@@ -84,8 +79,6 @@ MODULES = (
     samples,
     keeping,
     views,
-    webhooks,
-    provenance,
     events,
     curves,
     comparisons,
@@ -102,7 +95,7 @@ MODULES = (
 """The modules of the API, in the order of the documentation."""
 
 
-WITHOUT_PLUGINS = (views, webhooks, events, health)
+WITHOUT_PLUGINS = (views, events, health)
 """The modules whose answers do not depend on plug-ins; before others answer, edited plug-ins are imported again."""
 
 

@@ -41,15 +41,14 @@ PATIENCE_S = 60.0
 KEPT_ALIVE_S = 2.0  # longest pause for which a connection is reused; the server closes it after five seconds
 
 READS: dict[str, Callable[[int], str]] = {
-    "experiments, newest 50": lambda _: "/experiments?limit=50",
-    "experiments of a study": lambda n: f"/experiments?study={study_id(random.randrange(n // IN_A_STUDY))}",
-    "experiments that run": lambda _: "/experiments?state=RUNNING",
-    "experiments of a strategy": lambda _: "/experiments?strategy=informative",
     "studies, newest 50": lambda _: "/studies?limit=50",
+    "studies that run": lambda _: "/studies?state=RUNNING",
+    "studies of a strategy": lambda _: "/studies?strategy=informative",
+    "a study": lambda n: f"/studies/{study_id(random.randrange(n // IN_A_STUDY))}",
     "an experiment": lambda n: f"/experiments/{experiment_id(random.randrange(n))}",
     "its samples": lambda n: f"/experiments/{experiment_id(random.randrange(n))}/samples",
     "its curve": lambda n: f"/experiments/{experiment_id(random.randrange(n))}/curve",
-    "a study's curves": lambda n: f"/studies/{study_id(random.randrange(n // IN_A_STUDY))}/curves",
+    "a study's curves": lambda n: f"/curves?study={study_id(random.randrange(n // IN_A_STUDY))}",
 }
 """Paths of requests, from the number of stored experiments."""
 SUBMIT, FOLLOW = "submit an experiment", "events on a stream"

@@ -23,7 +23,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.specs.resolution import resolve
 from gaplab.workers.pool import LEAST_S
 
 CORES = (2, 16, 64, 1_000)
@@ -73,7 +73,7 @@ def phases(spec: ExperimentSpec) -> Iterator[Calls]:
 
 def figure() -> Iterator[tuple[int, tuple[Calls, ...]]]:
     """Yield repetitions and phases of each experiment of the paper's Fig. 4, including the direct baseline."""
-    for spec in resolve_study(FIGURE_4):
+    for spec in resolve(FIGURE_4):
         yield spec.repetitions or 0, tuple(phases(spec))
 
 

@@ -55,7 +55,7 @@ def through(client: Client, spec: Mapping[str, Any]) -> Callable[[], int]:
 
     def work() -> int:
         submitted = client.submit(dict(spec)).id
-        while not (read := client.find(submitted)).state.ended:
+        while not (read := client.study(submitted)).state.ended:
             sleep(LOOK_S)
         return read.progress.rollouts_done
 

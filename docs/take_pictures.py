@@ -21,7 +21,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import import_archive
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.experiments.submission import submit_experiment, submit_study
+from gaplab.services.experiments.submission import submit
 from gaplab.services.replay.portraits import portrait
 from gaplab.services.running.execution import claim, record_all
 from gaplab.services.specs.assembly import setting
@@ -89,7 +89,7 @@ def prepared() -> Iterator[tuple[str, dict[str, str]]]:
         for name in STUDIES:
             with (ROOT / "docs" / "studies" / f"{name}.zip").open("rb") as archive:
                 shown = import_archive(store, archive)
-        ids = {"study": shown.study or "", "experiment": shown.experiments[0], "all": ",".join(shown.experiments)}
+        ids = {"study": shown.study, "experiment": shown.experiments[0], "all": ",".join(shown.experiments)}
         ids["toy"] = toy(store)
         ask_for_a_measurement(store)
         store.dispose()
@@ -100,7 +100,7 @@ def prepared() -> Iterator[tuple[str, dict[str, str]]]:
 def toy(store: Store) -> str:
     """Compute the toy of the examples with two strategies, and return the first experiment."""
     spec = json.loads((ROOT / "examples" / "toy.json").read_text()) | {"strategies": ["simulated_fit", "random"]}
-    study = submit_study(store, StudySpec.model_validate(spec))
+    study = submit(store, StudySpec.model_validate(spec))
     while claims := claim(store, "pictures", 1):
         for claimed in claims:
             run(store, claimed, repetition(setting(claimed.spec, claimed.number)))
@@ -119,7 +119,7 @@ def ask_for_a_measurement(store: Store) -> None:
         "repetitions": 1,
         "budget": "smoke",
     }
-    submit_experiment(store, ExperimentSpec.model_validate(spec))
+    submit(store, ExperimentSpec.model_validate(spec))
     for claimed in claim(store, "pictures", 1):
         for delivered in recorded(setting(claimed.spec, claimed.number), claimed.log, claimed.checkpoints):
             if not isinstance(delivered, Pulse):

@@ -30,15 +30,14 @@ class Manifest(Frozen):
     format: Annotated[int, Field(strict=True, ge=1)]
     gaplab: str = Field(max_length=100, description="version of gaplab that wrote the archive")
     revision: str = Field(max_length=32, description="revision of the database that the archive was written from")
-    kind: Literal["study", "experiment"]
-    id: str = Field(max_length=32)
+    id: str = Field(max_length=32, description="id of the study")
     members: dict[str, Member]
 
 
 class ImportRead(Frozen):
     """The result of an import."""
 
-    study: Id | None = Field(default=None, description="id of the study; null for the archive of a single experiment")
+    study: Id
     experiments: tuple[Id, ...] = Field(description="ids of the experiments in this service, in the order of the study")
     renamed: dict[str, str] = Field(
         default_factory=dict,

@@ -1,4 +1,4 @@
-"""Changes to a submitted study or experiment, its rendered notes, and what was deleted."""
+"""Changes to a submitted study, its rendered notes, and what was deleted."""
 
 from typing import Annotated, ClassVar
 
@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field, model_validator
 from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Name, Tag
 
 MOST_TAGS = 20
-"""Tags of one study or experiment."""
+"""Tags of one study."""
 
 Tags = Annotated[tuple[Tag, ...], Field(max_length=MOST_TAGS), AfterValidator(lambda tags: tuple(sorted(set(tags))))]
 """Tags in alphabetical order, each once."""
@@ -57,5 +57,5 @@ class DeletionRead(Frozen):
 
     id: Id
     name: Name
-    study: Id | None = Field(default=None, description="study of a deleted experiment")
+    study: Id | None = Field(default=None, description="study of a deleted experiment; null: a study of several")
     deleted_at: Moment

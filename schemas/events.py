@@ -71,7 +71,7 @@ class EventRead(Frozen):
     number: int = Field(description="number of the event, from 1 without gaps; a reader resumes after it")
     kind: EventKind
     experiment: Id
-    study: Id | None = None
+    study: Id | None = Field(default=None, description="id of its study")
     repetition: int | None = Field(
         default=None, description="number of the repetition; null for an event of the experiment"
     )

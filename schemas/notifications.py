@@ -1,7 +1,7 @@
-"""Notifications of studies and experiments that have ended."""
+"""Notifications of studies that have ended."""
 
 from enum import StrEnum
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
@@ -19,7 +19,7 @@ class Channel(StrEnum):
     """The command of the service: `GAPLAB_NOTIFY_COMMAND`."""
 
     OWN = "own_webhook"
-    """The webhook of one study or experiment."""
+    """The webhook of one study."""
 
 
 class EndedExperiment(Frozen):
@@ -34,8 +34,7 @@ class Notification(Frozen):
     """What a webhook gets as its body, and a command on its standard input. It may arrive more than once."""
 
     id: str = Field(description="the same at each attempt: ignore a message whose id you know", examples=["412-01f2e3"])
-    kind: Literal["study", "experiment"]
-    subject: Id = Field(description="id of the study or the experiment")
+    subject: Id = Field(description="id of the study")
     name: Name
     state: State
     text: str = Field(
@@ -47,7 +46,7 @@ class Notification(Frozen):
 
 
 class WebhookSpec(Frozen):
-    """An address to tell when a study or an experiment has ended."""
+    """An address to tell when a study has ended."""
 
     EXAMPLES: ClassVar[Examples] = {
         "a chat": {"summary": "Post into a chat", "value": {"url": "https://hooks.example.org/services/T0/B0/x"}}
@@ -59,6 +58,6 @@ class WebhookSpec(Frozen):
 
 
 class WebhookRead(Frozen):
-    """The webhook of a study or an experiment, without the rest of its address, which may be a secret."""
+    """The webhook of a study, without the rest of its address, which may be a secret."""
 
     host: str | None = Field(description="host that is told; null: none", examples=["hooks.example.org"])

@@ -101,25 +101,12 @@ class BestRead(FitnessRead):
     strategy: Name
 
 
-class Kept(Frozen):
-    """What people name, describe, tag and archive."""
+class ExperimentRead(Frozen):
+    """An experiment with its resolved spec. Reality's parameters are null until all of its study have ended."""
 
     id: Id
     name: Name
-    notes: str | None = Field(
-        default=None, description="Markdown by people; `/notes` has it as HTML", examples=["the bounds were *too wide*"]
-    )
-    tags: tuple[str, ...] = Field(default=(), description="tags by people", examples=[("gait", "paper")])
-    edits: int = Field(default=0, description="number of changes to the name, notes or tags")
-    archived_at: Moment | None = Field(
-        default=None, description="time since which lists leave it out; null: they do not"
-    )
-
-
-class ExperimentRead(Kept):
-    """An experiment with its resolved spec. Reality's parameters are null until it and its study have ended."""
-
-    study: Id | None = None
+    study: Id = Field(description="id of its study: its own, if it was submitted alone")
     strategy: Name
     direct: bool = Field(
         default=False,
@@ -166,9 +153,22 @@ class ExperimentRead(Kept):
     ended_at: Moment | None = None
 
 
-class StudyRead(Kept):
-    """A study; its state combines those of its experiments."""
+class StudyRead(Frozen):
+    """A study; its state combines those of its experiments.
 
+    Asked for by the id of one experiment, it has that one alone, with its id and name.
+    """
+
+    id: Id
+    name: Name
+    notes: str | None = Field(
+        default=None, description="Markdown by people; `/notes` has it as HTML", examples=["the bounds were *too wide*"]
+    )
+    tags: tuple[str, ...] = Field(default=(), description="tags by people", examples=[("gait", "paper")])
+    edits: int = Field(default=0, description="number of changes to the name, notes or tags")
+    archived_at: Moment | None = Field(
+        default=None, description="time since which lists leave it out; null: they do not"
+    )
     state: State
     caveat: str | None = Field(
         default=None,

@@ -4,9 +4,10 @@ Every missing field has a default, and the defaults are the paper's. A *resolved
 service stores, so a later change of a default changes no stored experiment.
 """
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, Discriminator, Field, Tag, model_validator
 
 from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Seed, from_name
 from gaplab.schemas.measurements import KnownSample
@@ -227,8 +228,20 @@ class StudySpec(SharedSettings, Schedule):
     )
 
 
+def kind_of(spec: object) -> Literal["experiment", "study"]:
+    """Return of what a submitted spec is: it is one of an experiment if it names a strategy, and no strategies."""
+    names = spec.model_fields_set if isinstance(spec, BaseModel) else spec if isinstance(spec, Mapping) else ()
+    return "experiment" if "strategy" in names and "strategies" not in names else "study"
+
+
+AnySpec = Annotated[
+    Annotated[ExperimentSpec, Tag("experiment")] | Annotated[StudySpec, Tag("study")], Discriminator(kind_of)
+]
+"""The spec of a study, or of an experiment, which makes a study of one."""
+
+
 class SpecRead(Frozen):
-    """The spec of a study or an experiment: what a person would submit, and what was stored."""
+    """The spec of a study: what a person would submit, and what was stored."""
 
     spec: dict[str, Any] | None = Field(
         description="the shortest spec that gives the same; null if no single spec gives all experiments",

@@ -3,15 +3,17 @@
 All of them raise StoreUnavailable while the database cannot be used.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import func, select
+from sqlalchemy import func, or_, select
 
 from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.services.core.errors import Conflict
 from gaplab.services.store.models import DeletionRow, EventCounterRow, EventRow, ExperimentRow
-from gaplab.services.store.queries.experiments import get_experiment, get_study, was_deleted
+from gaplab.services.store.queries.experiments import members, was_deleted
 from gaplab.services.store.session import Session, snapshot
+from gaplab.services.store.statements import storable
 
 
 @dataclass(frozen=True)
@@ -19,22 +21,16 @@ class WantedEvents:
     """A selection of events; without a condition, all events.
 
     Attributes:
-        experiment: only events of this experiment.
-        study: only events of this study's experiments.
+        study: only events of this study's experiments, or of the experiment with this id.
         kinds: only events of these kinds.
     """
 
-    experiment: str | None = None
     study: str | None = None
     kinds: frozenset[EventKind] = frozenset()
 
     def has(self, event: EventRead) -> bool:
         """Return whether the selection contains the event."""
-        return (
-            self.experiment in (None, event.experiment)
-            and self.study in (None, event.study)
-            and (not self.kinds or event.kind in self.kinds)
-        )
+        return self.study in (None, event.study, event.experiment) and (not self.kinds or event.kind in self.kinds)
 
 
 @snapshot
@@ -43,10 +39,8 @@ def page(session: Session, after: int, wanted: WantedEvents, *, limit: int) -> E
     row, experiment, newest = EventRow, ExperimentRow, _latest(session)
     study = func.coalesce(experiment.study_id, DeletionRow.study_id)
     query = select(row.number, row.kind, row.experiment_id, study, row.repetition, row.body, row.at)
-    if wanted.experiment is not None:
-        query = query.where(row.experiment_id == wanted.experiment)
     if wanted.study is not None:
-        query = query.where(study == wanted.study)
+        query = query.where(row.experiment_id.in_(_experiments(session, wanted.study)))
     if wanted.kinds:
         query = query.where(row.kind.in_(list(wanted.kinds)))
     query = query.outerjoin(experiment, experiment.id == row.experiment_id)
@@ -60,10 +54,10 @@ def page(session: Session, after: int, wanted: WantedEvents, *, limit: int) -> E
 
 @snapshot
 def check(session: Session, wanted: WantedEvents, after: int = 0) -> None:
-    """Refuse a selection whose experiment, study or preceding event does not exist; deleted ones have events.
+    """Refuse a selection whose study or preceding event does not exist; deleted ones have events.
 
     Raises:
-        NotFound: no such experiment, or no such study.
+        NotFound: no such study or experiment.
         Conflict: there are fewer events than `after`.
     """
     if after > (newest := _latest(session)):
@@ -72,10 +66,15 @@ def check(session: Session, wanted: WantedEvents, after: int = 0) -> None:
             f"an earlier backup: continue after {newest}, or begin with 0"
         )
         raise Conflict(msg)
-    if wanted.experiment is not None and not was_deleted(session, wanted.experiment):
-        get_experiment(session, wanted.experiment)
     if wanted.study is not None and not was_deleted(session, wanted.study):
-        get_study(session, wanted.study)
+        members(session, wanted.study)
+
+
+def _experiments(session: Session, id_: str) -> Sequence[str]:
+    """Return the ids of the experiments of a study, or of the experiment with this id; deleted ones too."""
+    named = storable(id_)
+    found = (select(row.id).where(or_(row.id == named, row.study_id == named)) for row in (ExperimentRow, DeletionRow))
+    return [each for query in found for each in session.scalars(query)]
 
 
 def _latest(session: Session) -> int:

@@ -31,14 +31,14 @@ _SECRETS = (
     (re.compile(rf"(?s)DETAIL:\s.*?(?={_AFTER_DETAIL}|\Z)"), f"DETAIL: {HIDDEN}"),
 )
 
-_PLACE = ("experiment", "repetition")
+_PLACE = ("study", "experiment", "repetition")
 _REQUEST = ("method", "path", "status")
 
 _ACCESS = "uvicorn.access"
 _REPEATING, _MOST_ALIKE, _WINDOW_S = {"asyncio", "uvicorn.error"}, 5, 60.0
 _LONGEST = 1_000_000
 _PROBES = {"/livez", "/readyz", "/metrics"}
-_EXPERIMENT = re.compile(r"^/experiments/([\w-]{1,64})")
+_SUBJECT = re.compile(r"^/(?:studies/(?P<study>[\w-]{1,64})|experiments/(?P<experiment>[\w-]{1,64}))")
 
 
 def configure(stream: TextIO | None = None) -> None:
@@ -107,7 +107,10 @@ class Readable(logging.Formatter):
 
 
 class Json(logging.Formatter):
-    """A JSON object a line: at, level, logger, message; experiment, repetition, request and exception where known."""
+    """A JSON object a line: at, level, logger, message.
+
+    Where they are known it has study, experiment, repetition, request and exception.
+    """
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the record as one line."""
@@ -138,6 +141,6 @@ def _rewrite_requests(record: logging.LogRecord) -> bool:
         return False
     record.msg, record.args = "%s %s %s from %s", (method, path, status, client)
     record.method, record.path, record.status = method, path, status
-    if found := _EXPERIMENT.match(path):
-        record.experiment = found[1]
+    if found := _SUBJECT.match(path):
+        record.__dict__.update(found.groupdict())
     return True

@@ -158,10 +158,10 @@ class Notify(_Environment):
     """Who is told that work has ended: settings of the service's owner, which no request can change.
 
     Attributes:
-        url: webhook that is told of every study, and of every experiment without one. `GAPLAB_NOTIFY_URL`.
+        url: webhook that is told of every study. `GAPLAB_NOTIFY_URL`.
         command: command line that is run for the same, without a shell. `GAPLAB_NOTIFY_COMMAND`.
         secret: key of the signature of webhooks. `GAPLAB_NOTIFY_SECRET`.
-        hosts: hosts that webhooks of single studies and experiments may have, separated by commas; others are refused.
+        hosts: hosts that webhooks of single studies may have, separated by commas; others are refused.
             `GAPLAB_NOTIFY_HOSTS`; none.
     """
 

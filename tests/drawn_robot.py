@@ -11,10 +11,10 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.robots import robots
 from gaplab.services.core.types import Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.session import Store
+from tests.experiments import submit_one
 
 ENGINE = '''
 """An engine without physics."""
@@ -135,7 +135,7 @@ def strode(store: Store, *, iterations: int = 1, **changes: Any) -> str:
     spec = {"strategy": "simulated_fit", "robot": "strider", "engine": "puppet", "iterations": 1, "repetitions": 1}
     reality = {"engine": "puppet", "parameters": HIDDEN}
     more = {"budget": "smoke", "tunables": list(HIDDEN), "reality": reality}
-    experiment = submission.submit_experiment(store, ExperimentSpec.model_validate(spec | more | changes)).id
+    experiment = submit_one(store, ExperimentSpec.model_validate(spec | more | changes)).id
     (claim,) = execution.claim(store, "me", 1)
     known, setting_ = robots[claim.spec.robot.name]().known, setting(claim.spec, 0)
     real = setting_.reality(known)

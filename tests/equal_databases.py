@@ -8,8 +8,8 @@ import psycopg
 
 from gaplab import migrations
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.experiments import submission
 from gaplab.services.store.session import Store
+from tests.experiments import submit_one
 
 
 class Databases:
@@ -30,7 +30,7 @@ class Databases:
             self._execute('CREATE DATABASE "kill_template"')
         migrations.upgrade(self._template)
         store = Store(self._template)
-        submission.submit_experiment(store, spec)
+        submit_one(store, spec)
         store.dispose()
 
     def new(self) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from math import inf, isnan, nan
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
-from gaplab.services.experiments import lifecycle
+from gaplab.services.experiments import lifecycle, listing, submission
+from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Claim
 from gaplab.services.store.session import Store
@@ -59,9 +61,20 @@ def finish(store: Store) -> None:
             run(store, claim, some_log(iterations, recorded=1 + number / 10))
 
 
+def submit_one(store: Store, spec: ExperimentSpec) -> ExperimentRead:
+    """Submit an experiment, alone in its study."""
+    return submission.submit(store, spec).experiments[0]
+
+
+def listed(store: Store, **wanted: Any) -> list[ExperimentRead]:
+    """All experiments of the listed studies, the newest study first."""
+    found = listing.list_studies(store, ListFilter(**wanted), limit=1_000).items
+    return [each for study in found for each in study.experiments]
+
+
 def cancel(store: Store, experiment: str) -> ExperimentRead:
     """Cancel an experiment."""
-    return lifecycle.ask_experiment(store, experiment, Verb.CANCEL)
+    return lifecycle.ask(store, experiment, Verb.CANCEL).experiments[0]
 
 
 def same(first: object, second: object) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.records import StudyRead
 from gaplab.schemas.spec import StudySpec
-from gaplab.services.archives import export_study
+from gaplab.services.archives import export
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.experiments import lifecycle, submission
@@ -67,7 +67,7 @@ def log(recorded: Sequence[float]) -> Iterator[Step]:
 
 def archive(store: Store, label: str, study: Study, folder: Path) -> Path:
     """Run a study, whose fitness is made, and export it."""
-    exported = export_study(store, make(store, label, study).id)
+    exported = export(store, make(store, label, study).id)
     path = folder / f"{label}.zip"
     with exported.file as source, path.open("wb") as target:
         copyfileobj(source, target)
@@ -84,7 +84,7 @@ def make(store: Store, label: str, study: Study) -> StudyRead:
         "seed": 7,
         **study.changes,
     }
-    made = submission.submit_study(store, StudySpec.model_validate(spec))
+    made = submission.submit(store, StudySpec.model_validate(spec))
     recorded = {
         each.id: values(
             each.strategy, study.curves[each.strategy], study.repetitions, 1 if each.level else study.samples + 1
@@ -98,5 +98,5 @@ def make(store: Store, label: str, study: Study) -> StudyRead:
     assert all(execution.complete(store, claim) for claim in claims)
     if study.more:
         execution.hand_back(store, *(claim for claim in every if claim not in claims))
-        lifecycle.ask_study(store, made.id, Verb.STOP)
+        lifecycle.ask(store, made.id, Verb.STOP)
     return made

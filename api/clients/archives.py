@@ -1,4 +1,4 @@
-"""Archives of studies and experiments, sent and received in parts of bounded size."""
+"""Archives of studies, sent and received in parts of bounded size."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,31 +6,29 @@ from functools import partial
 from pathlib import Path
 from typing import IO
 
-from gaplab.api.clients.connection import CONFIRMED, Connection
-from gaplab.api.clients.records import Records, path_of
+from gaplab.api.clients.connection import CONFIRMED, Connection, Of, segment
 from gaplab.schemas.archives import ImportRead
 
 _CHUNK = 2**16
 
 
 class Archives:
-    """Export and import of everything stored about a study or an experiment."""
+    """Export and import of everything stored about a study."""
 
-    def __init__(self, connection: Connection, records: Records) -> None:
+    def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._records = records
 
-    def export(self, id: str, file: str | Path | IO[bytes]) -> None:
-        """Write a study or an experiment into a new file or an open one, as one archive.
+    def export(self, of: Of, file: str | Path | IO[bytes]) -> None:
+        """Write a study, or it with one of its experiments alone, into a new file or an open one, as one archive.
 
         Raises:
             OSError: the file exists already, or cannot be written.
         """
         if isinstance(file, str | Path):
             with _new(Path(file)) as target:
-                self.export(id, target)
+                self.export(of, target)
             return
-        with self._connection.stream("GET", f"{path_of(self._records.find(id))}/export") as answer:
+        with self._connection.stream("GET", f"/studies/{segment(of)}/export") as answer:
             for chunk in answer.iter_bytes():
                 file.write(chunk)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, TypedDict, Unpack
 
 from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
-from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.connection import Connection, Of, segment
 from gaplab.api.clients.driving import Driving, TakenRequest
 from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.mcap_traces import mcap_to_csv
@@ -44,7 +44,7 @@ class Bench:
 
     def requests(
         self,
-        experiment: str | None = None,
+        experiment: Of | None = None,
         *,
         bench: str | None = None,
         operator: str | None = None,
@@ -60,7 +60,7 @@ class Bench:
         again until the service has them.
 
         Args:
-            experiment: id of the experiment; left out: all of them, without end.
+            experiment: the experiment; left out: all of them, without end.
             bench: only requests of this bench.
             operator: name of the driver; left out: this machine's name.
             lease_s: seconds without a heartbeat after which others may take a request.
@@ -71,13 +71,13 @@ class Bench:
             yield from driving.tasks(experiment, bench)
 
     def pending(
-        self, experiment: str | None = None, *, bench: str | None = None, wait_s: float = 0.0
+        self, experiment: Of | None = None, *, bench: str | None = None, wait_s: float = 0.0
     ) -> tuple[RequestRead, ...]:
         """Return the requests that are still wanted, the oldest first; wait for so long if there is none."""
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": wait_s, "limit": PAGE}
         return tuple(self._connection.items(Page[RequestRead], "/requests", **parameters))
 
-    def history(self, experiment: str | None = None, *, bench: str | None = None) -> tuple[RequestRead, ...]:
+    def history(self, experiment: Of | None = None, *, bench: str | None = None) -> tuple[RequestRead, ...]:
         """Return all requests, also those that are measured, failed or withdrawn, the oldest first."""
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "pending": "false", "limit": PAGE}
         return tuple(self._connection.items(Page[RequestRead], "/requests", **parameters))
@@ -210,7 +210,7 @@ class Bench:
         path, content = f"/samples/check?robot={segment(robot)}{query}", [Path(file).read_bytes()]
         return self._connection.upload(SamplesRead, path, content, "text/csv").checked(Path(file))
 
-    def branches(self, experiment: str) -> tuple[BranchRead, ...]:
+    def branches(self, experiment: Of) -> tuple[BranchRead, ...]:
         """Return the steps that corrections closed."""
         return self._connection.get(tuple[BranchRead, ...], f"/experiments/{segment(experiment)}/branches")
 

@@ -2,8 +2,8 @@
 
 with Client("http://127.0.0.1:8000") as client:
     study = client.submit({"robot": "toy_function", "budget": "smoke"})
-    client.wait(study.id)
-    curves = client.curves([study.id])
+    client.wait(study)
+    curves = client.curves(study)
 
 Programs import it from `gaplab`.
 """
@@ -21,7 +21,6 @@ from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.clients.events import EventLog
 from gaplab.api.clients.figures import Figures
 from gaplab.api.clients.keeping import Keeping
-from gaplab.api.clients.life_cycle import LifeCycle
 from gaplab.api.clients.records import Records
 from gaplab.api.clients.replays import Replays
 from gaplab.api.clients.reports import Reports
@@ -37,8 +36,8 @@ class Client:
     """A client of the service.
 
     Its methods belong to its parts, which share one connection: `client.figure` is short for `client.figures.draw`,
-    `client.samples` for `client.tables.samples`. Every method that sends a request raises ServiceError with the
-    service's problem, or ServiceUnreachable.
+    `client.samples` for `client.tables.samples`. A study or an experiment may be given in place of its id. Every method
+    that sends a request raises ServiceError with the service's problem, or ServiceUnreachable.
 
     Args:
         url: address of the service; left out: GAPLAB_URL, or this machine.
@@ -61,26 +60,25 @@ class Client:
         self.url, self._connection = connection.url, connection
         self.submission = submission = Submission(connection)
         self.records = records = Records(connection)
-        self.life_cycle = life_cycle = LifeCycle(connection, records)
         self.keeping = keeping = Keeping(connection, records)
-        self.results = results = Results(connection, records)
+        self.results = results = Results(connection)
         self.tables = tables = Tables(connection, results)
-        self.figures, self.archives = figures, archives = Figures(connection, records), Archives(connection, records)
-        self.reports, self.replays = reports, replays = Reports(connection, records), Replays(connection)
+        self.figures, self.archives = figures, archives = Figures(connection), Archives(connection)
+        self.reports, self.replays = reports, replays = Reports(connection), Replays(connection)
         self.event_log, self.watcher = event_log, watcher = EventLog(connection), Watcher(records, results)
         self.bench = bench = Bench(connection, records)
 
         self.submit, self.estimate, self.check = submission.submit, submission.estimate, submission.check
-        self.find, self.study, self.experiment = records.find, records.study, records.experiment
-        self.studies, self.experiments, self.edit = records.studies, records.experiments, records.edit
-        self.repetitions, self.attempts, self.reveal = records.repetitions, records.attempts, records.reveal
-        self.spec, self.provenance, self.accept_versions = records.spec, records.provenance, life_cycle.accept_versions
-        self.pause, self.resume, self.stop = life_cycle.pause, life_cycle.resume, life_cycle.stop
-        self.cancel, self.extend, self.schedule = life_cycle.cancel, life_cycle.extend, life_cycle.schedule
-        self.retry, self.notify, self.tag, self.untag = life_cycle.retry, keeping.notify, keeping.tag, keeping.untag
+        self.study, self.experiment, self.studies = records.study, records.experiment, records.studies
+        self.edit, self.spec, self.repetitions = records.edit, records.spec, records.repetitions
+        self.attempts, self.provenance, self.retry = records.attempts, records.provenance, records.retry
+        self.pause, self.resume, self.stop = records.pause, records.resume, records.stop
+        self.cancel, self.extend, self.schedule = records.cancel, records.extend, records.schedule
+        self.accept_versions, self.notify = records.accept_versions, keeping.notify
+        self.tag, self.untag = keeping.tag, keeping.untag
         self.archive, self.unarchive, self.delete = keeping.archive, keeping.unarchive, keeping.delete
         self.views, self.save_view, self.delete_view = keeping.views, keeping.save_view, keeping.delete_view
-        self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
+        self.curves, self.curves_csv = results.curves, results.curves_csv
         self.compare, self.diff, self.curve, self.samples = results.compare, results.diff, tables.curve, tables.samples
         self.misfit, self.misfit_csv, self.figure_kinds = results.misfit, results.misfit_csv, figures.kinds
         self.simulators, self.predictions, self.readings = tables.simulators, tables.predictions, tables.readings

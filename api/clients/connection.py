@@ -6,20 +6,24 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import TypedDict, TypeVar, Unpack
+from typing import TypeAlias, TypedDict, TypeVar, Unpack
 from urllib.parse import quote
 from uuid import uuid4
 
 import httpx2
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from gaplab.api.clients.bodies import json_of
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, error_of
-from gaplab.schemas.records import Page
+from gaplab.schemas.records import ExperimentRead, Page, StudyRead
 from gaplab.services.settings import InvalidSetting, Settings
 
 T = TypeVar("T")
-Parameter = str | int | float | Sequence[str] | None
+Of: TypeAlias = str | StudyRead | ExperimentRead
+"""A study, or one experiment of it: its id, or itself."""
+
+Parameter = Of | int | float | Sequence[Of] | None
+Plain = str | int | float | Sequence[str]
 
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 """Hosts that are this machine; requests to them ignore the proxies of the environment."""
@@ -46,7 +50,7 @@ FINAL = (httpx2.ConnectError, httpx2.InvalidURL, httpx2.UnsupportedProtocol)
 class Request(TypedDict, total=False):
     """Optional parts of a request."""
 
-    params: Mapping[str, Parameter]
+    params: Mapping[str, Plain]
     json: object
     content: Iterable[bytes]
     headers: Mapping[str, str]
@@ -101,7 +105,7 @@ class Connection:
 
     def get_bytes(self, path: str, /, **parameters: Parameter) -> bytes:
         """Return the answer to a GET as it is; with `wait_s`, the service may take so much longer."""
-        given = {name: value for name, value in parameters.items() if value is not None}
+        given = plain(parameters)
         wait_s = given.get("wait_s")
         timeout_s = self._timeout_s + (wait_s if isinstance(wait_s, int | float) else 0.0)
         return self._repeat("GET", path, params=given, timeout=timeout_s)
@@ -145,12 +149,8 @@ class Connection:
 
         Raises:
             ValueError: a number of the body is not finite.
-            TypeError: JSON cannot hold a value of the body, or a parameter is a record in place of its id.
+            TypeError: JSON cannot hold a value of the body.
         """
-        for name, value in request.get("params", {}).items():
-            for each in value if isinstance(value, list | tuple) else (value,):
-                if isinstance(each, BaseModel):
-                    raise TypeError(f"{name}: an id is a text, not {each!r:.100}; give its `.id`")
         if "json" in request:
             request["json"] = json_of(request["json"])
         try:
@@ -220,13 +220,33 @@ def _without_scheme(url: str) -> str:
     return f"{url!r} is not the address of a service: it begins with http:// or https://, like http://{rest or 'HOST'}"
 
 
-def segment(id: str) -> str:
+def id_of(of: Of) -> str:
+    """Return the id of a study or an experiment, which may be given in place of it.
+
+    Raises:
+        TypeError: it is neither.
+    """
+    id = of.id if isinstance(of, StudyRead | ExperimentRead) else of
+    if not isinstance(id, str):
+        raise TypeError(f"an id or a name is a text, not {id!r:.100}")
+    return id
+
+
+def plain(parameters: Mapping[str, Parameter]) -> dict[str, Plain]:
+    """Return the parameters that are given, with ids in place of studies and experiments."""
+
+    def with_ids(value: Of | float | Sequence[Of]) -> Plain:
+        if isinstance(value, str | int | float):
+            return value
+        return id_of(value) if isinstance(value, StudyRead | ExperimentRead) else [id_of(each) for each in value]
+
+    return {name: with_ids(value) for name, value in parameters.items() if value is not None}
+
+
+def segment(of: Of) -> str:
     """Return any id or name as one segment of a path; servers decode a slash before they split the path.
 
     Raises:
-        TypeError: it is no text.
+        TypeError: it is not a text, a study or an experiment.
     """
-    if not isinstance(id, str):
-        hint = "; give its `.id`" if isinstance(id, BaseModel) else ""
-        raise TypeError(f"an id or a name is a text, not {id!r:.100}{hint}")
-    return quote(id.replace("/", "%2F"), safe="", errors="replace").replace(".", "%2E") or "%20"
+    return quote(id_of(of).replace("/", "%2F"), safe="", errors="replace").replace(".", "%2E") or "%20"

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
-from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.connection import Connection, Of, segment
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final, is_of_gaplab, refuses_sender
 from gaplab.api.clients.journal import PAUSE_S, Journal, log
 from gaplab.api.clients.motions import DriverMotion
@@ -134,7 +134,7 @@ class Driving:
         self.connection, self.records, self.journal = connection, records, journal
         self._lease_s, self._operator = lease_s, operator or socket.gethostname()
 
-    def tasks(self, experiment: str | None, bench: str | None) -> Iterator[TakenRequest]:
+    def tasks(self, experiment: Of | None, bench: str | None) -> Iterator[TakenRequest]:
         """Yield taken requests until the experiment has ended; send first what an earlier run left in the journal."""
         self._send_leftovers()
         while True:
@@ -146,7 +146,7 @@ class Driving:
             with task.take.kept():
                 yield task
 
-    def _next(self, experiment: str | None, bench: str | None) -> TakenRequest | None:
+    def _next(self, experiment: Of | None, bench: str | None) -> TakenRequest | None:
         """Take the oldest open request; None if there is none, or others have the bench.
 
         Raises:
@@ -179,7 +179,7 @@ class Driving:
             log.info("not taken: %s", error)
             return None
 
-    def _ended(self, experiment: str) -> bool:
+    def _ended(self, experiment: Of) -> bool:
         try:
             return self.records.experiment(experiment).state.ended
         except (ServiceError, ServiceUnreachable):

@@ -9,7 +9,7 @@ import httpx2
 from pydantic import ValidationError
 
 from gaplab.schemas.mistakes import Problem
-from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.records import StudyRead
 
 
 class ServiceError(Exception):
@@ -38,15 +38,14 @@ class UnknownService(ServiceUnreachable):
 
 
 class ExperimentFailed(Exception):
-    """A study or an experiment ended without completing; `ended` is its last state, the message says why."""
+    """A study ended without completing; `ended` is its last state, the message says why."""
 
-    def __init__(self, ended: ExperimentRead | StudyRead) -> None:
+    def __init__(self, ended: StudyRead) -> None:
         self.ended = ended
-        experiments = ended.experiments if isinstance(ended, StudyRead) else (ended,)
-        reasons = sorted({reason for experiment in experiments for reason in experiment.reasons})
+        reasons = sorted({reason for experiment in ended.experiments for reason in experiment.reasons})
         super().__init__("; ".join([f"{ended.name} ({ended.id}) ended as {ended.state}", *reasons]))
 
-    def __reduce__(self) -> tuple[type[Self], tuple[ExperimentRead | StudyRead]]:
+    def __reduce__(self) -> tuple[type[Self], tuple[StudyRead]]:
         """Return the class and the arguments from which a copy of the error is made."""
         return type(self), (self.ended,)
 

@@ -1,9 +1,9 @@
 """Events of experiments: one iterator, even if the connection breaks."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
-from gaplab.api.clients.connection import Connection, Parameter
+from gaplab.api.clients.connection import Connection, Parameter, Plain, plain
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
 from gaplab.schemas.events import EventPage, EventRead
 
@@ -26,7 +26,7 @@ class EventLog:
         follow: bool = True,
         patience_s: float = 60.0,
         retry_s: float = RETRY_S,
-        **filters: str | int | Sequence[str] | None,
+        **filters: Parameter,
     ) -> Iterator[EventRead]:
         """Yield events in their order, each once.
 
@@ -34,7 +34,7 @@ class EventLog:
             follow: continue forever with new events, over broken connections; otherwise, end with the latest.
             patience_s: longest time without a service before the error is raised.
             retry_s: pause before a broken stream is opened again.
-            filters: as in the API: experiment, study, kind, after; left out: all events.
+            filters: as in the API: study, kind, after; left out: all events.
         """
         if follow:
             yield from self._follow(filters, patience_s, retry_s)
@@ -43,10 +43,8 @@ class EventLog:
             yield from page.items
             filters["after"] = page.last
 
-    def _follow(
-        self, filters: dict[str, str | int | Sequence[str] | None], patience_s: float, retry_s: float
-    ) -> Iterator[EventRead]:
-        parameters: dict[str, Parameter] = {name: value for name, value in filters.items() if value is not None}
+    def _follow(self, filters: dict[str, Parameter], patience_s: float, retry_s: float) -> Iterator[EventRead]:
+        parameters = plain(filters)
         last: int | None = None
         away_since: float | None = None
         while True:
@@ -63,7 +61,7 @@ class EventLog:
                     raise
             time.sleep(retry_s)
 
-    def _stream(self, parameters: dict[str, Parameter], last: int | None) -> Iterator[EventRead | None]:
+    def _stream(self, parameters: dict[str, Plain], last: int | None) -> Iterator[EventRead | None]:
         """Yield each event of one stream, and None for any other sign that the service is there."""
         headers = {"Accept": "text/event-stream"} | ({} if last is None else {"Last-Event-ID": str(last)})
         with self._connection.stream("GET", "/events", params=parameters, headers=headers, timeout=SILENCE_S) as answer:

@@ -1,17 +1,18 @@
 """Figures that show themselves in a notebook and save themselves in the format of a file's suffix."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
-from gaplab.api.clients.connection import Connection
-from gaplab.api.clients.errors import ServiceError
-from gaplab.api.clients.records import Record, Records, experiments_of, split
+from gaplab.api.clients.connection import Connection, Of, id_of
 
 _FIGURES = "/figures/"
+
+OF_SEVERAL = ("curves", "coordinates")
+"""Kinds of figures of studies; others are of one experiment."""
 
 FORMATS = ("svg", "png", "pdf", "html", "json")
 
@@ -62,35 +63,28 @@ class Figure:
 class Figures:
     """Figures that the service draws."""
 
-    def __init__(self, connection: Connection, records: Records) -> None:
+    def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._records = records
 
-    def draw(self, /, *ids: str, of: str = "curves", **options: str | float | bool | None) -> Figure:
-        """Return a figure of experiments and studies; the service draws it when it is shown or saved.
+    def draw(self, /, *what: Of, of: str = "curves", **options: str | float | bool | None) -> Figure:
+        """Return a figure of studies; the service draws it when it is shown or saved, and refuses what is unknown then.
 
         Args:
-            ids: ids of experiments, or of studies for all of their experiments.
+            what: studies, for all of their experiments, and single experiments.
             of: kind of figure, like "curves" or "predictions"; `figure_kinds` lists them.
             options: options of the kind, like band="sd" or title="…"; docs/figures.md lists them.
 
         Raises:
-            ServiceError: an id is unknown. An unknown kind or option raises when the figure is drawn.
             TypeError: an option would change the format or the experiments.
         """
         if wrong := sorted({"format", "study", "experiment"} & options.keys()):
             msg = "give ids first, and the format as the suffix of the file that you save"
             raise TypeError(f"{', '.join(wrong)}: no option of a figure; {msg}")
-        records = [self._records.find(id) for id in ids]
-        drawn = split(records)
+        ids = tuple(map(id_of, what))
+        drawn = {"study" if of in OF_SEVERAL else "experiment": ids}
 
         def draw(format: str) -> bytes:  # noqa: A002 - as the API says
-            try:
-                return self._connection.get_bytes(f"{_FIGURES}{of}", **(drawn | {"format": format} | options))
-            except ServiceError as error:
-                if drawn["study"] and any(mistake.pointer == "study" for mistake in error.problem.errors):
-                    raise ValueError(_one_experiment(of, records)) from error
-                raise
+            return self._connection.get_bytes(f"{_FIGURES}{of}", **(drawn | {"format": format} | options))
 
         return Figure(of, ids, draw)
 
@@ -98,9 +92,3 @@ class Figures:
         """Return the kinds of figures that the service draws."""
         paths = self._connection.get(_Paths, "/openapi.json").paths
         return tuple(path.removeprefix(_FIGURES) for path in paths if path.startswith(_FIGURES))
-
-
-def _one_experiment(kind: str, records: Sequence[Record]) -> str:
-    """Return a sentence that names the experiments of which this kind of figure draws one."""
-    names = [f"{each.id} ({each.name})" for record in records for each in experiments_of(record)]
-    return f"a figure of {kind} has one experiment, not a study; choose one of {', '.join(names)}"

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.connection import Connection, Of, segment
 from gaplab.schemas.replays import Replay
 
 FORMATS = ("gif", "webp", "mp4")
@@ -14,15 +14,15 @@ class Replays:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def replay(self, id: str, /, **choice: int | str | None) -> Replay:
+    def replay(self, of: Of, /, **choice: int | str | None) -> Replay:
         """Return the motion of a controller of an experiment in its simulator and in reality.
 
         Its choice, as in the API: repetition, iteration (left out: the last that was measured), kind ("transfer" or
         "sample") and simulator.
         """
-        return self._connection.get(Replay, f"/experiments/{segment(id)}/replay", **choice)
+        return self._connection.get(Replay, f"/experiments/{segment(of)}/replay", **choice)
 
-    def video(self, id: str, file: str | Path, /, **choice: int | str | None) -> Path:
+    def video(self, of: Of, file: str | Path, /, **choice: int | str | None) -> Path:
         """Write a replay into a file with the suffix .gif, .webp or .mp4; missing folders are created.
 
         The choice is that of `replay`, and `width` in pixels.
@@ -30,7 +30,7 @@ class Replays:
         path = Path(file)
         if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
             raise ValueError(f"{path} has no suffix of a video; permitted: {', '.join(FORMATS)}")
-        return self._connection.save(path, f"/experiments/{segment(id)}/video", format=format_, **choice)
+        return self._connection.save(path, f"/experiments/{segment(of)}/video", format=format_, **choice)
 
     def robot_picture(self, name: str, file: str | Path, *, theme: str = "light", width: int = 640) -> Path:
         """Write a picture of a robot of the catalogue, as it stands at the start, into a PNG file.

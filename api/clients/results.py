@@ -1,10 +1,12 @@
 """Results of experiments: curves, comparisons and misfit."""
 
 from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+from pydantic import BaseModel
 
 from gaplab.api.clients.comparisons import Comparisons
-from gaplab.api.clients.connection import Connection, Parameter, segment
-from gaplab.api.clients.records import Records, experiments_of, split
+from gaplab.api.clients.connection import Connection, Of, Parameter, id_of, segment
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Curve
 from gaplab.schemas.differences import SpecDiff
@@ -12,23 +14,24 @@ from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.records import Page
 from gaplab.schemas.results import SimulatorRead
 
+Several: TypeAlias = Of | Sequence[Of]
+
 PAGE = 5_000
 """Samples or simulators of one request: the most that the service permits."""
 
 MOST_CURVES = 100
-"""Experiments of one request: the most that the service permits."""
+"""Ids of one request: the most that the service permits."""
 
 
 class Results:
     """Results of experiments, from the service's records of steps."""
 
-    def __init__(self, connection: Connection, records: Records) -> None:
+    def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._records = records
 
-    def best_simulator(self, id: str) -> SimulatorRead | None:
+    def best_simulator(self, of: Of) -> SimulatorRead | None:
         """Return the tuned simulator of the latest iteration with the smallest error; None if there is none yet."""
-        simulators = self._connection.items(Page[SimulatorRead], f"/experiments/{segment(id)}/simulators", limit=PAGE)
+        simulators = self._connection.items(Page[SimulatorRead], f"/experiments/{segment(of)}/simulators", limit=PAGE)
         best = [each for each in simulators if each.rank == 0 and each.error is not None]
         latest = max((each.iteration for each in best), default=0)
         return min(
@@ -37,31 +40,26 @@ class Results:
             default=None,
         )
 
-    def curves(self, ids: Sequence[str], fitness: str = "recorded") -> tuple[Curve, ...]:
-        """Return the curves of experiments, and of all experiments of studies, in this order.
+    def curves(self, of: Several, fitness: str = "recorded") -> tuple[Curve, ...]:
+        """Return the curves of all experiments of studies, and of single experiments, in this order.
 
         Args:
-            ids: ids of experiments and studies.
+            of: studies and experiments; or a single one.
             fitness: recorded as in the paper, `transferred` controllers alone, or the best of these so far,
                 `equal_chances`.
         """
-        return self.curves_of(self._experiments(ids), fitness)
-
-    def curves_of(self, experiments: Sequence[str], fitness: str = "recorded") -> tuple[Curve, ...]:
-        """Return the curves of experiments, given by their ids, with one request per hundred."""
-        parts = _hundreds(experiments)
-        found = (self._connection.get(tuple[Curve, ...], "/curves", experiment=ids, fitness=fitness) for ids in parts)
+        found = (self._connection.get(tuple[Curve, ...], "/curves", study=ids, fitness=fitness) for ids in _parts(of))
         return tuple(curve for part in found for curve in part)
 
-    def curves_csv(self, ids: Sequence[str]) -> str:
-        """Return the curves of experiments and studies as CSV."""
-        requests = ({"experiment": part, "format": "csv"} for part in _hundreds(self._experiments(ids)))
+    def curves_csv(self, of: Several) -> str:
+        """Return the curves of studies and experiments as CSV."""
+        requests = ({"study": part, "format": "csv"} for part in _parts(of))
         first, *others = (self._connection.get_bytes("/curves", **request).decode() for request in requests)
         return first + "".join(other.partition("\n")[2] for other in others)  # the header stands once
 
     def compare(  # noqa: PLR0913 - each is a parameter of the operation
         self,
-        experiments: Sequence[str],
+        of: Several,
         first: int | None = None,
         last: int | None = None,
         *,
@@ -77,7 +75,7 @@ class Results:
         whose p are too small.
 
         Args:
-            experiments: ids of experiments, or of studies for all of their experiments; or a single id.
+            of: studies, for all of their experiments, and single experiments; or a single study.
             first: first number of real-world evaluations; left out: `last`.
             last: last number; left out: the last that all experiments have.
             margin: difference in the unit of fitness; `equivalence` of a pair says whether it differs by less.
@@ -85,7 +83,7 @@ class Results:
             intervals: with intervals; left out: for up to 20 experiments.
             fitness: whose fitness counts, as in `curves`.
         """
-        query: dict[str, Parameter] = {"experiment": self._experiments(experiments), "from": first, "to": last}
+        query: dict[str, Parameter] = {"study": _ids(of), "from": first, "to": last}
         query |= {"margin": margin, "margin_of_direct": margin_of_direct, "intervals": intervals, "fitness": fitness}
         pairs = self._connection.get(tuple[Comparison, ...], "/comparisons", **query)
         query |= {"from": pairs[0].from_evaluations, "to": pairs[0].to_evaluations}  # also if an experiment goes on
@@ -95,28 +93,26 @@ class Results:
 
         return Comparisons(pairs, formatted)
 
-    def diff(self, *ids: str) -> SpecDiff:
+    def diff(self, *of: Of) -> SpecDiff:
         """Return the settings in which studies and experiments differ; of a single study, its experiments."""
-        return self._connection.get(SpecDiff, "/differences", **split(map(self._records.find, ids)))
+        return self._connection.get(SpecDiff, "/differences", study=_ids(of))
 
-    def misfit(self, id: str) -> MisfitRead:
+    def misfit(self, of: Of) -> MisfitRead:
         """Return how far the tuned simulators of an experiment are from reality and from each other."""
-        return self._connection.get(MisfitRead, f"/experiments/{segment(id)}/misfit")
+        return self._connection.get(MisfitRead, f"/experiments/{segment(of)}/misfit")
 
-    def misfit_csv(self, id: str) -> str:
+    def misfit_csv(self, of: Of) -> str:
         """Return the misfit of an experiment as CSV: a line for each iteration and each number over repetitions."""
-        return self._connection.get_bytes(f"/experiments/{segment(id)}/misfit", format="csv").decode()
-
-    def _experiments(self, ids: Sequence[str]) -> list[str]:
-        return [experiment.id for id in _several(ids) for experiment in experiments_of(self._records.find(id))]
+        return self._connection.get_bytes(f"/experiments/{segment(of)}/misfit", format="csv").decode()
 
 
-def _several(ids: Sequence[str]) -> Sequence[str]:
-    """Return ids; a single one, which is a sequence of letters, as a list."""
-    return [ids] if isinstance(ids, str) else ids
+def _ids(of: Several) -> list[str]:
+    """Return the ids of studies and experiments; a single one, which may be a sequence of letters, is one of them."""
+    return [id_of(of)] if isinstance(of, str | BaseModel) else list(map(id_of, of))
 
 
-def _hundreds(experiments: Sequence[str]) -> Iterator[list[str]]:
+def _parts(of: Several) -> Iterator[list[str]]:
     """Split the ids into requests; no ids at all are one request, for the service to refuse."""
-    for start in range(0, len(experiments) or 1, MOST_CURVES):
-        yield list(experiments[start : start + MOST_CURVES])
+    ids = _ids(of)
+    for start in range(0, len(ids) or 1, MOST_CURVES):
+        yield ids[start : start + MOST_CURVES]

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from gaplab.api.clients.confirmation import can_ask, confirm
 from gaplab.api.clients.connection import CONFIRMED, Connection, segment
 from gaplab.schemas.estimates import EstimateRead
-from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.records import StudyRead
 from gaplab.schemas.sensitivity import SensitivityRead, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 
@@ -26,8 +26,8 @@ class Submission:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def submit(self, spec: Spec, *, yes: bool = False) -> ExperimentRead | StudyRead:
-        """Queue an experiment if the spec names a `strategy`, else a study.
+    def submit(self, spec: Spec, *, yes: bool = False) -> StudyRead:
+        """Queue a study; a spec that names a `strategy`, and no `strategies`, makes a study of one experiment.
 
         In a terminal or a notebook, the estimated cost is shown first, and above an hour a person is asked. With `yes`,
         it is submitted without estimate and question, whatever it costs.
@@ -37,18 +37,13 @@ class Submission:
         """
         return self.send(spec, confirm_cost=yes or (can_ask() and confirm(self.estimate(spec), input)))
 
-    def send(self, spec: Spec, *, confirm_cost: bool = False) -> ExperimentRead | StudyRead:
+    def send(self, spec: Spec, *, confirm_cost: bool = False) -> StudyRead:
         """Submit without estimate and question; the service refuses a high cost unless it is confirmed."""
-        body, query = _body(spec), CONFIRMED if confirm_cost else ""
-        if is_experiment(body):
-            return self._connection.post(ExperimentRead, f"/experiments{query}", body)
-        return self._connection.post(StudyRead, f"/studies{query}", body)
+        return self._connection.post(StudyRead, f"/studies{CONFIRMED if confirm_cost else ''}", _body(spec))
 
     def estimate(self, spec: Spec) -> EstimateRead:
-        """Return the rollouts, the duration and the resolved specs of an experiment or a study; nothing is stored."""
-        body = _body(spec)
-        kind = "experiments" if is_experiment(body) else "studies"
-        return self._connection.post(EstimateRead, f"/{kind}/estimate", body)
+        """Return the rollouts, the duration and the resolved specs of a study; nothing is stored."""
+        return self._connection.post(EstimateRead, "/studies/estimate", _body(spec))
 
     def check(self, spec: Spec | SensitivitySpec, *, every_s: float = 0.5) -> SensitivityRead:
         """Return the effect of the tunables of a spec on fitness; the service computes it if it is not known yet.
@@ -75,8 +70,3 @@ def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:
         hint = "; read a file with json.loads(Path(…).read_text())" if isinstance(spec, str | Path) else ""
         raise TypeError(f"a spec is a dict, an ExperimentSpec or a StudySpec, not {spec!r:.100}{hint}")
     return dict(spec)
-
-
-def is_experiment(body: Mapping[str, Any]) -> bool:
-    """Return whether a spec is that of an experiment, and not of a study."""
-    return "strategy" in body and "strategies" not in body

@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.connection import Connection, Of, id_of, segment
 from gaplab.api.clients.frames import frame, pandas_library
 from gaplab.api.clients.results import PAGE, Results
 from gaplab.schemas.curves import CurvePoint
@@ -27,30 +27,30 @@ class Tables:
         self._connection = connection
         self._results = results
 
-    def curve(self, *ids: str, each: bool = False) -> "pandas.DataFrame":
+    def curve(self, *of: Of, each: bool = False) -> "pandas.DataFrame":
         """Return curves: fitness in reality against the number of real-world evaluations.
 
         Args:
-            ids: ids of experiments, or of studies for all of their experiments.
+            of: studies, for all of their experiments, and single experiments.
             each: one row per repetition, instead of one with their mean, SD, n and 95 % interval.
         """
         numbers = ("repetition", "evaluations", "fitness") if each else STATISTICS
         rows = [
             (curve.experiment, curve.name, curve.strategy, *row)
-            for curve in self._results.curves(ids)
+            for curve in self._results.curves(of)
             for point in curve.points
             for row in _rows(point, each=each)
         ]
         return frame(rows, ("experiment", "name", "strategy", *numbers), numbers, WHOLE)
 
-    def samples(self, id: str, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
+    def samples(self, of: Of, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
         """Return the real-world evaluations of an experiment, with a column for each gene.
 
         `repeats` is the number of values whose mean is the fitness, 0 if the measurement failed. `standard_error` is
         nan without repeats. Without evaluations there are no columns of genes. With a `repetition` or a `kind`,
         "sample" (learned from) or "probe" (only recorded), the table has only those.
         """
-        samples = self._samples(id, repetition, kind)
+        samples = self._samples(of, repetition, kind)
         columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at", "standard_error")
         rows = [[*(getattr(sample, name) for name in columns), _repeats(sample)] for sample in samples]
         numbers = ("repetition", "iteration", "fitness", "standard_error", "repeats")
@@ -59,7 +59,7 @@ class Tables:
         genes = pandas_library().DataFrame([sample.genome for sample in samples], index=table.index)
         return table.join(genes.rename(columns=lambda gene: f"gene_{gene}"))
 
-    def readings(self, id: str, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
+    def readings(self, of: Of, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
         """Return what the sensors said in the real-world evaluations of an experiment, with a column for each sensor.
 
         A row is one time of one evaluation; choose them as for `samples`. Values are in the sensors' units, nan where a
@@ -68,20 +68,22 @@ class Tables:
         Raises:
             LookupError: the robot or its task is not installed in the service, so the sensors are unknown.
         """
-        sensors = self._connection.get(ExperimentRead, f"/experiments/{segment(id)}").sensors
+        sensors = self._connection.get(ExperimentRead, f"/experiments/{segment(of)}").sensors
         if sensors is None:
-            raise LookupError(f"the sensors of {id} are unknown: its robot or task is not installed in the service")
+            raise LookupError(
+                f"the sensors of {id_of(of)} are unknown: its robot or task is not installed in the service"
+            )
         names = [f"{name}_{unit}" for name, unit in zip(sensors.names, sensors.units, strict=True)]
         rows = [
             (sample.repetition, sample.iteration, str(sample.kind), time_s, *values)
-            for sample in self._samples(id, repetition, kind)
+            for sample in self._samples(of, repetition, kind)
             if sample.readings is not None
             for time_s, *values in _values(sample.readings, sensors)
         ]
         numbers = ("repetition", "iteration", "time_s", *names)
         return frame(rows, ("repetition", "iteration", "kind", "time_s", *names), numbers, WHOLE).astype({"kind": str})
 
-    def simulators(self, id: str, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
+    def simulators(self, of: Of, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
         """Return the tuned simulators of an experiment, with a column for each tunable; rank 0 is an iteration's best.
 
         `squared_error` is a sum over samples and grows with them; `error` is per sample, in the unit of the
@@ -90,14 +92,14 @@ class Tables:
         Without simulators there are no columns of tunables. With a `repetition` or an `iteration`, 0 for the untuned
         start, the table has only those.
         """
-        path = f"/experiments/{segment(id)}/simulators"
+        path = f"/experiments/{segment(of)}/simulators"
         filters = {"limit": PAGE, "repetition": repetition, "iteration": iteration}
         simulators = list(self._connection.items(Page[SimulatorRead], path, **filters))
         columns = ("repetition", "iteration", "rank", "squared_error", "error")
         table = frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns, WHOLE)
         return table.join(pandas_library().DataFrame([_tuned(row) for row in simulators], index=table.index))
 
-    def predictions(self, id: str, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":
+    def predictions(self, of: Of, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":
         """Return the fitness of each sample in reality, and in simulation before and after it was measured.
 
         The service computes predictions at the first request, and this method waits for it. If there are very many
@@ -107,17 +109,17 @@ class Tables:
             TimeoutError: it takes longer than `timeout_s`; computed predictions are kept, so ask again.
         """
         pandas_library()
-        deadline, path = time.monotonic() + timeout_s, f"/experiments/{segment(id)}/predictions"
+        deadline, path = time.monotonic() + timeout_s, f"/experiments/{segment(of)}/predictions"
         while (predictions := self._connection.get(Predictions, path)).pending:
             if time.monotonic() > deadline:
-                msg = f"{predictions.pending} predictions of {id} are not computed after {timeout_s:g} s; ask again"
-                raise TimeoutError(msg)
+                msg = f"{predictions.pending} predictions of {id_of(of)} are not computed after {timeout_s:g} s"
+                raise TimeoutError(f"{msg}; ask again")
             time.sleep(every_s)
         columns = tuple(Prediction.model_fields)
         return frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns, WHOLE)
 
-    def _samples(self, id: str, repetition: int | None, kind: str | None) -> list[SampleRead]:
-        path = f"/experiments/{segment(id)}/samples"
+    def _samples(self, of: Of, repetition: int | None, kind: str | None) -> list[SampleRead]:
+        path = f"/experiments/{segment(of)}/samples"
         return list(self._connection.items(Page[SampleRead], path, limit=PAGE, repetition=repetition, kind=kind))
 
 

@@ -8,11 +8,11 @@ from pydantic import ValidationError
 from typer.core import TyperGroup
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands import completion
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.api.commands.json_output import echo
 from gaplab.schemas.mistakes import sentence
+from gaplab.schemas.records import StudyRead
 
 
 class Commands(TyperGroup):
@@ -47,7 +47,7 @@ PLUGINS = "Plug-ins"
 OTHERS = "Access and help"
 """The groups of `gaplab --help`; commands are in them in the order of use."""
 
-Id = Annotated[str, typer.Argument(metavar="ID", help="a study or an experiment", autocompletion=completion.ids)]
+Id = Annotated[str, typer.Argument(metavar="ID", help="a study, or one experiment", autocompletion=completion.ids)]
 ExperimentId = Annotated[str, typer.Argument(metavar="ID", help="an experiment", autocompletion=completion.experiments)]
 Ids = Annotated[list[str], typer.Argument(metavar="ID", help="studies or experiments", autocompletion=completion.ids)]
 AsJson = Annotated[bool, typer.Option("--json", help="print one JSON document, for programs")]
@@ -77,7 +77,7 @@ def connect(url: str | None) -> Client:
     return Client(url or None)
 
 
-def print_warnings(record: Record) -> None:
+def print_warnings(study: StudyRead) -> None:
     """Print the warnings of experiments on standard error."""
-    for warning in sorted({warning for experiment in experiments_of(record) for warning in experiment.warnings}):
+    for warning in sorted({warning for experiment in study.experiments for warning in experiment.warnings}):
         echo(f"warning: {warning}", err=True)

@@ -28,9 +28,9 @@ def export(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Export a study or an experiment into one archive of JSON and Parquet."""
+    """Export a study, perhaps with one of its experiments alone, into one archive of JSON and Parquet."""
     with connect(url) as client:
-        file = to or Path(f"gaplab-{client.find(id).id}.zip")  # the service's id, never a path that was typed
+        file = to or Path(f"gaplab-{client.study(id).id}.zip")  # the service's id, never a path that was typed
         with appearing(file, PRIVATE) as part, part.open("wb") as target:
             client.export(id, target)
     size = file.stat().st_size
@@ -50,7 +50,7 @@ def import_(
     if as_json:
         print_json(stored)
         return
-    echo(stored.study or stored.experiments[0])
+    echo(stored.study)
     for old, new in stored.renamed.items():
         echo(f"{old} is taken here; its new id is {new}", err=True)
     for cancelled in stored.called_off:

@@ -1,10 +1,10 @@
 """Shell completion of arguments; if the service does not answer at once, there is none."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
-from gaplab.schemas.records import ExperimentRead, Page, StudyRead
+from gaplab.schemas.records import ExperimentRead, StudyRead
 
 PATIENCE_S = 1.5
 """Longest wait for an answer; a shell that waits longer seems to hang."""
@@ -24,13 +24,13 @@ KINDS = (
 
 
 def ids(incomplete: str) -> list[tuple[str, str]]:
-    """Return the newest studies and experiments, each with its name and state."""
-    return _completions(incomplete, lambda client: [*_named(client.studies), *_named(client.experiments)])
+    """Return the newest studies and their experiments, each with its name and state."""
+    return _completions(incomplete, lambda client: [*_named(_newest(client)), *_experiments(client)])
 
 
 def experiments(incomplete: str) -> list[tuple[str, str]]:
-    """Return the newest experiments, each with its name and state."""
-    return _completions(incomplete, lambda client: _named(client.experiments))
+    """Return the experiments of the newest studies, each with its name and state."""
+    return _completions(incomplete, _experiments)
 
 
 def plugins(incomplete: str) -> list[tuple[str, str]]:
@@ -52,8 +52,16 @@ def _completions(incomplete: str, candidates: Callable[[Client], Iterable[tuple[
         return []
 
 
-def _named(records: Callable[..., Page[ExperimentRead] | Page[StudyRead]]) -> list[tuple[str, str]]:
-    return [(record.id, f"{record.name} ({record.state})") for record in records(limit=MOST).items]
+def _newest(client: Client) -> Sequence[StudyRead]:
+    return client.studies(limit=MOST).items
+
+
+def _experiments(client: Client) -> list[tuple[str, str]]:
+    return _named([each for study in _newest(client) for each in study.experiments])
+
+
+def _named(records: Sequence[ExperimentRead | StudyRead]) -> list[tuple[str, str]]:
+    return [(record.id, f"{record.name} ({record.state})") for record in records]
 
 
 def _plugins(client: Client) -> Iterator[tuple[str, str]]:

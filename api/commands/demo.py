@@ -99,9 +99,7 @@ def _submitted(name: str, spec: dict[str, Any], client: Client, console: Console
         client.wait(client.submit(demo_size.trial(spec), yes=True).id, progress=False)
         spec, reason = demo_size.sized(spec, client.estimate)
         console.print(f"\n[bold]{name}[/]: {reason}; the study is sized for this machine")
-    study = client.submit(spec, yes=True)
-    assert isinstance(study, StudyRead)  # the specs name no `strategy`
-    return study
+    return client.submit(spec, yes=True)
 
 
 def _show(name: str, study: StudyRead, client: Client, folder: Path, console: Console) -> None:

@@ -7,7 +7,6 @@ import typer
 from rich.markup import escape
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.records import experiments_of
 from gaplab.api.commands import completion, tables
 from gaplab.api.commands.app import RESULTS, AsJson, Url, app, connect
 from gaplab.api.commands.json_output import print_result
@@ -61,8 +60,8 @@ def _with_files(names: list[str], url: str | None) -> SpecDiff:
 def _stored(client: Client, id: str) -> "SpecColumn":
     from gaplab.services.specs.differences import SpecColumn
 
-    record = client.find(id)
-    return SpecColumn(record.id, record.name, tuple(experiment.spec for experiment in experiments_of(record)))
+    study = client.study(id)
+    return SpecColumn(study.id, study.name, tuple(experiment.spec for experiment in study.experiments))
 
 
 def _cell(values: Values) -> str:

@@ -10,7 +10,6 @@ from gaplab.api.commands import completion
 from gaplab.api.commands.app import SPECS, Url, app, connect
 from gaplab.api.commands.json_output import print_json
 from gaplab.schemas.events import EventKind, EventRead
-from gaplab.schemas.records import StudyRead
 
 
 @app.command(rich_help_panel=SPECS)
@@ -26,13 +25,9 @@ def events(
     ] = False,
     url: Url = None,
 ) -> None:
-    """Print the events of an experiment, a study, or the whole service, one on each line."""
+    """Print the events of a study, or of the whole service, one on each line."""
     with connect(url) as client:
-        record = client.find(id) if id else None
-        study = record.id if isinstance(record, StudyRead) else None
-        experiment = record.id if record and not study else None
-        kinds = [each.value for each in kind or []]
-        found = client.events(follow=follow, study=study, experiment=experiment, kind=kinds, after=after)
+        found = client.events(follow=follow, study=id, kind=[each.value for each in kind or []], after=after)
         if as_json and not follow:
             print_json(found)
             return

@@ -1,17 +1,16 @@
-"""Commands that tag, archive and delete studies and experiments, and those of saved views."""
+"""Commands that tag, archive and delete studies, and those of saved views."""
 
 from typing import Annotated
 
 import typer
 from rich.markup import escape
 
-from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands.app import KEEPING, RESULTS, AsJson, Id, Url, app, connect
 from gaplab.api.commands.json_output import print_result
 from gaplab.api.commands.questions import demand_yes
 from gaplab.api.commands.tables import table
 from gaplab.schemas.records import StudyRead
-from gaplab.schemas.views import Order, Shown, ViewRead
+from gaplab.schemas.views import Order, ViewRead
 
 ViewName = Annotated[str, typer.Argument(metavar="NAME", help="name of the view")]
 
@@ -31,7 +30,7 @@ def tag(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Add tags to a study or an experiment, or remove them."""
+    """Add tags to a study, or remove them."""
     with connect(url) as client:
         record = client.untag(id, *tags) if remove else client.tag(id, *tags)
     print_result(record, f"{record.id}: {record.name} [{', '.join(record.tags)}]", as_json=as_json)
@@ -39,7 +38,7 @@ def tag(
 
 @app.command(rich_help_panel=KEEPING)
 def archive(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Leave a study or an experiment that has ended out of lists; everything else stays."""
+    """Leave a study that has ended out of lists; everything else stays."""
     with connect(url) as client:
         record = client.archive(id)
     text = f"{record.name} is archived; `gaplab unarchive {record.id}` undoes it."
@@ -48,7 +47,7 @@ def archive(id: Id, as_json: AsJson = False, url: Url = None) -> None:
 
 @app.command(rich_help_panel=KEEPING)
 def unarchive(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """List an archived study or experiment again."""
+    """List an archived study again."""
     with connect(url) as client:
         record = client.unarchive(id)
     print_result(record, f"{record.name} is listed again.", as_json=as_json)
@@ -61,11 +60,10 @@ def delete(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Delete a study or an experiment that has ended, with its results, for good; `gaplab export` saves it first."""
+    """Delete a study that has ended, or one experiment of it, for good; `gaplab export` saves it first."""
     with connect(url) as client:
-        record = client.find(id)
         if not yes:
-            demand_yes(_size(record))
+            demand_yes(_size(client.study(id)))
         deleted = client.delete(id)
     print_result(deleted, f"{deleted.name} ({deleted.id}) is deleted.", as_json=as_json)
 
@@ -79,7 +77,7 @@ def notify(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Tell a webhook when a study or an experiment has ended; GAPLAB_NOTIFY_URL of the service tells of all."""
+    """Tell a webhook when a study has ended; GAPLAB_NOTIFY_URL of the service tells of all."""
     with connect(url) as client:
         told = client.notify(id, webhook)
     print_result(told, f"{told.host} is told when {id} has ended." if told.host else "None is told.", as_json=as_json)
@@ -92,8 +90,8 @@ def list_views(context: typer.Context, as_json: AsJson = False, url: Url = None)
         return
     with connect(url) as client:
         found = client.views()
-    rows = [(escape(view.name), view.shows, escape(view.query or "all"), view.sort) for view in found]
-    columns = ("name", "shows", "query", "sort")
+    rows = [(escape(view.name), escape(view.query or "all"), view.sort) for view in found]
+    columns = ("name", "query", "sort")
     shown = table(columns, rows) if found else "No views yet; `gaplab views save NAME --query Q` saves one."
     print_result(found, shown, as_json=as_json)
 
@@ -102,14 +100,13 @@ def list_views(context: typer.Context, as_json: AsJson = False, url: Url = None)
 def save(
     name: ViewName,
     query: Annotated[str | None, typer.Option(help="query; left out: all", show_default=False)] = None,
-    shows: Annotated[Shown, typer.Option(help="what it lists; all: studies, and experiments without a study")] = "all",
     sort: Annotated[Order, typer.Option(help="field to sort by; a minus reverses the order")] = "-created_at",
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Save a query as a view, in place of the view with this name."""
     with connect(url) as client:
-        view = client.save_view(name, query, shows=shows, sort=sort)
+        view = client.save_view(name, query, sort=sort)
     print_result(view, _sentence(view, "is saved"), as_json=as_json)
 
 
@@ -125,8 +122,6 @@ def _sentence(view: ViewRead, done: str) -> str:
     return f"The view {view.name!r} {done}: {view.query or 'all'}"
 
 
-def _size(record: Record) -> str:
-    experiments = experiments_of(record)
-    repetitions = sum(experiment.progress.repetitions for experiment in experiments)
-    within = f" in {len(experiments)} experiments" if isinstance(record, StudyRead) else ""
-    return f"{record.name!r} with {repetitions} repetitions{within}"
+def _size(study: StudyRead) -> str:
+    within = f" in {len(study.experiments)} experiments" if len(study.experiments) > 1 else ""
+    return f"{study.name!r} with {study.progress.repetitions} repetitions{within}"

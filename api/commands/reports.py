@@ -25,7 +25,7 @@ def report(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Print the verdict on a study or an experiment, or save its report: figures, tables, tests, provenance."""
+    """Print the verdict on a study, or save its report: figures, tables, tests, provenance."""
     for file in save or []:
         if file.suffix.removeprefix(".").lower() not in FORMATS:
             msg = f"{file} has no suffix of a report; permitted: {', '.join(FORMATS)}"

@@ -6,18 +6,17 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from gaplab.api.clients.submission import is_experiment
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.submission import read_spec
 from gaplab.schemas.mistakes import pointer_to, sentence
-from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.schemas.spec import ExperimentSpec, StudySpec, kind_of
 from gaplab.services.archives.members import member_of
 from gaplab.services.archives.opening import readable_zip
 from gaplab.services.core.errors import InvalidArchive, InvalidSpec
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins import folders
 from gaplab.services.specs.differences import SpecColumn
-from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import resolve
 
 MOST_BYTES = 50_000_000
 """Size of the specs in an archive; a spec has about two thousand bytes."""
@@ -68,6 +67,5 @@ def _archived(file: Path) -> tuple[dict[str, Any], ...]:
 
 
 def _completed(spec: dict[str, Any]) -> tuple[dict[str, Any], ...]:
-    resolved = [resolve_experiment(ExperimentSpec.model_validate(spec))] if is_experiment(spec) else None
-    studied = resolved or resolve_study(StudySpec.model_validate(spec))
-    return tuple(each.model_dump(mode="json") for each in studied)
+    kind = ExperimentSpec if kind_of(spec) == "experiment" else StudySpec
+    return tuple(each.model_dump(mode="json") for each in resolve(kind.model_validate(spec)))

@@ -11,7 +11,6 @@ import typer
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.confirmation import confirm, sentence
 from gaplab.api.clients.progress.text import console, counts, state_text
-from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
@@ -19,6 +18,7 @@ from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.api.commands.questions import keyboard
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import StudyRead
 
 SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - for standard input")]
 
@@ -34,7 +34,7 @@ def submit(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Submit an experiment, or a study if the spec names several strategies or none.
+    """Submit a study; a spec that names one strategy is that of a single experiment.
 
     The estimated cost is shown first, on standard error. Above an hour, a person at a terminal is asked.
     """
@@ -50,7 +50,7 @@ def submit(
             _watch(client, record.id, as_json=as_json)
 
 
-def submit_confirmed(client: Client, spec: Mapping[str, Any], *, yes: bool) -> Record:
+def submit_confirmed(client: Client, spec: Mapping[str, Any], *, yes: bool) -> StudyRead:
     """Show the estimated cost of a spec, ask a person at a terminal if it is long, and submit it.
 
     Raises:
@@ -77,7 +77,7 @@ def watch(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Watch a study or an experiment until it ends: live curves and repetitions in a terminal, lines in a log."""
+    """Watch a study until it ends: live curves and repetitions in a terminal, lines in a log."""
     with connect(url) as client:
         _watch(client, id, as_json=as_json, curves=True, every_s=every, patience_s=patience)
 
@@ -101,10 +101,10 @@ def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  
         msg = f"the service continues with it; `gaplab watch {id}` shows the progress again"
         raise CommandError(msg, Exit.INTERRUPTED) from None
     print_result(record, f"{record.name}: {state_text(record)}; {counts(record.progress)}.", as_json=as_json)
-    for reason in sorted({reason for experiment in experiments_of(record) for reason in experiment.reasons}):
+    for reason in sorted({reason for experiment in record.experiments for reason in experiment.reasons}):
         echo(f"  {reason}", err=True)
     print_warnings(record)
-    if any(each.state is not State.COMPLETED for each in experiments_of(record)):
+    if any(each.state is not State.COMPLETED for each in record.experiments):
         raise typer.Exit(Exit.FAILED)
 
 

@@ -8,8 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from gaplab.api.clients.progress.text import colored, fitness, left, percent, standing
-from gaplab.api.clients.records import Record
+from gaplab.api.clients.progress.text import Record, colored, fitness, left, percent, standing
 from gaplab.api.commands.completion import KINDS
 from gaplab.schemas.curves import Curve, CurvePoint, from_before
 from gaplab.schemas.lifecycle import State
@@ -116,9 +115,9 @@ def minute(moment: datetime | None) -> str:
 
 
 def _record(record: Record) -> tuple[str, ...]:
-    many = f" ({len(record.experiments)})" if isinstance(record, StudyRead) else ""
+    many = f" ({len(record.experiments)})" if isinstance(record, StudyRead) and len(record.experiments) > 1 else ""
     progress = (fitness(record), percent(record.progress), left(record))
-    tags = f" [dim]{escape(' '.join(record.tags))}[/]" if record.tags else ""
+    tags = f" [dim]{escape(' '.join(record.tags))}[/]" if isinstance(record, StudyRead) and record.tags else ""
     return record.id, escape(record.name) + many + tags, standing(record), *progress, minute(record.created_at)
 
 

@@ -33,7 +33,7 @@ RECHECK_S = 10.0
 
 READING = {"GET", "HEAD", "OPTIONS"}
 
-ASKING = {"/studies/estimate", "/experiments/estimate", "/samples/check"}
+ASKING = {"/studies/estimate", "/samples/check"}
 """POST requests that only read: the question is too long for an address."""
 
 

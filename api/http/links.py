@@ -2,26 +2,8 @@
 
 from typing import Any
 
-FROM_EXPERIMENT = (
-    "read_experiment",
-    "list_repetitions",
-    "list_samples",
-    "list_simulators",
-    "read_misfit",
-    "read_curve",
-    "edit_experiment",
-    "read_provenance",
-    "export_experiment",
-    "pause_experiment",
-    "resume_experiment",
-    "stop_experiment",
-    "cancel_experiment",
-    "retry_experiment",
-    "schedule_experiment",
-)
 FROM_STUDY = (
     "read_study",
-    "read_study_curves",
     "edit_study",
     "export_study",
     "pause_study",
@@ -29,6 +11,17 @@ FROM_STUDY = (
     "stop_study",
     "cancel_study",
     "retry_study",
+    "schedule_study",
+)
+FROM_EXPERIMENT = (
+    *FROM_STUDY,
+    "read_experiment",
+    "list_repetitions",
+    "list_samples",
+    "list_simulators",
+    "read_misfit",
+    "read_curve",
+    "read_provenance",
 )
 FROM_CHECK = ("read_sensitivity",)
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from itertools import islice
 from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from fastapi import Request
 from pydantic import BaseModel
@@ -32,9 +32,14 @@ def explain(error: Mapping[str, Any], body: object, request: Request) -> SpecErr
         request: its route knows the valid fields and parameters.
     """
     place, *path = error["loc"]
+    kinds = _models(request.scope["route"].body_field.field_info.annotation) if place == "body" else []
+    if len(kinds) > 1 and path:  # the kind of the body comes first
+        kinds = [each for each in kinds if each.__name__.lower().startswith(str(path[0]))]
+        path = path[1:]
     path = path[: _depth(body, path)] if place == "body" else path
     if error["type"] == "extra_forbidden":
-        return _unknown_field(str(place), path, error["input"], request)
+        fields = _fields(kinds, path[:-1]) if place == "body" else tuple(_parameters(request))
+        return _unknown_field(str(place), path, error["input"], fields)
     permitted, message = permitted_by(error), str(finite(sentence(error, path)))
     if error["type"] == "model_attributes_type" and isinstance(error["input"], bytes):
         message = "send the body as JSON, with the header `Content-Type: application/json`"
@@ -93,11 +98,9 @@ def _nearest(value: object, permitted: tuple[str, ...] | str | None) -> str | No
     return next(iter(get_close_matches(value, permitted, n=1, cutoff=0.5)), None)
 
 
-def _unknown_field(place: str, path: Sequence[str | int], value: object, request: Request) -> SpecError:
+def _unknown_field(place: str, path: Sequence[str | int], value: object, fields: tuple[str, ...]) -> SpecError:
     name = _text(path[-1])
-    fields = _fields(request, path[:-1]) if place == "body" else tuple(_parameters(request))
-    kind = "field" if place == "body" else "parameter"
-    found = unknown_name(_pointer(place, path), kind, name, fields)
+    found = unknown_name(_pointer(place, path), "field" if place == "body" else "parameter", name, fields)
     return SpecError(
         pointer=found.pointer,
         value=finite(value),
@@ -107,20 +110,20 @@ def _unknown_field(place: str, path: Sequence[str | int], value: object, request
     )
 
 
-def _fields(request: Request, path: Sequence[str | int]) -> tuple[str, ...]:
-    annotation: Any = request.scope["route"].body_field.field_info.annotation
+def _fields(models: Sequence[type[BaseModel]], path: Sequence[str | int]) -> tuple[str, ...]:
+    """Return the names of the fields at a place in one of these models."""
     for part in path:
-        models = _models(annotation)
         if models and part in models[0].model_fields:
-            annotation = models[0].model_fields[str(part)].annotation
-    models = _models(annotation)
+            models = _models(models[0].model_fields[str(part)].annotation)
     return tuple(models[0].model_fields) if models else ()
 
 
 def _models(annotation: object) -> list[type[BaseModel]]:
-    """Return the models in an annotation like `Model`, `Model | None` or `tuple[Model, ...]`."""
+    """Return the models in an annotation like `Model`, `Model | None`, `tuple[Model, ...]` or `Annotated[Model, …]`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
+    if get_origin(annotation) is Annotated:
+        return _models(get_args(annotation)[0])
     if get_origin(annotation) in {Union, UnionType, tuple}:
         return [model for part in get_args(annotation) for model in _models(part)]
     return []

@@ -1,4 +1,4 @@
-"""Archives: export an experiment or a study with everything in it, and import it again."""
+"""Archives: export a study with everything in it, and import it again."""
 
 from collections.abc import Iterator
 from typing import Annotated
@@ -26,19 +26,6 @@ _CONTENT = "A zip of JSON Lines and Parquet, one member for each table; `manifes
 
 
 @router.get(
-    "/experiments/{id}/export",
-    summary="Export an experiment",
-    response_class=Response,
-    response_description=_CONTENT,
-    responses=_EXPORTED,
-)
-def export_experiment(id: Id, store: StoreDep, line: LineDep) -> Response:
-    """Export all of an experiment as of one moment; reality's parameters are null while they are hidden."""
-    with line.turn():
-        return _sent(archives.export_experiment(store, id))
-
-
-@router.get(
     "/studies/{id}/export",
     summary="Export a study",
     response_class=Response,
@@ -46,9 +33,12 @@ def export_experiment(id: Id, store: StoreDep, line: LineDep) -> Response:
     responses=_EXPORTED,
 )
 def export_study(id: Id, store: StoreDep, line: LineDep) -> Response:
-    """Export all of a study and its experiments as of one moment."""
+    """Export all of a study as of one moment, or the study with one of its experiments alone.
+
+    Reality's parameters are null while they are hidden.
+    """
     with line.turn():
-        return _sent(archives.export_study(store, id))
+        return _sent(archives.export(store, id))
 
 
 @router.post(
@@ -67,8 +57,7 @@ def import_archive(
     Experiments that had not ended become CANCELLED; those on a bench obey the limits of a submission, and are PAUSED.
     """
     stored = archives.import_archive(store, request.state.body, query.given(admitted))
-    route, id = ("read_study", stored.study) if stored.study else ("read_experiment", stored.experiments[0])
-    response.headers["Location"] = str(request.app.url_path_for(route, id=id))
+    response.headers["Location"] = str(request.app.url_path_for("read_study", id=stored.study))
     return stored
 
 

@@ -106,7 +106,7 @@ async def list_requests(
 
     A waiting request counts as an open event stream.
     """
-    until, which = monotonic() + query.wait_s, WantedEvents(experiment=query.experiment, kinds=_NEWS)
+    until, which = monotonic() + query.wait_s, WantedEvents(study=query.experiment, kinds=_NEWS)
     page, latest = await run_sync(_look, store, query)
     if latest is not None:
         with streams.open(caller.token):

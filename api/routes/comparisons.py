@@ -4,10 +4,10 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from gaplab.api.http.attachments import attachment
-from gaplab.api.http.dependencies import Id, Parameters, StoreDep
+from gaplab.api.http.dependencies import Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.routes.curves import FITNESS, Ids
 from gaplab.schemas.comparisons import Comparison
@@ -63,7 +63,7 @@ class ComparisonQuery(MarginQuery):
     Over a range, each repetition is one value: its mean over the range.
     """
 
-    experiment: Annotated[Ids, Field(min_length=2)]
+    study: Ids
     format: Literal["json", "csv", "latex"] = "json"
     from_evaluations: Evaluations = Field(
         default=None, alias="from", description="first number of real-world evaluations; left out: `to`"
@@ -93,7 +93,7 @@ def compare_experiments(
     try:
         pairs = compare(
             store,
-            query.experiment,
+            query.study,
             from_evaluations=query.from_evaluations,
             to_evaluations=query.to_evaluations,
             margin=query.chosen(),
@@ -106,26 +106,15 @@ def compare_experiments(
     if query.format == "csv":
         return attachment(comparisons_csv(pairs), "text/csv", "gaplab-comparisons.csv")
     if query.format == "latex":
-        unit = unit_of(store, query.experiment[0])
+        unit = unit_of(store, pairs[0].first)
         return attachment(comparisons_latex(pairs, unit), "application/x-latex", "gaplab-comparisons.tex")
     return pairs
 
 
 class DifferencesQuery(Parameters):
-    """The studies and experiments whose settings to compare."""
+    """The studies whose settings to compare."""
 
-    experiment: list[Id] = Field(default=[], max_length=100, description="id of an experiment; repeat for more")
-    study: list[Id] = Field(
-        default=[],
-        max_length=20,
-        description="id of a study, which is one column; a single study alone is compared experiment by experiment",
-    )
-
-    @model_validator(mode="after")
-    def _something_is_compared(self) -> "DifferencesQuery":
-        if not self.experiment and not self.study:
-            raise ValueError("name what to compare, as in ?experiment=…&experiment=… or ?study=…&study=…")
-        return self
+    study: Ids
 
 
 @router.get(
@@ -135,8 +124,9 @@ class DifferencesQuery(Parameters):
     responses=documented(404, 422),
 )
 def read_spec_differences(store: StoreDep, query: Annotated[DifferencesQuery, Query()]) -> SpecDiff:
-    """Return the settings of the resolved specs that differ: studies first, then experiments, one column each.
+    """Return the settings of the resolved specs that differ, with a column for each study or experiment.
 
-    Tunables are compared by name. Parameters of reality are compared once they may be shown.
+    A single study is compared experiment by experiment. Tunables are compared by name. Parameters of reality are
+    compared once they may be shown.
     """
-    return read_differences(store, list(dict.fromkeys(query.study)), list(dict.fromkeys(query.experiment)))
+    return read_differences(store, query.study)

@@ -13,7 +13,10 @@ from gaplab.services.results import curves
 
 router = APIRouter(tags=["curves"])
 
-Ids = Annotated[list[Id], Field(min_length=1, max_length=100, description="ids of experiments; repeat for more")]
+Ids = Annotated[
+    list[Id],
+    Field(min_length=1, max_length=100, description="id of a study, or of an experiment of one; repeat for more"),
+]
 
 FITNESS: Fitness = Field(
     default=Fitness.RECORDED,
@@ -35,9 +38,9 @@ class CurveQuery(Parameters):
 
 
 class CurvesQuery(CurveQuery):
-    """The experiments whose curves to return, and the format."""
+    """The studies whose curves to return, and the format."""
 
-    experiment: Ids
+    study: Ids
 
 
 @router.get(
@@ -54,30 +57,15 @@ def read_curve(id: Id, store: StoreDep, query: Annotated[CurveQuery, Query()]) -
 
 
 @router.get(
-    "/studies/{id}/curves",
-    summary="Read a study's curves",
-    response_model=tuple[Curve, ...],
-    response_description="One for each experiment",
-    responses=_CSV | documented(404, 422),
-)
-def read_study_curves(id: Id, store: StoreDep, query: Annotated[CurveQuery, Query()]) -> tuple[Curve, ...] | Response:
-    """Return the curves of a study's experiments, in the order of the study."""
-    return _formatted(curves.study_curves(store, id, query.fitness), query)
-
-
-@router.get(
     "/curves",
-    summary="Read the curves of any experiments",
+    summary="Read the curves of studies",
     response_model=tuple[Curve, ...],
     response_description="In the order of the query",
     responses=_CSV | documented(404, 422),
 )
 def read_curves(store: StoreDep, query: Annotated[CurvesQuery, Query()]) -> tuple[Curve, ...] | Response:
-    """Return the curves of the named experiments, in that order."""
-    return _formatted(curves.curves(store, query.experiment, query.fitness), query)
-
-
-def _formatted(found: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:
+    """Return the curves of studies, and of single experiments, in that order, each once."""
+    found = curves.curves(store, query.study, query.fitness)
     return _csv(found) if query.format == "csv" else found
 
 

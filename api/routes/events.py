@@ -27,14 +27,13 @@ _STREAM: Responses = {200: {"content": {"text/event-stream": {"schema": {"type":
 class EventFilter(Parameters):
     """The events to return."""
 
-    experiment: Id | None = Field(default=None, description="only events of this experiment")
-    study: Id | None = Field(default=None, description="only events of this study's experiments")
+    study: Id | None = Field(default=None, description="only events of this study, or of this experiment")
     kind: list[EventKind] = Field(default=[], max_length=50, description="only events of these kinds; repeat for more")
     after: After = 0
 
     def which(self) -> WantedEvents:
         """Return the selection of events for the service."""
-        return WantedEvents(experiment=self.experiment, study=self.study, kinds=frozenset(self.kind))
+        return WantedEvents(study=self.study, kinds=frozenset(self.kind))
 
 
 class EventPaging(EventFilter):

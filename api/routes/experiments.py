@@ -9,9 +9,9 @@ from gaplab.api.http import conditional, links
 from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Id, Paging, Parameters, StoreDep, created
 from gaplab.api.http.problems import Responses, documented
-from gaplab.api.routes.studies import Confirming, EditBody, RecordFilter, RevealingQuery
-from gaplab.schemas.lifecycle import State
+from gaplab.api.routes.studies import Confirming, RevealingQuery
 from gaplab.schemas.misfit import MisfitRead
+from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import (
     AttemptRead,
     ExperimentRead,
@@ -22,9 +22,10 @@ from gaplab.schemas.records import (
     SimulatorRead,
 )
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.experiments import editing, listing, reading, submission
+from gaplab.services.experiments import reading, submission
 from gaplab.services.experiments.views import with_sensors
 from gaplab.services.results.misfit import misfit, misfit_csv
+from gaplab.services.running import provenance
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
 
@@ -45,14 +46,6 @@ class MisfitQuery(Parameters):
     """The format of the misfit."""
 
     format: Literal["json", "csv"] = "json"
-
-
-class ExperimentFilter(RecordFilter):
-    """The experiments to list, and their order."""
-
-    study: Id | None = Field(default=None, description="only experiments of this study")
-    alone: bool = Field(default=False, description="only experiments without a study")
-    state: State | None = Field(default=None, description="only experiments in this state")
 
 
 class SampleFilter(Paging):
@@ -83,20 +76,9 @@ class SimulatorFilter(Paging):
 def submit_experiment(
     spec: Experiment, store: StoreDep, admitted: AdmissionDep, query: Confirming, request: Request, response: Response
 ) -> ExperimentRead:
-    """Queue an experiment. Whatever the spec leaves out has the paper's value."""
-    done = submission.admit_experiment(store, spec, query.given(admitted))
-    return created(done, response, request.app.url_path_for("read_experiment", id=done.answer.id))
-
-
-@router.get(
-    "",
-    summary="List the experiments",
-    response_description="The newest first",
-    responses=documented(404, 422),
-)
-def list_experiments(store: StoreDep, query: Annotated[ExperimentFilter, Query()]) -> Page[ExperimentRead]:
-    """List experiments, by default the newest first. A cursor is valid only for the list that returned it."""
-    return listing.list_experiments(store, query.wanted(), limit=query.limit, cursor=query.cursor)
+    """Queue an experiment, alone in a study with its id and name. What the spec leaves out has the paper's value."""
+    done = submission.submit_once(store, spec, query.given(admitted))
+    return created(done, response, request.app.url_path_for("read_experiment", id=done.answer.id)).experiments[0]
 
 
 @router.get(
@@ -107,24 +89,9 @@ def list_experiments(store: StoreDep, query: Annotated[ExperimentFilter, Query()
     responses=conditional.CACHED | documented(404, 422),
 )
 def read_experiment(id: Id, store: StoreDep, caller: CallerDep, request: Request, query: RevealingQuery) -> Response:
-    """Return an experiment with its resolved spec; reality's parameters are null until it has ended."""
+    """Return an experiment with its resolved spec; reality's parameters are null until its study has ended."""
     experiment = with_sensors(reading.read_experiment(store, id, reveal=query.permitted(caller)))
-    return conditional.tagged(request, experiment, experiment.edits)
-
-
-@router.patch(
-    "/{id}",
-    summary="Edit an experiment",
-    response_model=ExperimentRead,
-    response_description="After the edit",
-    responses=conditional.TAGGED | documented(404, 412, 413, 415, 422, 428),
-)
-def edit_experiment(
-    id: Id, edit: EditBody, store: StoreDep, request: Request, if_match: conditional.IfMatch = None
-) -> Response:
-    """Change its name, notes or tags. `If-Match` names the `ETag` of what you edit; progress does not invalidate it."""
-    experiment = editing.edit_experiment(store, id, edit, starting_from=conditional.starting_from(if_match))
-    return conditional.tagged(request, experiment, experiment.edits)
+    return conditional.tagged(request, experiment)
 
 
 @router.get(
@@ -187,3 +154,14 @@ def read_misfit(id: Id, store: StoreDep, query: Annotated[MisfitQuery, Query()])
 def list_attempts(id: Id, number: Annotated[int, Path(ge=0, le=1_000_000)], store: StoreDep) -> tuple[AttemptRead, ...]:
     """List the attempts at a repetition: supervisor, start, end, outcome, reason. A lost repetition is queued again."""
     return reading.list_attempts(store, id, number)
+
+
+@router.get(
+    "/{id}/provenance",
+    summary="Read an experiment's provenance",
+    response_description="In chronological order",
+    responses=documented(404),
+)
+def read_provenance(id: Id, store: StoreDep) -> ProvenanceRead:
+    """Return the versions of gaplab, Python, engines and libraries, the commit and the machine of each supervisor."""
+    return provenance.read(store, id)

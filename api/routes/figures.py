@@ -1,13 +1,14 @@
 """Figures of studies and experiments, for the browser, for notebooks and for papers."""
 
 from dataclasses import replace
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, FastAPI, Query, Request, Response
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import FigureQuery, answer, responses
+from gaplab.api.routes.curves import Ids
 from gaplab.schemas.curves import Fitness
 from gaplab.schemas.figures import FigureRead
 from gaplab.services.core.errors import NotFound
@@ -21,7 +22,7 @@ from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import TITLE, titled
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.results import curves
-from gaplab.services.results.coordinates import experiment_coordinates, simulator_coordinates
+from gaplab.services.results.coordinates import setting_coordinates, simulator_coordinates
 from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.specs.resolution import is_direct, takes_samples
@@ -40,18 +41,9 @@ NO_SAMPLES = "a strategy without samples tunes no simulators"
 
 
 class CoordinatesDrawing(FigureQuery):
-    """The experiments to draw, and how."""
+    """The studies to draw, and how."""
 
-    experiment: list[Id] = Field(default=[], max_length=100, description="id of an experiment; repeat for more")
-    study: list[Id] = Field(
-        default=[], max_length=20, description="id of a study, for all of its experiments; repeat for more"
-    )
-
-    @model_validator(mode="after")
-    def _something_is_drawn(self) -> Self:
-        if not self.experiment and not self.study:
-            raise ValueError("name an experiment or a study, as in ?study=… or ?experiment=…&experiment=…")
-        return self
+    study: Ids
 
 
 class CurvesDrawing(CoordinatesDrawing):
@@ -91,7 +83,7 @@ class SimulatorsDrawing(ExperimentDrawing):
 
 @router.get("/curves", summary="Draw curves", response_model=FigureRead, responses=responses())
 def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Response:
-    """Draw the paper's Fig. 4 for any studies and experiments: curves and levels with bands."""
+    """Draw the paper's Fig. 4 for any studies: curves and levels with bands."""
     return answer(_curves(store, query), query)
 
 
@@ -128,14 +120,11 @@ def draw_coordinates(store: StoreDep, query: Annotated[CoordinatesDrawing, Query
     Of one experiment, each line is the best simulator of an iteration: its tunables, its error per sample, and the
     real fitness of the controller that evolved in it. Of several, each line is an experiment with its final fitness.
     """
-    if len(query.experiment) == 1 and not query.study:
-        alone = ExperimentDrawing(experiment=query.experiment[0], title=query.title)
+    if len(query.study) == 1 and len(found := reading.read(store, query.study[0]).experiments) == 1:
+        alone = ExperimentDrawing(experiment=found[0].id, title=query.title)
         figure = simulator_coordinates(store, alone.experiment, title=_title(store, alone))
         return answer(_explained(store, alone, figure), query)
-    title = query.title
-    if title is None:
-        title = ", ".join(reading.read_study(store, id).name for id in query.study)
-    return answer(experiment_coordinates(store, query.study, query.experiment, title=title), query)
+    return answer(setting_coordinates(store, query.study, title=_names(store, query)), query)
 
 
 @router.get(
@@ -175,6 +164,14 @@ def _title(store: Store, query: ExperimentDrawing) -> str:
     return titled(experiment.name, experiment.strategy, TITLE)
 
 
+def _names(store: Store, query: CoordinatesDrawing) -> str:
+    """Return the title; left out, the names of the studies that have several experiments."""
+    if query.title is not None:
+        return query.title
+    studies = (reading.read(store, id) for id in query.study)
+    return ", ".join(each.name for each in studies if len(each.experiments) > 1)
+
+
 def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition) -> FigureDefinition:
     """Return the figure, with an explanation if it will always be empty."""
     spec = spec_of(reading.read_experiment(store, query.experiment).spec)
@@ -185,11 +182,9 @@ def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition)
 
 
 def _curves(store: Store, query: CurvesDrawing) -> FigureDefinition:
-    studies = [reading.read_study(store, id) for id in query.study]
-    named = [each.id for study in studies for each in study.experiments] + query.experiment
-    ids = list(dict.fromkeys(named))
-    drawn = curves.curves(store, ids, query.fitness or Fitness.RECORDED)
-    beside = () if query.fitness else curves.curves(store, ids, Fitness.TRANSFERRED)
-    title = query.title if query.title is not None else ", ".join(study.name for study in studies)
+    drawn = curves.curves(store, query.study, query.fitness or Fitness.RECORDED)
+    beside = () if query.fitness else curves.curves(store, query.study, Fitness.TRANSFERRED)
     against = None if query.x == "evaluations" else cost_axis(store, drawn, query.x, cost_s=query.cost_s)
-    return curves_figure(drawn, title=title, band=query.band, against=against, each=query.each, beside=beside)
+    return curves_figure(
+        drawn, title=_names(store, query), band=query.band, against=against, each=query.each, beside=beside
+    )

@@ -1,4 +1,4 @@
-"""Reports: a study or an experiment as one document, with a verdict in words."""
+"""Reports: a study as one document, with a verdict in words."""
 
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -14,11 +14,10 @@ from gaplab.api.http.security_headers import page
 from gaplab.api.routes.comparisons import MarginQuery
 from gaplab.schemas.reports import VerdictRead
 from gaplab.services.experiments import reading
-from gaplab.services.reports.content import Subject, verdict_on
+from gaplab.services.reports.content import verdict_on
 from gaplab.services.reports.document import report_on
 from gaplab.services.reports.html import render_html
 from gaplab.services.reports.takehome import takehome_page, takehome_zip
-from gaplab.services.store.session import Store
 
 router = APIRouter(tags=["reports"])
 
@@ -63,17 +62,22 @@ def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]
     """Return verdict, curves, tests, simulators, sensitivity, cost, settings and provenance in one document.
 
     The verdict follows from rules that the report states: which strategies differ, and whether each curve still rises,
-    or is flat since some iteration and not worth continuing.
+    or is flat since some iteration and not worth continuing. The id of one experiment gives the report on it alone.
     """
-    return _answer(store, reading.read_study(store, id), query)
+    study, margin = reading.read(store, id), query.chosen()
+    if query.format == "json":
+        return verdict_on(store, study, margin)
+    report, at = report_on(store, study, margin), datetime.now(UTC)
+    made = f"Made by gaplab {version('gaplab')} on {at:%Y-%m-%d at %H:%M} UTC, from what was stored by then."
+    name = f'inline; filename="gaplab-{report.id}-report.{query.format}"'
+    if query.format == "html":
+        answer: Response = page(in_turn(lambda: render_html(report, made)))
+    else:
+        from gaplab.services.reports.pdf import render_pdf  # its library takes as long to import as the web server
 
-
-@router.get(
-    "/experiments/{id}/report", summary="Report on an experiment", response_model=VerdictRead, responses=_RESPONSES
-)
-def report_experiment(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]) -> VerdictRead | Response:
-    """Return verdict, curve, simulators, sensitivity, cost, settings and provenance in one document."""
-    return _answer(store, reading.read_experiment(store, id), query)
+        answer = Response(in_turn(lambda: render_pdf(report, made, at)), media_type="application/pdf")
+    answer.headers["Content-Disposition"] = name
+    return answer
 
 
 @router.get(
@@ -94,20 +98,4 @@ def take_home(
     else:
         answer = Response(takehome_zip(store, process, id, in_turn), media_type="application/zip")
     answer.headers["Content-Disposition"] = f'inline; filename="gaplab-{id}-takehome.{query.format}"'
-    return answer
-
-
-def _answer(store: Store, subject: Subject, query: ReportQuery) -> VerdictRead | Response:
-    if query.format == "json":
-        return verdict_on(store, subject, query.chosen())
-    report, at = report_on(store, subject, query.chosen()), datetime.now(UTC)
-    made = f"Made by gaplab {version('gaplab')} on {at:%Y-%m-%d at %H:%M} UTC, from what was stored by then."
-    name = f'inline; filename="gaplab-{report.id}-report.{query.format}"'
-    if query.format == "html":
-        answer: Response = page(in_turn(lambda: render_html(report, made)))
-    else:
-        from gaplab.services.reports.pdf import render_pdf  # its library takes as long to import as the web server
-
-        answer = Response(in_turn(lambda: render_pdf(report, made, at)), media_type="application/pdf")
-    answer.headers["Content-Disposition"] = name
     return answer

@@ -1,35 +1,50 @@
-"""Studies: experiments to be compared."""
+"""Studies: experiments to be compared, or one alone. Most addresses also take the id of one experiment of a study."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Body, Query, Request, Response
 from pydantic import Field
 
 from gaplab.api.http import conditional, links
-from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Confirmation, Id, Paging, Revealing, StoreDep, created
+from gaplab.api.http.dependencies import (
+    AdmissionDep,
+    CallerDep,
+    Confirmation,
+    Id,
+    LimitsDep,
+    Paging,
+    Revealing,
+    StoreDep,
+    created,
+    of_app,
+)
 from gaplab.api.http.problems import documented
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Page, StudyRead
-from gaplab.schemas.spec import StudySpec
+from gaplab.schemas.spec import AnySpec, ExperimentSpec, SpecRead, StudySpec
 from gaplab.schemas.views import Order
-from gaplab.services.experiments import editing, listing, reading, submission
+from gaplab.services.experiments import editing, estimates, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
-
+CoresDep = Annotated[int, of_app("cores")]
 Confirming = Annotated[Confirmation, Query()]
 RevealingQuery = Annotated[Revealing, Query()]
-Study = Annotated[StudySpec, Body(openapi_examples=StudySpec.EXAMPLES)]
+Spec = Annotated[AnySpec, Body(openapi_examples=ExperimentSpec.EXAMPLES | StudySpec.EXAMPLES)]
 EditBody = Annotated[Edit, Body(openapi_examples=Edit.EXAMPLES)]
 
 
-class RecordFilter(Paging):
-    """The studies or experiments to list, and their order."""
+class StudyFilter(Paging):
+    """The studies to list, and their order."""
 
+    state: State | None = Field(
+        default=None, description="only studies in this state, which follows from their experiments"
+    )
     strategy: str | None = Field(
-        default=None, max_length=100, pattern=r"^\w+$", description="only those with this strategy"
+        default=None, max_length=100, pattern=r"^\w+$", description="only those with an experiment of this strategy"
     )
     text: str | None = Field(
         default=None, max_length=200, description="only those whose name, id, notes or tags contain this text"
@@ -47,17 +62,6 @@ class RecordFilter(Paging):
         return ListFilter(**self.model_dump(exclude={"limit", "cursor"}))
 
 
-class StudyFilter(RecordFilter):
-    """The studies to list, and their order."""
-
-    state: State | None = Field(
-        default=None, description="only studies in this state, which follows from their experiments"
-    )
-    sort: Literal["created_at", "-created_at", "name", "-name"] = Field(
-        default="-created_at", description="field to sort by; a minus reverses the order"
-    )
-
-
 @router.post(
     "",
     status_code=202,
@@ -66,11 +70,29 @@ class StudyFilter(RecordFilter):
     responses={202: links.leading_to(*links.FROM_STUDY), **documented(404, 413, 415, 422, 429)},
 )
 def submit_study(
-    spec: Study, store: StoreDep, admitted: AdmissionDep, query: Confirming, request: Request, response: Response
+    spec: Spec, store: StoreDep, admitted: AdmissionDep, query: Confirming, request: Request, response: Response
 ) -> StudyRead:
-    """Queue one experiment for each strategy, all else equal. Whatever the spec leaves out has the paper's value."""
-    done = submission.admit_study(store, spec, query.given(admitted))
+    """Queue one experiment for each strategy, all else equal. Whatever the spec leaves out has the paper's value.
+
+    A spec that names a `strategy`, and no `strategies`, is that of an experiment, and makes a study of one.
+    """
+    done = submission.submit_once(store, spec, query.given(admitted))
     return created(done, response, request.app.url_path_for("read_study", id=done.answer.id))
+
+
+@router.post(
+    "/estimate",
+    summary="Estimate a study",
+    response_description="The expected cost",
+    responses=documented(413, 415, 422),
+)
+def estimate_study(spec: Spec, store: StoreDep, limits: LimitsDep, cores: CoresDep) -> EstimateRead:
+    """Check a spec as on submission, and return its rollouts and the time they take here; nothing is stored.
+
+    A reader's token suffices. The seconds per rollout are those that this service measured in its newest experiments
+    with the same robot and engine.
+    """
+    return estimates.estimate(store, spec, limits=limits, cores=cores)
 
 
 @router.get("", summary="List the studies", response_description="The newest first", responses=documented(422))
@@ -87,8 +109,11 @@ def list_studies(store: StoreDep, query: Annotated[StudyFilter, Query()]) -> Pag
     responses=conditional.CACHED | documented(404, 422),
 )
 def read_study(id: Id, store: StoreDep, caller: CallerDep, request: Request, query: RevealingQuery) -> Response:
-    """Return a study with its experiments, their states and progress, and the time left."""
-    study = reading.read_study(store, id, reveal=query.permitted(caller))
+    """Return a study with its experiments, their states and progress, and the time left.
+
+    By the id of one of its experiments, it is a study of that one alone.
+    """
+    study = reading.read(store, id, reveal=query.permitted(caller))
     return conditional.tagged(request, study, study.edits)
 
 
@@ -97,11 +122,25 @@ def read_study(id: Id, store: StoreDep, caller: CallerDep, request: Request, que
     summary="Edit a study",
     response_model=StudyRead,
     response_description="After the edit",
-    responses=conditional.TAGGED | documented(404, 412, 413, 415, 422, 428),
+    responses=conditional.TAGGED | documented(404, 409, 412, 413, 415, 422, 428),
 )
 def edit_study(
     id: Id, edit: EditBody, store: StoreDep, request: Request, if_match: conditional.IfMatch = None
 ) -> Response:
-    """Change its name, notes or tags. `If-Match` names the `ETag` of what you edit; progress does not invalidate it."""
-    study = editing.edit_study(store, id, edit, starting_from=conditional.starting_from(if_match))
+    """Change its name, notes or tags; by the id of one of its experiments, the name of that.
+
+    `If-Match` names the `ETag` of what you edit; progress does not invalidate it.
+    """
+    study = editing.edit(store, id, edit, starting_from=conditional.starting_from(if_match))
     return conditional.tagged(request, study, study.edits)
+
+
+@router.get(
+    "/{id}/spec",
+    summary="Read a study's spec",
+    response_description="To submit it again",
+    responses=documented(404, 422),
+)
+def read_spec(id: Id, store: StoreDep, caller: CallerDep, query: RevealingQuery) -> SpecRead:
+    """Return the shortest spec that gives the same study, or one experiment of it, and the complete ones."""
+    return reading.read_spec(store, id, reveal=query.permitted(caller))

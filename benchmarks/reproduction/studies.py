@@ -161,12 +161,8 @@ def read_study(store: Store, archives: Sequence[Path]) -> Study:
 
 def _part(store: Store, archive: Path) -> tuple[str, tuple[ExperimentRead, ...]]:
     """Import an archive, and return its name and its experiments."""
-    made = import_file(store, archive)
-    if made.study is not None:
-        study = reading.read_study(store, made.study)
-        return study.name, study.experiments
-    reads = tuple(reading.read_experiment(store, id_) for id_ in made.experiments)
-    return reads[0].name, reads
+    study = reading.read(store, import_file(store, archive).study)
+    return study.name, study.experiments
 
 
 def _settings(spec: ResolvedSpec) -> str:
@@ -179,12 +175,13 @@ def _arms(store: Store, reads: Sequence[ExperimentRead]) -> list[Arm]:
     ids, arms = [read.id for read in reads], []
     tuned = {id_: found(store, id_) for id_ in ids}
     with store.reading() as session:
-        work, fitness = work_of(session, ids), {kind: values_of(session, ids, kind)[1] for kind in Fitness}
+        rows = experiments.get_experiments(session, ids)
+        work, fitness = work_of(session, ids), {kind: values_of(session, rows, kind) for kind in Fitness}
         samples = {id_: np.full_like(each, np.nan) for id_, each in fitness[Fitness.RECORDED].items()}
         for id_, number, iteration, value in results.measured_fitness(session, ids, MeasurementKind.SAMPLE):
             samples[id_][number, iteration] = np.nan if value is None else value
-        for read in reads:
-            spec = spec_of(experiments.get_experiment(session, read.id).spec)
+        for read, row in zip(reads, rows, strict=True):
+            spec = spec_of(row.spec)
             uses = [(use.repetitions, use.provenance) for use in provenance.uses(session, read.id)]
             engine = spec.reality.engine if read.direct else spec.engine
             cores = int(engine.options.get("threads", 1)) if engine else 1

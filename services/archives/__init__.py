@@ -1,4 +1,4 @@
-"""Archives: one file with everything about an experiment or a study, for backup, analysis elsewhere, and import.
+"""Archives: one file with everything about a study, for backup, analysis elsewhere, and import.
 
 An archive is a zip with one member for each exported table: Parquet, or JSON Lines where values are nested. For readers
 without gaplab it has the curves as `curves.json`, and the spec to submit again as `spec.json`. `manifest.json` lists
@@ -7,5 +7,4 @@ all members. The same content gives the same bytes.
 
 from gaplab.services.archives.reading import import_archive as import_archive
 from gaplab.services.archives.writing import Archive as Archive
-from gaplab.services.archives.writing import export_experiment as export_experiment
-from gaplab.services.archives.writing import export_study as export_study
+from gaplab.services.archives.writing import export as export

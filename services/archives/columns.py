@@ -55,8 +55,6 @@ COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
         "webhook": "is an address of one person, and may be a secret",
     },
     "experiment": {
-        "archived_at": "hides it in the lists of one service",
-        "webhook": "is an address of one person, and may be a secret",
         "token_id": "names a token of one service",
         "sensitivity_id": "names a check of one service",
         "running": "counts leases, and an archive has none",

@@ -47,14 +47,11 @@ def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
             raise InvalidArchive(f"it has more than {MOST_EXPERIMENTS} experiments")
         spec = _checked_spec(row)
         experiments[row["id"]] = row | {"spec": spec, "robot": _on_a_bench(row["id"], spec)}
-    study = manifest.id if manifest.kind == "study" else None
     studies = [row["id"] for row in opened.rows("study")]
-    if studies != ([study] if study else []) or {row["study_id"] for row in experiments.values()} - {study}:
-        raise InvalidArchive(
-            f"it has other studies or experiments than the {manifest.kind} {manifest.id!r} of its manifest"
-        )
-    if study is None and list(experiments) != [manifest.id]:
-        raise InvalidArchive(f"it has another experiment than {manifest.id!r}, which its manifest names")
+    if studies != [manifest.id] or {row["study_id"] for row in experiments.values()} != {manifest.id}:
+        raise InvalidArchive(f"it has other studies or experiments than the study {manifest.id!r} of its manifest")
+    if manifest.id in experiments and len(experiments) > 1:
+        raise InvalidArchive(f"an experiment among others has the id {manifest.id!r} of the study")
     return experiments
 
 
@@ -75,8 +72,8 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
     Raises:
         InvalidArchive: the message quotes the row.
     """
-    if table in {"study", "experiment"}:
-        _check_tags(table, row)
+    if table == "study":
+        _check_tags(row)
     if table in {"study", "robot", "attachment"}:
         return
     if table == "provenance":
@@ -137,13 +134,13 @@ def check_attachments(session: Session, opened: OpenedArchive) -> None:
         raise InvalidArchive(f"no answer names the attachment {unnamed[0]!r}")
 
 
-def _check_tags(table: str, row: Row) -> None:
+def _check_tags(row: Row) -> None:
     try:
         tags = Edit(tags=unpack_tags(row["tags"])).tags or ()
     except ValidationError as error:
-        raise InvalidArchive(f"the tags of {table} {row['id']!r} are invalid") from error
+        raise InvalidArchive(f"the tags of study {row['id']!r} are invalid") from error
     if pack_tags(tags) != row["tags"]:
-        raise InvalidArchive(f"the tags of {table} {row['id']!r} are not as this service stores them")
+        raise InvalidArchive(f"the tags of study {row['id']!r} are not as this service stores them")
 
 
 def _check_provenance(row: Row) -> None:

@@ -36,7 +36,6 @@ from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts, hardware_of
 from gaplab.services.store.clock import moment
-from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import new_id
@@ -61,13 +60,13 @@ class CheckedArchive:
 
     Attributes:
         store: the private database.
-        study: id of the study in the archive; None if it has none.
+        study: id of the study in the archive.
         experiments: the rows of the experiments in the archive, by their ids.
         attachments: files beside measurements, by their hashes; the private database has them without content.
     """
 
     store: Store
-    study: str | None
+    study: str
     experiments: Mapping[str, Row]
     attachments: Mapping[str, Path]
 
@@ -123,8 +122,7 @@ def _check(session: Session, private: Store, opened: OpenedArchive, now: datetim
         _insert(session, table, (_arriving(table, row, experiments, now) for row in opened.rows(table)))
     check_attachments(session, opened)
     check_logs(session, experiments)
-    study = opened.manifest.id if opened.manifest.kind == "study" else None
-    return CheckedArchive(private, study, experiments, opened.attachments)
+    return CheckedArchive(private, opened.manifest.id, experiments, opened.attachments)
 
 
 def _work_left(experiments: Mapping[str, Row], limits: Limits) -> list[ResolvedSpec]:
@@ -141,25 +139,23 @@ def _copy(session: Session, checked: CheckedArchive, left: Sequence[ResolvedSpec
     """Copy the rows of the private database into the service's, and begin the life of the experiments there."""
     if left:
         admit(session, left, admitted)
-    studies = {checked.study} if checked.study else set()
-    taken_studies = archives.taken_ids(session, StudyRow, studies)
-    renamed = {old: new_id() for old in studies & taken_studies}
-    taken = archives.taken_ids(session, ExperimentRow, checked.experiments)
-    ids = {old: new_id() if old in taken else old for old in checked.experiments}
+    renamed = {old: new_id() for old in archives.taken_ids(session, {checked.study, *checked.experiments})}
+    ids = {old: renamed.get(old, old) for old in (checked.study, *checked.experiments)}
     with checked.store.reading() as source:
         for table in EXPORTED:
-            owners = [*studies] if table == "study" else list(ids)
+            owners = [checked.study] if table == "study" else list(checked.experiments)
             sent = {"token_id": admitted.token} if table == "experiment" else {}
             rows = archives.read_rows(source, table, [column.name for column in columns_of(table)], owners)
-            _insert(session, table, (_renamed(checked, table, row, renamed, ids) | sent for row in rows))
-    archives.forget_deletions(session, [*studies - taken_studies, *ids.values()])
-    for id_ in ids.values():
+            _insert(session, table, (_renamed(checked, table, row, ids) | sent for row in rows))
+    archives.forget_deletions(session, ids.values())
+    arrived = tuple(ids[old] for old in checked.experiments)
+    for id_ in arrived:
         note(session, EventKind.IMPORTED, id_)
-    settle(session, ids.values())
+    settle(session, arrived)
     return ImportRead(
-        study=renamed.get(checked.study, checked.study) if checked.study else None,
-        experiments=tuple(ids.values()),
-        renamed=renamed | {old: new for old, new in ids.items() if old != new},
+        study=ids[checked.study],
+        experiments=arrived,
+        renamed=renamed,
         called_off=tuple(
             ids[old] for old, row in checked.experiments.items() if not (State(row["state"]).ended or _goes_on(row))
         ),
@@ -197,22 +193,19 @@ def _goes_on(experiment: Row) -> bool:
     return experiment["robot"] is not None and not State(experiment["state"]).ended
 
 
-def _renamed(
-    checked: CheckedArchive, table: str, row: Row, studies: Mapping[str, str], experiments: Mapping[str, str]
-) -> Row:
+def _renamed(checked: CheckedArchive, table: str, row: Row, ids: Mapping[str, str]) -> Row:
     """Return a row under its ids here, that of a file with its content."""
     if table == "attachment":
         return row | {"content": checked.attachments[row["id"]].read_bytes()}
     if table == "study":
-        return row | {"id": studies.get(row["id"], row["id"])}
+        return row | {"id": ids[row["id"]]}
     if table == "experiment":
-        study = row["study_id"]
-        row |= {"id": experiments[row["id"]], "study_id": studies.get(study, study)}
+        row |= {"id": ids[row["id"]], "study_id": ids[row["study_id"]]}
         spec, ended = spec_of(row["spec"]), State(row["state"]).ended
         row |= {"hardware": hardware_of(spec), "paused_because": None if ended else "it was imported"}
         row |= {} if ended else {"rollouts": expected_rollouts(spec)}
     for name in {EXPERIMENT, "experiment_id"} & set(row):
-        before, row[name] = row[name], experiments[row[name]]
+        before, row[name] = row[name], ids[row[name]]
         if table in {"request", "answer"} and before != row[name]:
             row |= {key: _derived(row[name], row[key]) for key in _REQUEST_IDS & set(row)}
     return row

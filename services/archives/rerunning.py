@@ -26,7 +26,7 @@ from gaplab.services.plugins import folders
 from gaplab.services.plugins.external import imported_files
 from gaplab.services.running import provenance
 from gaplab.services.running.versions import provenance as provenance_here
-from gaplab.services.specs.shortening import experiment_spec, study_spec
+from gaplab.services.specs.shortening import shortest
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import experiments, logs
 from gaplab.services.store.session import Session
@@ -66,9 +66,9 @@ def submitted_spec(file: IO[bytes]) -> dict[str, Any]:
         Conflict: no single spec gives all experiments, or parameters of reality are hidden.
     """
     with checked_archive(file, datetime.now(UTC)) as checked, checked.store.reading() as session:
-        specs = [row.spec for row in experiments.get_experiments(session, list(checked.experiments))]
-        name = experiments.get_study(session, checked.study).name if checked.study else ""
-    found = study_spec(name, specs) if checked.study else experiment_spec(specs[0])
+        whole = experiments.members(session, checked.study)
+        specs = [row.spec for row in whole.experiments]
+        found = shortest(whole.study.name, specs)
     if found.spec is None:
         raise Conflict(f"no single spec gives the experiments of the archive: {'; '.join(found.remarks)}")
     if any(value is None for spec in specs for value in spec["reality"]["parameters"].values()):

@@ -1,4 +1,4 @@
-"""Export of experiments and studies from a store into an archive."""
+"""Export of studies from a store into an archive."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from importlib.metadata import version
 from io import SEEK_END, BufferedIOBase, BytesIO
 from shutil import copyfileobj
 from tempfile import TemporaryFile
-from typing import IO, Literal
+from typing import IO
 from zipfile import ZipFile
 
 from pydantic import TypeAdapter
@@ -19,8 +19,8 @@ from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, file_member
 from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
 from gaplab.services.results.files import entry_of
-from gaplab.services.specs.shortening import experiment_spec, study_spec
-from gaplab.services.store.models import REVISION, ExperimentRow
+from gaplab.services.specs.shortening import shortest
+from gaplab.services.store.models import REVISION
 from gaplab.services.store.queries import archives, attachments, experiments
 from gaplab.services.store.session import Session, Store
 from gaplab.services.store.stored_specs import without_truth
@@ -41,49 +41,34 @@ class Archive:
     file: IO[bytes]
 
 
-def export_experiment(store: Store, experiment_id: str) -> Archive:
-    """Return an archive of one experiment at one moment, without its study.
+def export(store: Store, id_: str) -> Archive:
+    """Return an archive of a study at one moment, or of a study with one of its experiments alone.
 
     The parameters of reality are null until they may be shown. Memory does not grow with the number of results.
 
     Raises:
-        NotFound: the experiment does not exist.
+        NotFound: no such study or experiment.
     """
     with store.reading() as session:
-        row = experiments.get_experiment(session, experiment_id)
-        return _export(session, "experiment", row.id, [row])
+        return _export(session, experiments.members(session, id_))
 
 
-def export_study(store: Store, study_id: str) -> Archive:
-    """Return an archive of a study and its experiments, as `export_experiment` does.
-
-    Raises:
-        NotFound: the study does not exist.
-    """
-    with store.reading() as session:
-        study = experiments.get_study(session, study_id)
-        return _export(session, "study", study.id, experiments.experiments_of(session, [study.id]))
-
-
-def _export(
-    session: Session, kind: Literal["study", "experiment"], id_: str, owners: Sequence[ExperimentRow]
-) -> Archive:
-    ids, study = [row.id for row in owners], id_ if kind == "study" else None
-    hidden = hiding.hidden(session, owners)
+def _export(session: Session, found: experiments.Members) -> Archive:
+    hidden = hiding.hidden(session, found.experiments)
     file = TemporaryFile()  # noqa: SIM115 - the sender closes it
     try:
         members: dict[str, Member] = {}
         with ZipFile(file, "w") as archive:
             for table in EXPORTED:
                 with TemporaryFile() as part:
-                    count = write(table, _rows(session, table, study, ids, hidden), part)
+                    count = write(table, _rows(session, table, found, hidden), part)
                     members[member_of(table)] = _add(archive, member_of(table), part, count)
-            members |= _add_files(session, archive, ids)
-            points = TypeAdapter(tuple[Curve, ...]).dump_json(curves.curves_of(session, ids))
-            members[CURVES] = _add(archive, CURVES, BytesIO(points), len(ids))
-            members[SPEC] = _add(archive, SPEC, BytesIO(_spec(session, study, owners, hidden)), 0)
+            members |= _add_files(session, archive, found.ids)
+            points = TypeAdapter(tuple[Curve, ...]).dump_json(curves.curves_of(session, found.experiments))
+            members[CURVES] = _add(archive, CURVES, BytesIO(points), len(found.ids))
+            members[SPEC] = _add(archive, SPEC, BytesIO(_spec(found, hidden)), 0)
             manifest = Manifest(
-                format=FORMAT, gaplab=version("gaplab"), revision=REVISION, kind=kind, id=id_, members=members
+                format=FORMAT, gaplab=version("gaplab"), revision=REVISION, id=found.study.id, members=members
             )
             archive.writestr(entry_of(MANIFEST), manifest.model_dump_json(indent=2))
         size = file.tell()
@@ -91,24 +76,22 @@ def _export(
     except BaseException:
         file.close()
         raise
-    return Archive(name=f"gaplab-{id_}.zip", size=size, file=file)
+    return Archive(name=f"gaplab-{found.named.id}.zip", size=size, file=file)
 
 
-def _spec(session: Session, study: str | None, owners: Sequence[ExperimentRow], hidden: Collection[str]) -> bytes:
+def _spec(found: experiments.Members, hidden: Collection[str]) -> bytes:
     """Return the spec to submit again, as JSON, with remarks on what it lacks."""
-    specs = [without_truth(row.spec) if row.id in hidden else row.spec for row in owners]
-    found = study_spec(experiments.get_study(session, study).name, specs) if study else experiment_spec(specs[0])
-    return found.model_dump_json(include={"spec", "remarks"}, indent=2).encode()
+    specs = [without_truth(row.spec) if row.id in hidden else row.spec for row in found.experiments]
+    shown = shortest(found.named.name, specs)
+    return shown.model_dump_json(include={"spec", "remarks"}, indent=2).encode()
 
 
-def _rows(
-    session: Session, table: str, study: str | None, experiments: Sequence[str], hidden: Collection[str]
-) -> Iterator[Row]:
-    """Yield the rows of a table as they are exported: without secrets, and without a study that is not exported."""
-    owners = [study] if study and table == "study" else [] if table == "study" else experiments
+def _rows(session: Session, table: str, found: experiments.Members, hidden: Collection[str]) -> Iterator[Row]:
+    """Yield the rows of a table as they are exported: without secrets."""
+    owners = [found.study.id] if table == "study" else found.ids
     for row in archives.read_rows(session, table, [column.name for column in columns_of(table)], owners):
-        if table == "experiment":
-            row |= {"study_id": study} | ({"spec": without_truth(row["spec"])} if row["id"] in hidden else {})
+        if table == "experiment" and row["id"] in hidden:
+            row |= {"spec": without_truth(row["spec"])}
         yield row
 
 

@@ -1,14 +1,14 @@
-"""Deletion of experiments and studies that have ended, with all of their results.
+"""Deletion of studies, or of single experiments of them, that have ended, with all of their results.
 
 What they share with others stays: provenances and sensitivity checks, which are about machines and robots, and files
 that answers of others name. Events stay too, because their numbers have no gaps; the last one says that the experiment
 was deleted.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import delete, or_, select
+from sqlalchemy import delete as delete_from
+from sqlalchemy import or_, select
 
 from gaplab.schemas.editing import DeletionRead
 from gaplab.schemas.events import EventKind
@@ -32,7 +32,7 @@ from gaplab.services.store.models import (
 )
 from gaplab.services.store.queries import attachments
 from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, lock
+from gaplab.services.store.queries.experiments import Members, lock, members
 from gaplab.services.store.session import Session, transaction
 from gaplab.services.store.statements import storable
 
@@ -66,44 +66,27 @@ class Deleter:
 
 
 @transaction
-def delete_experiment(session: Session, experiment_id: str, by: Deleter) -> DeletionRead:
-    """Delete an experiment with its results; deleting it twice changes nothing, and returns the same.
+def delete(session: Session, id_: str, by: Deleter) -> DeletionRead:
+    """Delete a study, or one experiment of it, with its results; doing it twice changes nothing, and returns the same.
+
+    The last experiment of a study takes the study with it.
 
     Raises:
-        NotFound: no such experiment, and none was deleted.
+        NotFound: no such study or experiment, and none was deleted.
         Forbidden: others have submitted it.
-        Conflict: it has not ended, still holds hardware, or is the only one of its study.
+        Conflict: it has not ended, or still holds hardware.
     """
-    _lock(session, experiment_id)
-    if before := _deleted(session, experiment_id):
-        return before
-    experiment = get_experiment(session, experiment_id)
-    if experiment.study_id and len(experiments_of(session, [experiment.study_id])) == 1:
-        msg = f"experiment {experiment_id!r} is the only one of study {experiment.study_id!r}: delete the study"
-        raise Conflict(msg)
-    _delete(session, [experiment], by, f"experiment {experiment_id!r}")
-    return _bury(session, experiment, experiment.study_id, by)
-
-
-@transaction
-def delete_study(session: Session, study_id: str, by: Deleter) -> DeletionRead:
-    """Delete a study with its experiments and their results; deleting it twice changes nothing, and returns the same.
-
-    Raises:
-        NotFound: no such study, and none was deleted.
-        Forbidden: others have submitted an experiment of it.
-        Conflict: an experiment of it has not ended, or still holds hardware.
-    """
-    _lock(session, study_id)
-    if before := _deleted(session, study_id):
-        return before
-    study = get_study(session, study_id)
-    experiments = experiments_of(session, [study_id])
-    _delete(session, experiments, by, f"study {study_id!r}")
-    for experiment in experiments:
-        _bury(session, experiment, study_id, by)
-    session.execute(delete(StudyRow).where(StudyRow.id == study_id), execution_options=_SQL)
-    return _bury(session, study, None, by)
+    _lock(session, id_)
+    if before := session.get(DeletionRow, storable(id_)):
+        return _view(before)
+    found = members(session, id_)
+    _delete(session, found, by)
+    buried = {row.id: _bury(session, row, found.study.id, by) for row in found.experiments}
+    if found.one is None:
+        session.execute(delete_from(StudyRow).where(StudyRow.id == found.study.id), execution_options=_SQL)
+        if found.study.id not in buried:
+            buried[found.study.id] = _bury(session, found.study, None, by)
+    return buried[id_]
 
 
 def _lock(session: Session, id_: str) -> None:
@@ -117,36 +100,32 @@ def _lock(session: Session, id_: str) -> None:
     lock(session, session.scalars(select(row.id).where(which)).all())
 
 
-def _deleted(session: Session, id_: str) -> DeletionRead | None:
-    row = session.get(DeletionRow, storable(id_))
-    return _view(row) if row else None
-
-
-def _delete(session: Session, experiments: Sequence[ExperimentRow], by: Deleter, what: str) -> None:
+def _delete(session: Session, found: Members, by: Deleter) -> None:
     """Delete experiments with all rows that belong to them alone.
 
     Raises:
         Forbidden: the deleter may not.
         Conflict: one has not ended, or still holds hardware.
     """
-    if not by.may_delete_all and any(experiment.token_id != by.token for experiment in experiments):
-        msg = f"{what} was submitted with another token: only that token, or an admin's, may delete it"
+    if not by.may_delete_all and any(experiment.token_id != by.token for experiment in found.experiments):
+        msg = f"{found} was submitted with another token: only that token, or an admin's, may delete it"
         raise Forbidden(msg)
-    ids = [experiment.id for experiment in experiments]
+    ids = found.ids
     states = lock(session, ids)
     if open_ := sorted({state.value for state in states.values() if not state.ended}):
-        raise Conflict(f"{what} is {' and '.join(open_)} and cannot be deleted: cancel it first, and then delete it")
+        raise Conflict(f"{found} is {' and '.join(open_)} and cannot be deleted: cancel it first, and then delete it")
     row = RepetitionRow
     if session.scalar(select(row.id).where(row.experiment_id.in_(ids), row.hardware.is_not(None)).limit(1)):
-        raise Conflict(f"{what} still holds hardware, whose worker is stopping: delete it in a moment")
+        raise Conflict(f"{found} still holds hardware, whose worker is stopping: delete it in a moment")
     repetitions = select(row.id).where(row.experiment_id.in_(ids)).scalar_subquery()
     once_named = attachments.named(session, repetitions)
     for table in _OF_REPETITIONS:
-        session.execute(delete(table).where(table.__table__.c.repetition_id.in_(repetitions)), execution_options=_SQL)
+        of_them = table.__table__.c.repetition_id.in_(repetitions)
+        session.execute(delete_from(table).where(of_them), execution_options=_SQL)
     attachments.remove_unnamed(session, once_named)
     for table in (RepetitionRow, ExperimentProvenanceRow):
-        session.execute(delete(table).where(table.experiment_id.in_(ids)), execution_options=_SQL)
-    session.execute(delete(ExperimentRow).where(ExperimentRow.id.in_(ids)), execution_options=_SQL)
+        session.execute(delete_from(table).where(table.experiment_id.in_(ids)), execution_options=_SQL)
+    session.execute(delete_from(ExperimentRow).where(ExperimentRow.id.in_(ids)), execution_options=_SQL)
 
 
 def _bury(session: Session, row: ExperimentRow | StudyRow, study: str | None, by: Deleter) -> DeletionRead:

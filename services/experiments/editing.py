@@ -1,8 +1,4 @@
-"""Names, notes and tags, changed after submission. Each function is one transaction, and raises StoreUnavailable.
-
-`starting_from` protects another person's edit: the change is refused unless the present number of edits is in it.
-None permits any number. Progress is no edit.
-"""
+"""Names, notes and tags, changed after submission."""
 
 from collections.abc import Collection
 from typing import Any
@@ -11,81 +7,80 @@ from sqlalchemy import update
 
 from gaplab.schemas.editing import MOST_TAGS, Edit
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.records import StudyRead
 from gaplab.services.core.errors import Changed, InvalidSpec, Violation
-from gaplab.services.experiments.views import view_experiments, view_studies
+from gaplab.services.experiments.views import view
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study
+from gaplab.services.store.queries.experiments import Members, lock, members, whole
 from gaplab.services.store.session import Session, transaction
 from gaplab.services.store.texts import pack_tags, storable, unpack_tags
 
 
 @transaction
-def edit_experiment(
-    session: Session, experiment_id: str, edit: Edit, *, starting_from: Collection[int] | None
-) -> ExperimentRead:
-    """Change the experiment's name, notes or tags; its spec stays as it was submitted.
+def edit(session: Session, id_: str, change: Edit, *, starting_from: Collection[int] | None) -> StudyRead:
+    """Change a study's name, notes or tags; with the id of one of its experiments, the name of that.
+
+    A study of one has one name with its experiment. Specs stay as they were submitted.
+
+    Args:
+        session: a transaction.
+        id_: id of a study, or of one of its experiments.
+        change: what changes.
+        starting_from: protects another person's edit: the change is refused unless the present number of edits is in
+            it; None permits any number. Progress does not count.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: no such study or experiment.
+        Conflict: notes or tags of one experiment among others.
         Changed: it was edited meanwhile.
+        InvalidSpec: it would have too many tags.
+        StoreUnavailable: the database cannot be used now.
     """
-    row = get_experiment(session, experiment_id)
-    if told := _edit(session, row, edit, starting_from):
-        note(session, EventKind.EDITED, row.id, **told)
-    return view_experiments(session, [row])[0]
+    found = members(session, id_) if change.model_fields_set == {"name"} else whole(session, id_)
+    study, row = found.study, StudyRow
+    lock(session, found.ids)
+    session.refresh(study, with_for_update={"key_share": True})
+    if starting_from is not None and study.edits not in starting_from:
+        raise Changed(f"{study.id!r} was changed by someone else since you read it; read it again, and then decide")
+    values, told = _changes(found, change)
+    if told:
+        if "name" in values and len(found.experiments) == 1:
+            renamed = update(ExperimentRow).where(ExperimentRow.id == found.ids[0])
+            session.execute(renamed.values(name=values["name"]))
+            session.refresh(found.experiments[0])
+        if found.one is not None:
+            values = {}
+        session.execute(update(row).where(row.id == study.id).values(values | {"edits": row.edits + 1}))
+        session.refresh(study)
+        for experiment in found.ids:
+            note(session, EventKind.EDITED, experiment, **told)
+    return view(session, found)[0]
 
 
-@transaction
-def edit_study(session: Session, study_id: str, edit: Edit, *, starting_from: Collection[int] | None) -> StudyRead:
-    """Change the study's name, notes or tags; its experiments keep theirs.
-
-    Raises:
-        NotFound: no such study.
-        Changed: it was edited meanwhile.
-    """
-    row = get_study(session, study_id)
-    if told := _edit(session, row, edit, starting_from):
-        for experiment in experiments_of(session, [row.id]):
-            note(session, EventKind.EDITED, experiment.id, **told, of_study=True)
-    return view_studies(session, [row])[0]
-
-
-def _edit(
-    session: Session, row: ExperimentRow | StudyRow, edit: Edit, starting_from: Collection[int] | None
-) -> dict[str, list[str]]:
-    """Change what differs, and return it as an event's body: the fields, and tags that are new or gone."""
-    table = type(row)
-    session.refresh(row, with_for_update={"key_share": True})
-    if starting_from is not None and row.edits not in starting_from:
-        raise Changed(f"{row.id!r} was changed by someone else since you read it; read it again, and then decide")
-    before, after = set(unpack_tags(row.tags)), _tags_after(row, edit)
-    values = {name: text for name, text in _texts(edit).items() if text != getattr(row, name)}
-    told = {"fields": sorted([*values, *(["tags"] if after != before else [])])}
-    if not told["fields"]:
-        return {}
-    values |= {"edits": table.edits + 1, "tags": pack_tags(after)}
-    session.execute(update(table).where(table.id == row.id).values(values))
-    session.refresh(row)
-    changes = {"add_tags": sorted(after - before), "remove_tags": sorted(before - after)}
-    return told | {name: tags for name, tags in changes.items() if tags}
+def _changes(found: Members, change: Edit) -> tuple[dict[str, Any], dict[str, list[str]]]:
+    """Return the columns that differ, and an event's body: the fields, and tags that are new or gone."""
+    before, after = set(unpack_tags(found.study.tags)), _tags_after(found.study, change)
+    given = change.model_dump(exclude_unset=True, include={"name", "notes"})
+    texts = {name: None if value is None else storable(value) for name, value in given.items()}
+    present = {"name": found.named.name, "notes": found.study.notes}
+    values: dict[str, Any] = {name: text for name, text in texts.items() if text != present[name]}
+    told = {"add_tags": sorted(after - before), "remove_tags": sorted(before - after)}
+    if after != before:
+        values["tags"] = pack_tags(after)
+    changed = {"fields": sorted(values)} if values else {}
+    return values, changed | {name: tags for name, tags in told.items() if tags}
 
 
-def _texts(edit: Edit) -> dict[str, Any]:
-    changes = edit.model_dump(exclude_unset=True, include={"name", "notes"})
-    return {name: storable(value) if value is not None else None for name, value in changes.items()}
-
-
-def _tags_after(row: ExperimentRow | StudyRow, edit: Edit) -> set[str]:
+def _tags_after(study: StudyRow, change: Edit) -> set[str]:
     """Return the tags after the edit.
 
     Raises:
         InvalidSpec: there would be too many.
     """
-    given = set(unpack_tags(row.tags)) if edit.tags is None else set(edit.tags)
-    tags = (given | set(edit.add_tags)) - set(edit.remove_tags)
+    given = set(unpack_tags(study.tags)) if change.tags is None else set(change.tags)
+    tags = (given | set(change.add_tags)) - set(change.remove_tags)
     if len(tags) > MOST_TAGS:
         message = f"it would have {len(tags)} tags; permitted: at most {MOST_TAGS}. Remove some with `remove_tags`"
-        raise InvalidSpec([Violation("/add_tags", edit.add_tags, message)])
+        raise InvalidSpec([Violation("/add_tags", change.add_tags, message)])
     return tags

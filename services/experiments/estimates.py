@@ -1,4 +1,4 @@
-"""Estimates: the cost of a study or an experiment that is checked and resolved as if submitted, and not stored."""
+"""Estimates: the cost of a spec that is checked and resolved as if submitted, and not stored."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import Admission, check_extent
 from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.settings import Limits, variable_of
-from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples
+from gaplab.services.specs.resolution import is_direct, resolve, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts
 from gaplab.services.store.queries import costs, totals
 from gaplab.services.store.session import Session, Store
@@ -34,13 +34,13 @@ Key = tuple[str, str]
 def estimate(
     store: Store, spec: StudySpec | ExperimentSpec, *, limits: Limits | None = None, cores: int = 1
 ) -> EstimateRead:
-    """Return the cost of the study or the experiment on a number of cores.
+    """Return the cost of a study, or of one experiment, on a number of cores.
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation, as on submission.
         StoreUnavailable: the database cannot be used now.
     """
-    resolved = resolved_here(store, spec, _resolve)
+    resolved = resolved_here(store, spec, resolve)
     check_extent(resolved, limits)
     with store.reading() as session:
         measured = _measured(costs.latest(session, LATEST))
@@ -78,10 +78,6 @@ def check_cost(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
         above = f"more than {limit:,} ({variable_of('unconfirmed_core_hours')}) must be confirmed"
         message = f"this takes about {hours:,.0f} core-hours; {above}: confirm_cost=true, --yes, or yes=True in Python"
         raise CostUnconfirmed([Violation("confirm_cost", False, message, "true")])
-
-
-def _resolve(spec: StudySpec | ExperimentSpec) -> tuple[ResolvedSpec, ...]:
-    return resolve_study(spec) if isinstance(spec, StudySpec) else (resolve_experiment(spec),)
 
 
 def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[Key, float]:

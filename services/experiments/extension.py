@@ -1,21 +1,22 @@
 """Extension: COMPLETED experiments become as large as if they had been submitted with larger totals.
 
-Each function is one transaction, and raises StoreUnavailable while the database cannot be used.
+An experiment that is larger keeps its size, and one that takes no samples has no iterations to add. Given its present
+totals, a stopped experiment is completed.
 """
 
 from collections.abc import Iterator, Sequence
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import ExtensionSpec, State, Verb
-from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.records import StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.experiments.archiving import show_again
-from gaplab.services.experiments.lifecycle import get_permitting, get_study_permitting
+from gaplab.services.experiments.lifecycle import members_permitting
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.experiments.submission import admit, extent_of
-from gaplab.services.experiments.views import view_experiments, view_studies
+from gaplab.services.experiments.views import view
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.events import note
@@ -25,54 +26,28 @@ from gaplab.services.store.session import Session, transaction
 
 
 @transaction
-def extend_experiment(
-    session: Session, experiment_id: str, extension: ExtensionSpec, admitted: Admission = FREELY
-) -> ExperimentRead:
-    """Queue a COMPLETED experiment again with larger totals; its results so far stay.
-
-    Given its present totals, a stopped experiment is completed.
+def extend(session: Session, id_: str, extension: ExtensionSpec, admitted: Admission = FREELY) -> StudyRead:
+    """Queue the COMPLETED experiments that the id means again with larger totals; their results so far stay.
 
     Raises:
-        NotFound: no such experiment.
-        Conflict: it is not COMPLETED, the totals add nothing, or its reality is unknown here.
-        InvalidSpec: a total is smaller than the present one or above a limit, or a strategy without samples gets
-            iterations.
+        NotFound: no such study or experiment.
+        Conflict: none of them is COMPLETED, the totals add nothing to these, or their reality is unknown here.
+        InvalidSpec: no total is given, one is smaller than that of each experiment or above a limit, or strategies
+            without samples get iterations.
         CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
         LimitReached: too much work is in progress.
+        StoreUnavailable: the database cannot be used now.
     """
-    experiment = get_permitting(session, experiment_id, Verb.EXTEND)
-    spec = _spec(experiment)
-    if violations := list(_violations(spec, extension)):
+    found, completed = members_permitting(session, id_, Verb.EXTEND)
+    specs = [_spec(each) for each in completed]
+    if violations := list(_violations(specs, extension)):
         raise InvalidSpec(violations)
-    larger = spec.model_copy(update=extension.model_dump(exclude_none=True))
-    if not _extend(session, [(experiment, larger)], admitted):
-        msg = f"experiment {experiment_id!r} has {larger.iterations} iterations and {larger.repetitions} repetitions "
-        raise Conflict(f"{msg}already, and none of these is left to run: ask for larger totals")
-    return view_experiments(session, [experiment])[0]
-
-
-@transaction
-def extend_study(session: Session, study_id: str, extension: ExtensionSpec, admitted: Admission = FREELY) -> StudyRead:
-    """Queue the COMPLETED experiments of a study again that are smaller than the totals; their results so far stay.
-
-    An experiment that is larger keeps its size, and one that takes no samples has no iterations to add. A stopped
-    experiment is completed.
-
-    Raises:
-        NotFound: no such study.
-        Conflict: none of its experiments is COMPLETED, the totals add nothing to these, or their reality is unknown
-            here.
-        InvalidSpec: no total is given, or one is above a limit.
-        CostUnconfirmed: the cost is above the limit, and the request does not confirm it.
-        LimitReached: too much work is in progress.
-    """
-    study, experiments = get_study_permitting(session, study_id, Verb.EXTEND)
-    if violations := list(_missing(extension)):
-        raise InvalidSpec(violations)
-    if not _extend(session, [(each, _enlarged(_spec(each), extension)) for each in experiments], admitted):
-        msg = f"no experiment of study {study_id!r} has anything left to run with these totals: ask for larger totals"
-        raise Conflict(msg)
-    return view_studies(session, [study])[0]
+    larger = [(each, _enlarged(spec, extension)) for each, spec in zip(completed, specs, strict=True)]
+    if not _extend(session, larger, admitted):
+        most = {name: max(getattr(spec, name) for _, spec in larger) for name in ("iterations", "repetitions")}
+        msg = f"{found} has {most['iterations']} iterations and {most['repetitions']} repetitions already, and none of "
+        raise Conflict(f"{msg}these is left to run: ask for larger totals")
+    return view(session, found)[0]
 
 
 def _spec(experiment: ExperimentRow) -> ResolvedSpec:
@@ -122,19 +97,16 @@ def _grow(session: Session, experiment: ExperimentRow, spec: ResolvedSpec) -> No
     session.refresh(experiment)
 
 
-def _violations(spec: ResolvedSpec, extension: ExtensionSpec) -> Iterator[Violation]:
-    yield from _missing(extension)
-    if extension.iterations is not None and not takes_samples(spec):
-        subject = "the direct baseline" if is_direct(spec) else spec.strategy.name
-        message = f"{subject} has no iterations: it takes no samples; extend its repetitions"
-        yield Violation("/iterations", extension.iterations, message)
-    for name, total in extension.model_dump(exclude_none=True).items():
-        present = getattr(spec, name)
-        if total < present:
-            message = f"{total} is less than the {present} {name} that the experiment has; give a total"
-            yield Violation(f"/{name}", total, message, f"at least {present}")
-
-
-def _missing(extension: ExtensionSpec) -> Iterator[Violation]:
-    if not extension.model_dump(exclude_none=True):
+def _violations(specs: Sequence[ResolvedSpec], extension: ExtensionSpec) -> Iterator[Violation]:
+    totals = extension.model_dump(exclude_none=True)
+    if not totals:
         yield Violation("", {}, "give a total of iterations, of repetitions, or both", ["iterations", "repetitions"])
+    for name, total in totals.items():
+        able = [spec for spec in specs if name != "iterations" or takes_samples(spec)]
+        if not able:
+            subject = "the direct baseline" if is_direct(specs[0]) else specs[0].strategy.name
+            message = f"{subject} has no iterations: it takes no samples; extend its repetitions"
+            yield Violation("/iterations", total, message)
+        elif total < (present := min(getattr(spec, name) for spec in able)):
+            message = f"{total} is less than the {present} {name} that there are; give a total"
+            yield Violation(f"/{name}", total, message, f"at least {present}")

@@ -13,5 +13,5 @@ from gaplab.services.store.queries.experiments import open_studies
 
 def hidden(session: Session, experiments: Sequence[ExperimentRow]) -> frozenset[str]:
     """Return the ids of the experiments whose reality's parameters may not be shown yet."""
-    open_ = open_studies(session, [row.study_id for row in experiments if row.study_id])
-    return frozenset(row.id for row in experiments if not row.state.ended or row.study_id in open_)
+    open_ = open_studies(session, [row.study_id for row in experiments])
+    return frozenset(row.id for row in experiments if row.study_id in open_)

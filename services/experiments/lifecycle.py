@@ -1,4 +1,4 @@
-"""Requests that change the state of experiments and studies: pause, resume, stop, cancel, schedule.
+"""Requests that change the state of studies, or of one experiment of them: pause, resume, stop, cancel, schedule.
 
 `gaplab.schemas.lifecycle` says what each verb means and which states permit it. Each function is one transaction, and
 raises StoreUnavailable while the database cannot be used.
@@ -10,16 +10,16 @@ from sqlalchemy import update
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import PERMITTED, Ending, ScheduleChange, State, Verb
-from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.records import StudyRead
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.checks import cancel_unneeded
 from gaplab.services.experiments.states import move, settle
-from gaplab.services.experiments.views import view_experiments, view_studies
-from gaplab.services.store.models import ExperimentRow, RepetitionRow, RequestRow, StudyRow
+from gaplab.services.experiments.views import view
+from gaplab.services.store.models import ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import attempts, checkpoints
 from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, lock, with_failures
+from gaplab.services.store.queries.experiments import Members, lock, members, with_failures
 from gaplab.services.store.queries.request_states import withdraw
 from gaplab.services.store.session import Session, transaction
 
@@ -42,101 +42,69 @@ _PARTICIPLES = {
 
 
 @transaction
-def ask_experiment(session: Session, experiment_id: str, verb: Verb) -> ExperimentRead:
-    """Pause, resume, stop, cancel or retry an experiment.
+def ask(session: Session, id_: str, verb: Verb) -> StudyRead:
+    """Pause, resume, stop, cancel or retry the experiments that the id means and that permit it.
 
     Raises:
-        NotFound: no such experiment.
-        Conflict: its state does not permit the verb, or none of its repetitions FAILED and could be retried.
+        NotFound: no such study or experiment.
+        Conflict: none of them permits the verb, or none of their repetitions FAILED and could be retried.
     """
-    experiment = get_permitting(session, experiment_id, verb)
-    if verb is Verb.RETRY and not with_failures(session, [experiment_id]):
-        raise Conflict(f"no repetition of experiment {experiment_id!r} has FAILED, so none can be retried")
-    _obey(session, experiment, verb)
-    return view_experiments(session, [experiment])[0]
-
-
-@transaction
-def ask_study(session: Session, study_id: str, verb: Verb) -> StudyRead:
-    """Pause, resume, stop, cancel or retry the experiments of a study that permit it.
-
-    Raises:
-        NotFound: no such study.
-        Conflict: none of its experiments permits it.
-    """
-    study, permitting = get_study_permitting(session, study_id, verb)
+    found, permitting = members_permitting(session, id_, verb)
     if verb is Verb.RETRY:
-        failed = with_failures(session, [experiment.id for experiment in permitting])
+        failed = with_failures(session, found.ids)
         permitting = [experiment for experiment in permitting if experiment.id in failed]
         if not permitting:
-            raise Conflict(f"no repetition of study {study_id!r} has FAILED, so none can be retried")
+            raise Conflict(f"no repetition of {found} has FAILED, so none can be retried")
     for experiment in permitting:
         _obey(session, experiment, verb)
-    return view_studies(session, [study])[0]
+    return view(session, found)[0]
 
 
 @transaction
-def schedule_experiment(session: Session, experiment_id: str, change: ScheduleChange) -> ExperimentRead:
-    """Change the priority or the number of repetitions that run at once; a missing field stays unchanged.
+def schedule(session: Session, id_: str, change: ScheduleChange) -> StudyRead:
+    """Change the priority or the number of repetitions of each experiment that run at once.
+
+    A missing field stays unchanged.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: no such study or experiment.
     """
-    experiment, row = get_experiment(session, experiment_id), ExperimentRow
-    lock(session, [experiment.id])
+    found, row = members(session, id_), ExperimentRow
+    lock(session, found.ids)
     values = change.model_dump(exclude_unset=True)
     if "priority" in values:
         values["precedence"] = -(values.pop("priority") or 0)
     if values:
-        session.execute(update(row).where(row.id == experiment.id).values(values))
-    settle(session, [experiment.id])
-    session.refresh(experiment)
-    return view_experiments(session, [experiment])[0]
+        session.execute(update(row).where(row.id.in_(found.ids)).values(values))
+    settle(session, found.ids)
+    for experiment in found.experiments:
+        session.refresh(experiment)
+    return view(session, found)[0]
 
 
-def get_permitting(session: Session, experiment_id: str, verb: Verb) -> ExperimentRow:
-    """Return the experiment, locked in a state that permits the verb.
+def members_permitting(session: Session, id_: str, verb: Verb) -> tuple[Members, list[ExperimentRow]]:
+    """Return what the id means, with its experiments locked, and those whose state permits the verb.
 
     Raises:
-        NotFound: no such experiment.
-        Conflict: its state does not permit the verb.
+        NotFound: no such study or experiment.
+        Conflict: none of them permits it.
     """
-    experiment = get_experiment(session, experiment_id)
-    lock(session, [experiment.id])
-    session.refresh(experiment)
-    if experiment.state not in PERMITTED[verb]:
-        failed = with_failures(session, [experiment.id])
+    found = members(session, id_)
+    lock(session, found.ids)
+    for experiment in found.experiments:
+        session.refresh(experiment)
+    permitting = [each for each in found.experiments if each.state in PERMITTED[verb]]
+    if not permitting:
+        failed = with_failures(session, found.ids)
+        states = sorted({each.state for each in found.experiments})
         able = [
             other.value
             for other in Verb
-            if experiment.state in PERMITTED[other] and (other is not Verb.RETRY or failed)
+            if not set(PERMITTED[other]).isdisjoint(states) and (other is not Verb.RETRY or failed)
         ]
-        msg = (
-            f"experiment {experiment_id!r} is {experiment.state} and cannot be {_PARTICIPLES[verb]}; "
-            f"permitted: {', '.join(able) or 'nothing'}"
-        )
-        raise Conflict(msg)
-    return experiment
-
-
-def get_study_permitting(session: Session, study_id: str, verb: Verb) -> tuple[StudyRow, list[ExperimentRow]]:
-    """Return the study, and those of its experiments whose state permits the verb; all of its experiments are locked.
-
-    Raises:
-        NotFound: no such study.
-        Conflict: none of its experiments permits it.
-    """
-    study, experiments = get_study(session, study_id), experiments_of(session, [study_id])
-    lock(session, [experiment.id for experiment in experiments])
-    for experiment in experiments:
-        session.refresh(experiment)
-    permitting = [experiment for experiment in experiments if experiment.state in PERMITTED[verb]]
-    if not permitting:
-        states = ", ".join(sorted({experiment.state for experiment in experiments}))
-        permitted = ", ".join(PERMITTED[verb])
-        msg = f"no experiment of study {study_id!r} can be {_PARTICIPLES[verb]}: "
-        raise Conflict(msg + f"they are {states}; permitted: {permitted}")
-    return study, permitting
+        permitted = f"permitted: {', '.join(able) or 'nothing'}"
+        raise Conflict(f"{found} is {' and '.join(states)} and cannot be {_PARTICIPLES[verb]}; {permitted}")
+    return found, permitting
 
 
 def _obey(session: Session, experiment: ExperimentRow, verb: Verb) -> None:

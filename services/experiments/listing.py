@@ -1,34 +1,24 @@
-"""Lists of experiments and studies, page by page, filtered and sorted. Use cases raise StoreUnavailable.
+"""The list of studies, page by page, filtered and sorted.
 
 A page begins after the key of the last row of the page before. The key is the sorted column, then the id. If a row's
-state or name changes between two pages, both pages or neither may have it.
+name changes between two pages, both pages or neither may have it.
 """
 
 import json
 from dataclasses import asdict, dataclass
 from hashlib import sha256
-from typing import TypeVar
 
-from sqlalchemy import Select, String, select, tuple_, type_coerce
+from sqlalchemy import select, tuple_
 
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import ExperimentRead, Page, StudyRead
-from gaplab.services.experiments.query.conditions import (
-    EXPERIMENT_TEXTS,
-    STUDY_TEXTS,
-    contains,
-    experiments_meeting,
-    of_study,
-    studies_meeting,
-    study_is,
-)
-from gaplab.services.experiments.views import view_experiments, view_studies
+from gaplab.schemas.records import Page, StudyRead
+from gaplab.services.experiments.query.conditions import conditions, containing, of_one, study_is
+from gaplab.services.experiments.views import view
 from gaplab.services.store.cursor import decode, encode, next_cursor
-from gaplab.services.store.models import Base, ExperimentRow, StudyRow
+from gaplab.services.store.models import ExperimentRow, StudyRow
+from gaplab.services.store.queries.experiments import of_studies
 from gaplab.services.store.session import Session, snapshot
 from gaplab.services.store.statements import storable
-
-R = TypeVar("R", ExperimentRow, StudyRow)
 
 
 @dataclass(frozen=True)
@@ -36,18 +26,13 @@ class ListFilter:
     """The selection and the order of a list.
 
     Attributes:
-        study: only experiments of this study.
-        alone: only experiments without a study.
-        state: only experiments or studies in this state.
-        strategy: only experiments with this strategy, or studies that have such an experiment.
-        text: only experiments or studies whose name, id, notes or tags contain this text.
-        q: query, as `gaplab.services.experiments.query` has it. Archived ones are left out unless it mentions them, or
-            a study is named.
-        sort: an order of ORDERS; a minus before it reverses the order.
+        state: only studies in this state.
+        strategy: only studies that have an experiment with this strategy.
+        text: only studies whose name, id, notes or tags contain this text, or the id of an experiment of them.
+        q: query, as `gaplab.services.experiments.query` has it. Archived ones are left out unless it mentions them.
+        sort: `created_at` or `name`; a minus before it reverses the order.
     """
 
-    study: str | None = None
-    alone: bool = False
     state: State | None = None
     strategy: str | None = None
     text: str | None = None
@@ -58,76 +43,37 @@ class ListFilter:
         """Return a text that identifies the list, for its cursors."""
         return sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:12]
 
-    def cursor_after(self, row: ExperimentRow | StudyRow) -> str:
+    def cursor_after(self, row: StudyRow) -> str:
         """Return the cursor of the page that follows the row in this list."""
-        key = (getattr(row, name) for name in ORDERS[type(row)][self.sort.removeprefix("-")])
-        return encode(*key, bound_to=self.digest())
+        return encode(getattr(row, self.sort.removeprefix("-")), row.id, bound_to=self.digest())
 
-
-ORDERS: dict[type[Base], dict[str, tuple[str, ...]]] = {
-    ExperimentRow: {
-        "created_at": ("created_at", "position", "id"),
-        "name": ("name", "id"),
-        "strategy": ("strategy", "id"),
-        "state": ("state", "id"),
-    },
-    StudyRow: {"created_at": ("created_at", "id"), "name": ("name", "id")},
-}
-"""The columns of each order."""
 
 NEWEST_FIRST = ListFilter()
-
-
-@snapshot
-def list_experiments(
-    session: Session, wanted: ListFilter = NEWEST_FIRST, *, limit: int = 50, cursor: str | None = None
-) -> Page[ExperimentRead]:
-    """Return a page of experiments; concurrent submissions do not shift later pages.
-
-    Raises:
-        InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
-    """
-    row = ExperimentRow
-    query = select(row).where(*experiments_meeting(wanted.q, all_=wanted.study is not None))
-    if wanted.text:
-        query = query.where(contains(wanted.text, *EXPERIMENT_TEXTS))
-    equal = {row.study_id: wanted.study, row.strategy: wanted.strategy}
-    query = query.where(*(column == storable(value) for column, value in equal.items() if value is not None))
-    if wanted.alone:
-        query = query.where(row.study_id.is_(None))
-    if wanted.state is not None:
-        query = query.where(row.state == wanted.state)
-    rows = session.scalars(_cut(query, row, wanted, limit + 1, cursor)).all()
-    return Page(items=view_experiments(session, rows[:limit]), next=next_cursor(rows, limit, wanted.cursor_after))
 
 
 @snapshot
 def list_studies(
     session: Session, wanted: ListFilter = NEWEST_FIRST, *, limit: int = 50, cursor: str | None = None
 ) -> Page[StudyRead]:
-    """Return a page of studies.
+    """Return a page of studies; concurrent submissions do not shift later pages.
 
     Raises:
         InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
+        StoreUnavailable: the database cannot be used now.
     """
-    query = select(StudyRow).where(*studies_meeting(wanted.q))
+    row, falling = StudyRow, wanted.sort.startswith("-")
+    columns = (getattr(row, wanted.sort.removeprefix("-")), row.id)
+    query = select(row).where(*conditions(wanted.q))
     if wanted.text:
-        query = query.where(contains(wanted.text, *STUDY_TEXTS))
+        query = query.where(containing(wanted.text))
     if wanted.strategy is not None:
-        query = query.where(of_study(ExperimentRow.strategy == storable(wanted.strategy)))
+        query = query.where(of_one(ExperimentRow.strategy == storable(wanted.strategy)))
     if wanted.state is not None:
         query = query.where(study_is(wanted.state))
-    rows = session.scalars(_cut(query, StudyRow, wanted, limit + 1, cursor)).all()
-    return Page(items=view_studies(session, rows[:limit]), next=next_cursor(rows, limit, wanted.cursor_after))
-
-
-def _cut(query: Select[R], table: type[R], wanted: ListFilter, limit: int, cursor: str | None) -> Select[R]:
-    names = ORDERS[table][wanted.sort.removeprefix("-")]
-    columns = [
-        type_coerce(ExperimentRow.state, String()) if name == "state" else getattr(table, name) for name in names
-    ]
-    falling = wanted.sort.startswith("-")
     if cursor is not None:
         key, after = tuple_(*columns), decode(cursor, columns, wanted.digest())
         query = query.where(key < after if falling else key > after)
-    return query.order_by(*(each.desc() if falling else each.asc() for each in columns)).limit(limit)
+    query = query.order_by(*(each.desc() if falling else each.asc() for each in columns)).limit(limit + 1)
+    rows = session.scalars(query).all()
+    found = of_studies(session, rows[:limit])
+    return Page(items=view(session, *found), next=next_cursor(rows, limit, wanted.cursor_after))

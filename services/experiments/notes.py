@@ -15,20 +15,21 @@ from markdown_it.token import Token
 from markdown_it.utils import OptionsDict
 
 from gaplab.schemas.editing import NotesRead
-from gaplab.services.store.queries.experiments import Noun, get
+from gaplab.services.store.queries.experiments import whole
 from gaplab.services.store.session import Session, snapshot
 
 _SCHEMES = {"http", "https", "mailto"}
 
 
 @snapshot
-def read(session: Session, noun: Noun, id_: str) -> NotesRead:
-    """Return the notes of an experiment or a study as HTML.
+def read(session: Session, id_: str) -> NotesRead:
+    """Return the notes of a study as HTML.
 
     Raises:
-        NotFound: there is none with this id.
+        NotFound: no such study.
+        Conflict: the id is that of one of its experiments.
     """
-    return NotesRead(html=render(get(session, noun, id_).notes or ""))
+    return NotesRead(html=render(whole(session, id_).study.notes or ""))
 
 
 def render(notes: str) -> str:

@@ -87,7 +87,7 @@ def caveat_of(state: State, tally: Tally) -> str | None:
     return "; ".join(parts) or None
 
 
-def study_caveat_of(state: State, members: Mapping[State, int], stopped: int, tally: Tally) -> str | None:
+def caveat_of_several(state: State, members: Mapping[State, int], stopped: int, tally: Tally) -> str | None:
     """Return what the state of a study does not say about its experiments; `stopped` were COMPLETED early."""
     counts = {each.lower(): members.get(each, 0) for each in (State.FAILED, State.CANCELLED) if each is not state}
     counts["stopped early"] = stopped if state.ended else 0

@@ -1,7 +1,6 @@
 """Experiments and studies, read with their repetitions, samples and simulators. Use cases raise StoreUnavailable."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.records import (
@@ -16,22 +15,24 @@ from gaplab.schemas.records import (
 )
 from gaplab.schemas.spec import SpecRead
 from gaplab.services.experiments.hiding import hidden
-from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
+from gaplab.services.experiments.views import view, view_experiments, view_repetition
 from gaplab.services.specs.differences import SpecColumn, differences
-from gaplab.services.specs.shortening import experiment_spec, study_spec
+from gaplab.services.specs.shortening import shortest
 from gaplab.services.store.cursor import next_cursor
-from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import attempts, results
-from gaplab.services.store.queries.experiments import (
-    Noun,
-    experiments_of,
-    get,
-    get_experiment,
-    get_study,
-    repetitions_of,
-)
+from gaplab.services.store.queries.experiments import get_experiment, members, repetitions_of
 from gaplab.services.store.session import Session, Store, snapshot
 from gaplab.services.store.stored_specs import without_truth
+
+
+@snapshot
+def read(session: Session, id_: str, *, reveal: bool = False) -> StudyRead:
+    """Return a study, or one experiment of it as a study of one; `reveal` includes hidden parameters of reality.
+
+    Raises:
+        NotFound: no such study or experiment.
+    """
+    return view(session, members(session, id_), reveal=reveal)[0]
 
 
 @snapshot
@@ -45,31 +46,16 @@ def read_experiment(session: Session, experiment_id: str, *, reveal: bool = Fals
 
 
 @snapshot
-def read_study(session: Session, study_id: str, *, reveal: bool = False) -> StudyRead:
-    """Return the study with its experiments and their progress; `reveal` includes hidden parameters of reality.
+def read_spec(session: Session, id_: str, *, reveal: bool = False) -> SpecRead:
+    """Return the spec of a study, or of one experiment of it; `reveal` includes hidden parameters of reality.
 
     Raises:
-        NotFound: no such study.
+        NotFound: no such study or experiment.
     """
-    return view_studies(session, [get_study(session, study_id)], reveal=reveal)[0]
-
-
-@snapshot
-def read_spec(session: Session, noun: Noun, id_: str, *, reveal: bool = False) -> SpecRead:
-    """Return the spec of an experiment or a study; `reveal` includes hidden parameters of reality.
-
-    Raises:
-        NotFound: there is none with this id.
-    """
-    row = get(session, noun, id_)
-    if isinstance(row, StudyRow):
-        return study_spec(row.name, _shown_specs(session, experiments_of(session, [row.id]), reveal=reveal))
-    return experiment_spec(*_shown_specs(session, [row], reveal=reveal))
-
-
-def _shown_specs(session: Session, rows: Sequence[ExperimentRow], *, reveal: bool) -> list[dict[str, Any]]:
-    secret = frozenset() if reveal else hidden(session, rows)
-    return [without_truth(row.spec) if row.id in secret else row.spec for row in rows]
+    found = members(session, id_)
+    secret = frozenset() if reveal else hidden(session, found.experiments)
+    specs = [without_truth(row.spec) if row.id in secret else row.spec for row in found.experiments]
+    return shortest(found.named.name, specs)
 
 
 @snapshot
@@ -140,21 +126,15 @@ def list_attempts(session: Session, experiment_id: str, repetition: int) -> tupl
     return attempts.attempts_of(session, experiment_id, repetition, secret=secret)
 
 
-def read_differences(store: Store, studies: Sequence[str], experiments: Sequence[str]) -> SpecDiff:
+def read_differences(store: Store, ids: Sequence[str]) -> SpecDiff:
     """Return the settings that differ between studies and experiments, or within a single study.
 
     Raises:
         NotFound: one of them does not exist.
         InvalidSpec: there is only one experiment to compare.
     """
-    loaded = [read_study(store, id) for id in studies]
-    columns = [
-        SpecColumn(study.id, study.name, tuple(experiment.spec for experiment in study.experiments)) for study in loaded
-    ]
-    if len(loaded) == 1 and not experiments:
-        columns = [_column(experiment) for experiment in loaded[0].experiments]
-    return differences([*columns, *(_column(read_experiment(store, id)) for id in experiments)])
-
-
-def _column(experiment: ExperimentRead) -> SpecColumn:
-    return SpecColumn(experiment.id, experiment.name, (experiment.spec,))
+    studies = [read(store, id_) for id_ in dict.fromkeys(ids)]
+    columns = [SpecColumn(each.id, each.name, tuple(member.spec for member in each.experiments)) for each in studies]
+    if len(studies) == 1:
+        columns = [SpecColumn(each.id, each.name, (each.spec,)) for each in studies[0].experiments]
+    return differences(columns)

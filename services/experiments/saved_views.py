@@ -4,7 +4,7 @@ from sqlalchemy import delete, func, select, update
 
 from gaplab.schemas.views import ViewRead, ViewSpec
 from gaplab.services.core.errors import InvalidSpec, LimitReached, NotFound
-from gaplab.services.experiments.query.conditions import experiments_meeting, studies_meeting
+from gaplab.services.experiments.query.conditions import conditions
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ViewRow
 from gaplab.services.store.session import Session, snapshot, transaction
@@ -39,11 +39,11 @@ def save_view(session: Session, name: str, spec: ViewSpec) -> ViewRead:
         LimitReached: there are too many views.
     """
     try:
-        (experiments_meeting if spec.shows == "experiments" else studies_meeting)(spec.query)
+        conditions(spec.query)
     except InvalidSpec as error:
         raise InvalidSpec(violation.moved("q", "/query") for violation in error.violations) from error
     query = storable(spec.query) if spec.query else None
-    shown = {"shows": spec.shows, "query": query, "sort": spec.sort}
+    shown = {"query": query, "sort": spec.sort}
     if session.get(ViewRow, storable(name)) is None:
         if session.execute(select(func.count()).select_from(ViewRow)).scalar_one() >= MOST:
             raise LimitReached(f"this service has {MOST} saved views already: delete one first")

@@ -1,6 +1,6 @@
 """Experiments, studies and repetitions as the API shows them: with progress, without hidden parameters."""
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -13,13 +13,13 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.fitness import best_of, fitness_of
 from gaplab.services.experiments.hiding import hidden
-from gaplab.services.experiments.progress import Span, caveat_of, mean_best, progress_of, study_caveat_of
+from gaplab.services.experiments.progress import Span, caveat_of, caveat_of_several, mean_best, progress_of
 from gaplab.services.plugins.refusals import tells_unavailable
 from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.robots import sensors
-from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import attempts
-from gaplab.services.store.queries.experiments import experiments_of
+from gaplab.services.store.queries.experiments import Members
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
 from gaplab.services.store.queries.requests import doubtful
 from gaplab.services.store.queries.results import best_recorded
@@ -29,10 +29,18 @@ from gaplab.services.store.texts import unpack_tags
 _MOVING = (State.RUNNING, State.PAUSING, State.STOPPING)
 
 
-def view_experiments(
-    session: Session, rows: Sequence[ExperimentRow], *, reveal: bool = False
-) -> tuple[ExperimentRead, ...]:
-    """Return the experiments with their progress; `reveal` includes hidden parameters of reality."""
+def view(session: Session, *found: Members, reveal: bool = False) -> tuple[StudyRead, ...]:
+    """Return studies, or each as one experiment of it alone; `reveal` includes hidden parameters of reality."""
+    rows = [row for each in found for row in each.experiments]
+    work = _work(session, rows)
+    shown = {each.id: each for each in _view(session, rows, work, reveal=reveal)}
+    by_id = {each.named.id: [shown[id_] for id_ in each.ids] for each in found}
+    best = best_of(session, by_id)
+    return tuple(_study(each, by_id[each.named.id], work, best.get(each.named.id)) for each in found)
+
+
+def view_experiments(session: Session, rows: Sequence[ExperimentRow], *, reveal: bool = False) -> list[ExperimentRead]:
+    """Return experiments with their progress; `reveal` includes hidden parameters of reality."""
     return _view(session, rows, _work(session, rows), reveal=reveal)
 
 
@@ -42,17 +50,6 @@ def with_sensors(experiment: ExperimentRead) -> ExperimentRead:
     if found is not None:
         found = found.model_copy(update={"needed": needs_readings(discrepancy_of(experiment.spec), found)})
     return experiment.model_copy(update={"sensors": found})
-
-
-def view_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = False) -> tuple[StudyRead, ...]:
-    """Return the studies with their experiments; `reveal` includes hidden parameters of reality."""
-    experiments = experiments_of(session, [row.id for row in rows])
-    work = _work(session, experiments)
-    by_study: dict[str, list[ExperimentRead]] = defaultdict(list)
-    for experiment in _view(session, experiments, work, reveal=reveal):
-        by_study[str(experiment.study)].append(experiment)
-    best = best_of(session, by_study)
-    return tuple(_study(row, by_study[row.id], work, best.get(row.id)) for row in rows)
 
 
 def view_repetition(row: RepetitionRow, *, secret: bool) -> RepetitionRead:
@@ -94,14 +91,14 @@ class _Work:
 def _work(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, _Work]:
     """Return the work on each experiment; a study that runs needs the times of those of its members that ended too."""
     found = tallies(session, [row.id for row in rows])
-    running = {row.study_id or row.id for row in rows if row.state in _MOVING}
-    spans = attempts.work_spans(session, [row.id for row in rows if (row.study_id or row.id) in running])
+    running = {row.study_id for row in rows if row.state in _MOVING}
+    spans = attempts.work_spans(session, [row.id for row in rows if row.study_id in running])
     return {row.id: _Work(found.get(row.id, Tally()), tuple(spans.get(row.id, ()))) for row in rows}
 
 
 def _view(
     session: Session, rows: Sequence[ExperimentRow], work: Mapping[str, _Work], *, reveal: bool
-) -> tuple[ExperimentRead, ...]:
+) -> list[ExperimentRead]:
     ids = [row.id for row in rows]
     found = _Findings(
         failures=reasons(session, ids),
@@ -111,7 +108,7 @@ def _view(
         doubts=doubtful(session, ids),
     )
     secret = frozenset() if reveal else hidden(session, rows)
-    return tuple(_experiment(row, work[row.id], found, secret=row.id in secret) for row in rows)
+    return [_experiment(row, work[row.id], found, secret=row.id in secret) for row in rows]
 
 
 @dataclass(frozen=True)
@@ -130,7 +127,6 @@ def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bo
     return ExperimentRead.filled_from(
         row,
         study=row.study_id,
-        tags=unpack_tags(row.tags),
         direct=row.strategy in strategies and strategies[row.strategy].in_reality,
         level=not row.tunes,
         caveat=caveat_of(row.state, work.tally),
@@ -147,17 +143,20 @@ def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bo
 
 
 def _study(
-    row: StudyRow, experiments: Sequence[ExperimentRead], work: Mapping[str, _Work], best: BestRead | None
+    found: Members, experiments: Sequence[ExperimentRead], work: Mapping[str, _Work], best: BestRead | None
 ) -> StudyRead:
     together = sum((work[each.id] for each in experiments), _Work())
     states = Counter(each.state for each in experiments)
     stopped = sum(each.state is State.COMPLETED and work[each.id].tally.stopped > 0 for each in experiments)
     state = state_of(states)
+    alone = experiments[0].caveat if len(experiments) == 1 else None
     return StudyRead.filled_from(
-        row,
-        tags=unpack_tags(row.tags),
+        found.study,
+        id=found.named.id,
+        name=found.named.name,
+        tags=unpack_tags(found.study.tags),
         state=state,
-        caveat=study_caveat_of(state, states, stopped, together.tally),
+        caveat=alone or caveat_of_several(state, states, stopped, together.tally),
         best=best,
         experiments=tuple(experiments),
         progress=together.progress,

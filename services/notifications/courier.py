@@ -57,8 +57,7 @@ class Courier:
             letter = outbox.next_letter(self._store)
             if letter is None or self._stopped.is_set():
                 break
-            path = "studies" if letter.message.kind == "study" else "experiments"
-            url = f"{self._page}/#/{path}/{letter.message.subject}" if self._page else None
+            url = f"{self._page}/#/studies/{letter.message.subject}" if self._page else None
             outcome = deliver(
                 letter.message.model_copy(update={"url": url}), letter.channel, letter.webhook, self._notify
             )

@@ -37,7 +37,7 @@ class Attempt:
 
 
 def deliver(message: Notification, channel: Channel, webhook: str | None, notify: Notify) -> Attempt:
-    """Send a notification once; `webhook` is the address that its study or experiment has of its own."""
+    """Send a notification once; `webhook` is the address that its study has of its own."""
     if channel is Channel.COMMAND:
         return run(notify.command, message) if notify.command else _no_longer("the command")
     if channel is Channel.WEBHOOK:

@@ -7,7 +7,6 @@ function is one transaction, and raises StoreUnavailable while the database cann
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Literal
 
 from sqlalchemy import func, select
 
@@ -52,7 +51,7 @@ class Letter:
     Attributes:
         key: event, subject and channel, which identify it.
         message: what it says.
-        webhook: address, if the study or experiment has its own; None if that was removed.
+        webhook: address, if the study has its own; None if that was removed.
         attempt: number of this attempt, from 1.
     """
 
@@ -97,9 +96,9 @@ def next_letter(session: Session) -> Letter | None:
     due = select(row).where(row.next_at <= moment(session)).order_by(row.next_at, row.event).limit(1)
     if (found := session.scalars(due).first()) is None:
         return None
-    owner = session.get(StudyRow, found.subject_id) or session.get(ExperimentRow, found.subject_id)
+    study = session.get(StudyRow, found.subject_id)
     key = (found.event, found.subject_id, found.channel)
-    webhook = owner.webhook if owner else None
+    webhook = study.webhook if study else None
     return Letter(key, Notification.model_validate(found.message), webhook, found.attempts + 1)
 
 
@@ -115,7 +114,7 @@ def settle(session: Session, letter: Letter, failure: str | None, *, hopeless: b
     row.attempts, row.error = letter.attempt, failure
     pauses = () if hopeless or failure is None else PAUSES_S[letter.attempt - 1 : letter.attempt]
     row.next_at = moment(session) + timedelta(seconds=pauses[0]) if pauses else None
-    about = {"channel": letter.channel.value, "of": letter.message.kind, "attempt": letter.attempt}
+    about = {"channel": letter.channel.value, "attempt": letter.attempt}
     if failure is None:
         row.delivered_at = moment(session)
         note(session, EventKind.NOTIFIED, row.experiment_id, **about)
@@ -127,61 +126,50 @@ def settle(session: Session, letter: Letter, failure: str | None, *, hopeless: b
 def _of_end(
     session: Session, event: EventRow, channels: Sequence[Channel], present: datetime
 ) -> Iterator[NotificationRow]:
-    """Yield the notifications of an end, unless it was undone since.
+    """Yield the notifications that a study has ended, unless that was undone since.
 
-    The end of an experiment that is deleted by now may be that of its study.
+    The last of its experiments to end may be deleted by now.
     """
-    experiment = session.get(ExperimentRow, event.experiment_id)
-    if experiment is not None:
-        if not experiment.state.ended or not _is_last_end(session, event, [experiment.id]):
-            return
-        yield from _rows(event, experiment, [experiment], channels if experiment.study_id is None else (), present)
-    of = experiment or session.get(DeletionRow, event.experiment_id)
+    of = session.get(ExperimentRow, event.experiment_id) or session.get(DeletionRow, event.experiment_id)
     study = session.get(StudyRow, of.study_id) if of and of.study_id else None
     if study is not None:
         members = experiments_of(session, [study.id])
-        if members and all(each.state.ended for each in members) and _ends(session, event, study, members):
+        if all(each.state.ended for each in members) and _ends(session, event, study, members):
             yield from _rows(event, study, members, channels, present)
 
 
 def _ends(session: Session, event: EventRow, study: StudyRow, members: Sequence[ExperimentRow]) -> bool:
     """Return whether the last experiment of the study to end, deleted or not, ended at this event."""
-    deleted = session.scalars(select(DeletionRow.id).where(DeletionRow.study_id == study.id))
-    return _is_last_end(session, event, [*(each.id for each in members), *deleted])
-
-
-def _is_last_end(session: Session, event: EventRow, experiments: Sequence[str]) -> bool:
     row = EventRow
+    deleted = session.scalars(select(DeletionRow.id).where(DeletionRow.study_id == study.id))
+    experiments = [*(each.id for each in members), *deleted]
     ends = select(func.max(row.number)).where(row.experiment_id.in_(experiments), row.kind.in_(ENDS))
     return session.scalar(ends) == event.number
 
 
 def _rows(
     event: EventRow,
-    row: ExperimentRow | StudyRow,
+    study: StudyRow,
     members: Sequence[ExperimentRow],
     channels: Sequence[Channel],
     present: datetime,
 ) -> Iterator[NotificationRow]:
-    """Yield the notifications that a study with its members, or an experiment by itself, has ended."""
-    kind: Literal["study", "experiment"] = "study" if isinstance(row, StudyRow) else "experiment"
     states = [each.state.value for each in members]
     counts = ", ".join(f"{states.count(state)} {state}" for state in sorted(set(states)))
     state = state_of([each.state for each in members])
     message = Notification(
-        id=f"{event.number}-{row.id}",
-        kind=kind,
-        subject=row.id,
-        name=row.name,
+        id=f"{event.number}-{study.id}",
+        subject=study.id,
+        name=study.name,
         state=state,
-        text=f"The {kind} {row.name} is {state}{f': {counts}' if kind == 'study' else ''}.",
+        text=f"The study {study.name} is {state}{f': {counts}' if len(members) > 1 else ''}.",
         experiments=tuple(EndedExperiment(id=each.id, name=each.name, state=each.state) for each in members),
         ended_at=event.at,
     )
-    for channel in (*channels, *([Channel.OWN] if row.webhook else [])):
+    for channel in (*channels, *([Channel.OWN] if study.webhook else [])):
         yield NotificationRow(
             event=event.number,
-            subject_id=row.id,
+            subject_id=study.id,
             channel=channel.value,
             experiment_id=event.experiment_id,
             message=message.model_dump(mode="json"),

@@ -1,52 +1,45 @@
-"""Webhooks of single studies and experiments: only to hosts that the owner of the service permits."""
+"""Webhooks of single studies: only to hosts that the owner of the service permits."""
 
 from collections.abc import Collection
 from urllib.parse import SplitResult, urlsplit
 
-from sqlalchemy import update
-
 from gaplab.schemas.notifications import WebhookRead, WebhookSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
-from gaplab.services.store.models import ExperimentRow, StudyRow
-from gaplab.services.store.queries.experiments import Noun, experiments_of, get, lock
+from gaplab.services.store.queries.experiments import lock, whole
 from gaplab.services.store.session import Session, snapshot, transaction
 
 _USUAL = {"http": 80, "https": 443}
 
-NONE_PERMITTED = (
-    "this service permits no webhooks of studies and experiments: its owner lists hosts in GAPLAB_NOTIFY_HOSTS"
-)
+NONE_PERMITTED = "this service permits no webhooks of studies: its owner lists hosts in GAPLAB_NOTIFY_HOSTS"
 
 
 @transaction
-def set_webhook(
-    session: Session, noun: Noun, id_: str, spec: WebhookSpec | None, hosts: Collection[str]
-) -> WebhookRead:
-    """Tell a webhook when an experiment, or all experiments of a study, have ended; None tells none any more.
+def set_webhook(session: Session, id_: str, spec: WebhookSpec | None, hosts: Collection[str]) -> WebhookRead:
+    """Tell a webhook when all experiments of a study have ended; None tells none any more.
 
     Raises:
-        NotFound: there is none with this id.
+        NotFound: no such study.
         InvalidSpec: the address is not permitted.
-        Conflict: they have ended, so nothing would be sent.
+        Conflict: they have ended, so nothing would be sent; or the id is that of one of them.
     """
-    row, url = get(session, noun, id_), spec.url if spec else None
+    found, url = whole(session, id_), spec.url if spec else None
     if url is not None and (why := refusal(url, hosts)):
         raise InvalidSpec([Violation("/url", None, why, sorted(hosts))])  # without the address, which may be secret
-    if url is not None and _has_ended(session, row):
-        raise Conflict(f"{row.name!r} ({row.id}) has ended, so nothing would be sent: extend it first")
-    table = type(row)
-    session.execute(update(table).where(table.id == row.id).values(webhook=url))
+    if url is not None and all(state.ended for state in lock(session, found.ids).values()):
+        raise Conflict(f"{found.study.name!r} ({id_}) has ended, so nothing would be sent: extend it first")
+    found.study.webhook = url
     return _view(url)
 
 
 @snapshot
-def read(session: Session, noun: Noun, id_: str) -> WebhookRead:
-    """Return the host of the webhook of an experiment or a study.
+def read(session: Session, id_: str) -> WebhookRead:
+    """Return the host of the webhook of a study.
 
     Raises:
-        NotFound: there is none with this id.
+        NotFound: no such study.
+        Conflict: the id is that of one of its experiments.
     """
-    return _view(get(session, noun, id_).webhook)
+    return _view(whole(session, id_).study.webhook)
 
 
 def refusal(url: str, hosts: Collection[str]) -> str | None:
@@ -69,12 +62,6 @@ def refusal(url: str, hosts: Collection[str]) -> str | None:
     if not {host, with_port} & set(hosts):
         return f"the host {host!r} is not permitted; permitted: {', '.join(sorted(hosts))} (GAPLAB_NOTIFY_HOSTS)"
     return None
-
-
-def _has_ended(session: Session, row: ExperimentRow | StudyRow) -> bool:
-    experiments = [row] if isinstance(row, ExperimentRow) else experiments_of(session, [row.id])
-    states = lock(session, [experiment.id for experiment in experiments])
-    return all(state.ended for state in states.values())
 
 
 def _view(url: str | None) -> WebhookRead:

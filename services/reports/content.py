@@ -25,18 +25,15 @@ from gaplab.services.specs.differences import SpecColumn, differences
 from gaplab.services.store.queries.costs import Work, work_of
 from gaplab.services.store.session import Store
 
-Subject = StudyRead | ExperimentRead
-
 
 @dataclass(frozen=True)
 class Facts:
     """Everything that a report shows, as of about one moment.
 
     Attributes:
-        id: id of the study or the experiment.
+        id: id of the study, or of the experiment that alone is meant.
         name: its name.
         notes: its notes; None without any.
-        study: whether it is a study.
         experiments: its experiments; of hidden realities without parameters.
         curves: their curves.
         transferred: the same of transferred controllers alone.
@@ -57,7 +54,6 @@ class Facts:
     id: str
     name: str
     notes: str | None
-    study: bool
     experiments: tuple[ExperimentRead, ...]
     curves: tuple[Curve, ...]
     transferred: tuple[Curve, ...]
@@ -79,16 +75,16 @@ class Facts:
         return {one.curve.experiment: one.name for one in self.judged}
 
 
-def verdict_on(store: Store, subject: Subject, margin: Margin | None = None) -> VerdictRead:
-    """Return the verdict on a study or an experiment."""
-    experiments = _experiments(subject)
+def verdict_on(store: Store, subject: StudyRead, margin: Margin | None = None) -> VerdictRead:
+    """Return the verdict on a study."""
+    experiments = subject.experiments
     curves = results.curves(store, [experiment.id for experiment in experiments])
     return _verdict(store, curves, experiments, _misfits(store, experiments), margin)[0]
 
 
-def facts_of(store: Store, subject: Subject, margin: Margin | None = None) -> Facts:
-    """Return the facts of a study or an experiment."""
-    experiments = _experiments(subject)
+def facts_of(store: Store, subject: StudyRead, margin: Margin | None = None) -> Facts:
+    """Return the facts of a study."""
+    experiments = subject.experiments
     ids = [experiment.id for experiment in experiments]
     curves = results.curves(store, ids)
     misfits = _misfits(store, experiments)
@@ -102,7 +98,6 @@ def facts_of(store: Store, subject: Subject, margin: Margin | None = None) -> Fa
         id=subject.id,
         name=subject.name,
         notes=subject.notes,
-        study=isinstance(subject, StudyRead),
         experiments=experiments,
         curves=curves,
         transferred=results.curves(store, ids, Fitness.TRANSFERRED),
@@ -118,10 +113,6 @@ def facts_of(store: Store, subject: Subject, margin: Margin | None = None) -> Fa
         provenance={id_: provenance.read(store, id_) for id_ in ids},
         leading=_leading(store, judged),
     )
-
-
-def _experiments(subject: Subject) -> tuple[ExperimentRead, ...]:
-    return subject.experiments if isinstance(subject, StudyRead) else (subject,)
 
 
 def _misfits(store: Store, experiments: Sequence[ExperimentRead]) -> dict[str, MisfitRead]:

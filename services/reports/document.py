@@ -1,5 +1,6 @@
 """The arrangement of a report: which facts stand in which section."""
 
+from gaplab.schemas.records import StudyRead
 from gaplab.schemas.reports import VerdictRead
 from gaplab.services.core.comparisons import POOLED
 from gaplab.services.figures.kinds.curves import curves_figure
@@ -7,15 +8,15 @@ from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number_of, titled
 from gaplab.services.reports import compared, tables
 from gaplab.services.reports.blocks import Block, Bullets, Drawing, Paragraph, Report, Section
-from gaplab.services.reports.content import Facts, Subject, facts_of
+from gaplab.services.reports.content import Facts, facts_of
 from gaplab.services.reports.reproduction import reproduction
 from gaplab.services.results.comparisons import Margin
 from gaplab.services.results.coordinates import simulator_coordinates
 from gaplab.services.store.session import Store
 
 
-def report_on(store: Store, subject: Subject, margin: Margin | None = None) -> Report:
-    """Return the report on a study or an experiment."""
+def report_on(store: Store, subject: StudyRead, margin: Margin | None = None) -> Report:
+    """Return the report on a study."""
     facts = facts_of(store, subject, margin)
     several = len(facts.experiments) > 1
     sections = [
@@ -29,12 +30,11 @@ def report_on(store: Store, subject: Subject, margin: Margin | None = None) -> R
         Section("Provenance", _provenance(facts)),
         Section("How to reproduce it", tuple(reproduction(facts))),
     ]
-    kind = number_of("experiment", len(facts.experiments)) if facts.study else "1 experiment"
     repetitions = sum(experiment.progress.completed for experiment in facts.experiments)
     return Report(
         id=facts.id,
-        title=facts.name if facts.study else titled(facts.name, facts.experiments[0].strategy, 200),
-        subtitle=f"{'Study' if facts.study else 'Experiment'} {facts.id}: {kind}, "
+        title=facts.name if several else titled(facts.name, facts.experiments[0].strategy, 200),
+        subtitle=f"Study {facts.id}: {number_of('experiment', len(facts.experiments))}, "
         f"{number_of('completed repetition', repetitions)}",
         headline=facts.verdict.headline,
         sections=tuple(sections),

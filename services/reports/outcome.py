@@ -9,7 +9,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.experiments.reading import read_experiment
+from gaplab.services.experiments.reading import read
 from gaplab.services.reports.content import Facts, facts_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import ExperimentRow
@@ -66,7 +66,6 @@ def outcome_of(store: Store, experiment_id: str) -> ExperimentOutcome:
         Conflict: nothing has been measured or tuned yet.
         InvalidSpec: its robot is not installed here.
     """
-    facts = facts_of(store, read_experiment(store, experiment_id))
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
         seen = results.page_of_samples(session, experiment_id, repetition=None, kind=None, limit=MOST_ROWS, cursor=None)
@@ -79,7 +78,7 @@ def outcome_of(store: Store, experiment_id: str) -> ExperimentOutcome:
         raise Conflict(f"experiment {experiment_id!r} has measured and tuned nothing{later}")
     spec = spec_of(row.spec)
     return ExperimentOutcome(
-        facts=facts,
+        facts=facts_of(store, read(store, experiment_id)),
         spec=spec,
         robot=robot_of(spec),
         measured=measured,

@@ -1,4 +1,4 @@
-"""How to compute a study or an experiment again: its spec, and the commands."""
+"""How to compute a study again: its spec, and the commands."""
 
 import json
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from typing import Any
 from gaplab.schemas.spec import SpecRead
 from gaplab.services.reports.blocks import Block, Code, Paragraph
 from gaplab.services.reports.content import Facts
-from gaplab.services.specs.shortening import experiment_spec, study_spec
+from gaplab.services.specs.shortening import shortest
 
 ONE = "Save the spec below as spec.json and submit it: gaplab submit spec.json --watch"
 EACH = "Save each spec below as a file and submit it: gaplab submit spec.json --watch"
@@ -28,13 +28,12 @@ def reproduction(facts: Facts) -> Iterator[Block]:
         return
     for experiment, one in zip(facts.experiments, facts.judged, strict=True):
         yield Paragraph(f"{one.name}:")
-        yield Code(spec_text(experiment_spec(experiment.spec).spec))
+        yield Code(spec_text(shortest(experiment.name, [experiment.spec]).spec))
 
 
 def submitted(facts: Facts) -> SpecRead:
     """Return the spec to submit, without parameters of reality that are hidden yet."""
-    specs = [experiment.spec for experiment in facts.experiments]
-    return study_spec(facts.name, specs) if facts.study else experiment_spec(specs[0])
+    return shortest(facts.name, [experiment.spec for experiment in facts.experiments])
 
 
 def spec_text(spec: dict[str, Any] | None) -> str:

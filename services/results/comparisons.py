@@ -42,7 +42,7 @@ class Margin:
 
 def compare(  # noqa: PLR0913 - each is a parameter of the operation
     store: Store,
-    experiment_ids: Sequence[str],
+    ids: Sequence[str],
     *,
     from_evaluations: int | None = None,
     to_evaluations: int | None = None,
@@ -56,7 +56,7 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
 
     Args:
         store: database with the experiments.
-        experiment_ids: two or more, each once.
+        ids: of studies and experiments, which mean two or more experiments.
         from_evaluations: the first number of evaluations; by default the last.
         to_evaluations: the last number of evaluations; by default the last that the experiments share.
         margin: difference within which two experiments are equivalent; None: not tested.
@@ -64,15 +64,15 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
         fitness: whose fitness counts; by default the recorded one, as in the paper.
 
     Raises:
-        NotFound: an experiment does not exist.
-        InvalidSpec: fewer than two experiments, an experiment twice, a range that is empty, negative or beyond
+        NotFound: there is nothing with one of the ids.
+        InvalidSpec: fewer than two experiments, a range that is empty, negative or beyond
             all experiments, or a share of direct without one direct baseline.
     """
-    if len(set(experiment_ids)) < max(2, len(experiment_ids)):
-        message = f"a comparison needs two or more experiments, each once, not {len(experiment_ids)}"
-        raise InvalidSpec([Violation("experiment", list(experiment_ids), message)])
     with store.reading() as session:
-        rows, values = values_of(session, experiment_ids, fitness)
+        if len(rows := experiments.meant(session, ids)) < 2:
+            message = "a comparison needs two or more experiments, and this names one"
+            raise InvalidSpec([Violation("study", list(ids), message)])
+        values = values_of(session, rows, fitness)
         final = _common_count(session, rows) if to_evaluations is None else to_evaluations
         within = None if margin is None else _in_units(session, rows, margin)
         concealed = hidden(session, rows)
@@ -125,7 +125,7 @@ def _in_units(session: Session, rows: Sequence[ExperimentRow], margin: Margin) -
     """
     if not margin.of_direct:
         return margin.value
-    studies = {row.study_id for row in rows if row.study_id is not None}
+    studies = {row.study_id for row in rows}
     baselines = _direct(rows) or _direct(experiments.experiments_of(session, sorted(studies)))
     means = [point.mean for point in fitness_of(session, baselines).values()]
     if len(baselines) != 1 or len(means) != 1 or means[0] <= 0:
@@ -153,7 +153,7 @@ def warnings(first: ExperimentRow, second: ExperimentRow, hidden: Set[str]) -> I
     elif one.task != other.task:
         tasks = _both(one.task.name if one.task else "its own", other.task.name if other.task else "its own")
         yield f"different tasks{tasks}: their fitness does not mean the same"
-    if first.study_id is not None and first.study_id == second.study_id:
+    if first.study_id == second.study_id:
         return
     if _setup(one) == _setup(other) and not hidden.isdisjoint((first.id, second.id)):
         yield "realities are hidden until the experiments have ended, so they may be different"

@@ -61,18 +61,15 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
     )
 
 
-def experiment_coordinates(
-    store: Store, studies: Sequence[str], experiment_ids: Sequence[str], *, title: str = ""
-) -> FigureDefinition:
-    """Return experiments as lines: the settings that differ between them, and their fitness.
+def setting_coordinates(store: Store, ids: Sequence[str], *, title: str = "") -> FigureDefinition:
+    """Return the experiments of studies as lines: the settings that differ between them, and their fitness.
 
     Raises:
-        NotFound: a study or an experiment does not exist.
+        NotFound: there is nothing with one of the ids.
     """
-    of_studies = [each for id_ in studies for each in reading.read_study(store, id_).experiments]
-    known = {each.id: each for each in [*of_studies, *(reading.read_experiment(store, id_) for id_ in experiment_ids)]}
+    known = {each.id: each for id_ in ids for each in reading.read(store, id_).experiments}
     kept = [each for each in known.values() if each.fitness]
-    differing = read_differences(store, [], [each.id for each in kept]).settings if len(kept) > 1 else ()
+    differing = read_differences(store, [each.id for each in kept]).settings if len(kept) > 1 else ()
     axes = [*(_setting(setting) for setting in differing[:MOST_SETTINGS]), *_results(kept)]
     return coordinates_figure(
         axes,

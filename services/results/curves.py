@@ -19,46 +19,32 @@ from gaplab.services.store.session import Session, Store
 COLUMNS = ("experiment", "name", "strategy", "repetition", "evaluations", "fitness")
 
 
+def curves(store: Store, ids: Sequence[str], fitness: Fitness = Fitness.RECORDED) -> tuple[Curve, ...]:
+    """Return the curves of the experiments that the ids of studies and experiments mean, in their order.
+
+    Raises:
+        NotFound: there is nothing with one of the ids.
+    """
+    with store.reading() as session:
+        return curves_of(session, experiments.meant(session, ids), fitness)
+
+
+def curves_of(
+    session: Session, rows: Sequence[ExperimentRow], fitness: Fitness = Fitness.RECORDED
+) -> tuple[Curve, ...]:
+    """Return the curves of experiments in the snapshot of a session."""
+    values = values_of(session, rows, fitness)
+    return tuple(_curve(row, values[row.id], fitness) for row in rows)
+
+
 def curve(store: Store, experiment_id: str, fitness: Fitness = Fitness.RECORDED) -> Curve:
     """Return the curve of an experiment so far.
 
     Raises:
         NotFound: the experiment does not exist.
     """
-    return curves(store, [experiment_id], fitness)[0]
-
-
-def curves(store: Store, experiment_ids: Sequence[str], fitness: Fitness = Fitness.RECORDED) -> tuple[Curve, ...]:
-    """Return the curves of experiments, in their order.
-
-    Raises:
-        NotFound: an experiment does not exist.
-    """
     with store.reading() as session:
-        return curves_of(session, experiment_ids, fitness)
-
-
-def curves_of(
-    session: Session, experiment_ids: Sequence[str], fitness: Fitness = Fitness.RECORDED
-) -> tuple[Curve, ...]:
-    """Return the curves of experiments, as `curves` does, in the snapshot of a session.
-
-    Raises:
-        NotFound: an experiment does not exist.
-    """
-    rows, values = values_of(session, experiment_ids, fitness)
-    return tuple(_curve(row, values[row.id], fitness) for row in rows)
-
-
-def study_curves(store: Store, study_id: str, fitness: Fitness = Fitness.RECORDED) -> tuple[Curve, ...]:
-    """Return the curves of a study's experiments, in its order.
-
-    Raises:
-        NotFound: the study does not exist.
-    """
-    with store.reading() as session:
-        experiments.get_study(session, study_id)
-        return curves_of(session, [row.id for row in experiments.experiments_of(session, [study_id])], fitness)
+        return curves_of(session, [experiments.get_experiment(session, experiment_id)], fitness)[0]
 
 
 def unit_of(store: Store, experiment_id: str) -> str:
@@ -87,17 +73,14 @@ def curves_csv(curves: Sequence[Curve]) -> str:
 
 
 def values_of(
-    session: Session, ids: Sequence[str], fitness: Fitness = Fitness.RECORDED
-) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
-    """Return experiments, and the fitness of each: `(repetitions, k)`, nan if missing, up to the last iteration done.
+    session: Session, rows: Sequence[ExperimentRow], fitness: Fitness = Fitness.RECORDED
+) -> dict[str, FloatArray]:
+    """Return the fitness of each experiment: `(repetitions, k)`, nan if missing, up to the last iteration done.
 
     A failed controller is never the best. Where one was not measured, there is no best from there on: others had more
     chances.
-
-    Raises:
-        NotFound: an experiment does not exist.
     """
-    rows = experiments.get_experiments(session, ids)
+    ids = [row.id for row in rows]
     recorded = fitness is Fitness.RECORDED
     found = (
         results.recorded(session, ids) if recorded else results.measured_fitness(session, ids, MeasurementKind.PROBE)
@@ -108,7 +91,7 @@ def values_of(
         values[experiment][repetition, iteration] = -np.inf if value is None else value
     if fitness is Fitness.EQUAL_CHANCES:
         values = {id_: np.maximum.accumulate(each, axis=1) for id_, each in values.items()}
-    return rows, {id_: np.where(np.isneginf(each), np.nan, each) for id_, each in values.items()}
+    return {id_: np.where(np.isneginf(each), np.nan, each) for id_, each in values.items()}
 
 
 def _curve(row: ExperimentRow, values: FloatArray, fitness: Fitness) -> Curve:

@@ -14,15 +14,15 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.provenance import Provenance, ProvenanceRead, ProvenanceUse
-from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.records import StudyRead
 from gaplab.services.core.errors import Conflict
-from gaplab.services.experiments.views import view_experiments
+from gaplab.services.experiments.views import view
 from gaplab.services.plugins import refusals
 from gaplab.services.plugins.external import named_in, unavailable
 from gaplab.services.store.lease import Claim
 from gaplab.services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow
 from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.experiments import get_experiment, lock
+from gaplab.services.store.queries.experiments import get_experiment, lock, members
 from gaplab.services.store.queries.provenance import id_of, insert_unless_there
 from gaplab.services.store.session import snapshot, transaction
 from gaplab.services.store.statements import insert_new, storable
@@ -46,26 +46,29 @@ def read(session: Session, experiment_id: str) -> ProvenanceRead:
 
 
 @transaction
-def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
-    """Let the next supervisor continue the experiment under any versions; the experiment is then bound to those.
+def accept_versions(session: Session, id_: str) -> StudyRead:
+    """Let the next supervisor continue experiments under any versions; each is then bound to those.
 
     Raises:
-        NotFound: the experiment does not exist.
-        Conflict: it has ended, or has not started.
+        NotFound: no such study or experiment.
+        Conflict: all of them have ended, or have not started.
         StoreUnavailable: the database cannot be used now.
     """
-    experiment = get_experiment(session, experiment_id)
-    lock(session, [experiment_id])
-    session.refresh(experiment)
-    if experiment.state.ended or experiment.computed_with is None:
-        ended = f"has ended: it is {experiment.state}"
-        why = ended if experiment.state.ended else "has not started, so it has no versions yet"
-        raise Conflict(f"experiment {experiment_id!r} {why}; there is nothing to accept")
-    told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
-    note(session, EventKind.VERSIONS_ACCEPTED, experiment_id, **told)
-    experiment.computed_with = experiment.refused_by = None
+    found = members(session, id_)
+    lock(session, found.ids)
+    for experiment in found.experiments:
+        session.refresh(experiment)
+    bound = [each for each in found.experiments if not each.state.ended and each.computed_with is not None]
+    if not bound:
+        ended = " and ".join(sorted({each.state for each in found.experiments if each.state.ended}))
+        why = f"has ended: it is {ended}" if ended else "has not started, so it has no versions yet"
+        raise Conflict(f"{found} {why}; there is nothing to accept")
+    for experiment in bound:
+        told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
+        note(session, EventKind.VERSIONS_ACCEPTED, experiment.id, **told)
+        experiment.computed_with = experiment.refused_by = None
     session.flush()
-    return view_experiments(session, [experiment])[0]
+    return view(session, found)[0]
 
 
 def decisive(under: Provenance, spec: Mapping[str, Any]) -> str:

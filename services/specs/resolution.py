@@ -107,12 +107,14 @@ def _created(spec: ExperimentSpec) -> tuple[Robot, Strategy, Optimizer, Optimize
     )
 
 
-def resolve_study(spec: StudySpec) -> tuple[ResolvedSpec, ...]:
-    """Return the resolved spec of each experiment of a study, in the order of its strategies.
+def resolve(spec: StudySpec | ExperimentSpec) -> tuple[ResolvedSpec, ...]:
+    """Return the resolved spec of each experiment of a study, in the order of its strategies; or of one experiment.
 
     Raises:
-        InvalidSpec: with every violation, each with its pointer into the study's spec, once.
+        InvalidSpec: with every violation, each with its pointer into the spec, once.
     """
+    if isinstance(spec, ExperimentSpec):
+        return (resolve_experiment(spec),)
     shared = shared_fields(spec, StudySpec.model_fields.keys() & ExperimentSpec.model_fields.keys())
     resolved: list[ResolvedSpec] = []
     violations: dict[tuple[str, str], Violation] = {}

@@ -11,7 +11,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, SpecRead, StudySpec
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples
+from gaplab.services.specs.resolution import is_direct, resolve, resolve_experiment, takes_samples
 
 Spec = dict[str, Any]
 Stored = Mapping[str, Any]
@@ -23,20 +23,17 @@ ALONE = ("name", "preset")
 """Fields that may stand for an object that has nothing else."""
 
 
-def experiment_spec(stored: Stored) -> SpecRead:
-    """Return the spec of an experiment from its stored spec; null parameters of reality are left out."""
-    return SpecRead(spec=_shortest(spec_of(stored)), resolved=(dict(stored),), remarks=_hidden([stored]))
+def shortest(name: str, stored: Sequence[Stored]) -> SpecRead:
+    """Return the spec of a study from its name and the stored specs of its experiments.
 
-
-def study_spec(name: str, stored: Sequence[Stored]) -> SpecRead:
-    """Return the spec of a study from the stored specs of its experiments.
-
-    Experiments that were extended count with the size that all have. The spec is None if the experiments differ in more
-    than their strategies, or cannot be resolved here.
+    That of a single experiment names one strategy. Null parameters of reality are left out. Experiments that were
+    extended count with the size that all have. The spec is None if the experiments differ in more than their
+    strategies, or cannot be resolved here.
     """
+    if len(stored) == 1:
+        spec = _shortest(spec_of(stored[0]).model_copy(update={"name": name}))
+        return SpecRead(spec=spec, resolved=(dict(stored[0]),), remarks=_hidden(stored))
     specs = [spec_of(each) for each in stored]
-    if not specs:
-        return SpecRead(spec=None, resolved=(), remarks=("the study has no experiments",))
     size, wanted = _common_size(specs)
     base = max(wanted, key=lambda spec: (takes_samples(spec), not is_direct(spec)))
     strategies = [_shortest(spec, within="strategy")["strategy"] for spec in wanted]
@@ -68,7 +65,7 @@ def _common_size(specs: Sequence[ResolvedSpec]) -> tuple[Spec, list[ResolvedSpec
 def _gives(spec: Spec, wanted: Sequence[ResolvedSpec], *, hidden: bool) -> bool:
     """Return whether the spec of a study resolves to these experiments, apart from names and hidden parameters."""
     try:
-        found = resolve_study(StudySpec.model_validate(spec))
+        found = resolve(StudySpec.model_validate(spec))
     except (GaplabError, ValueError):
         return False
     left_out: dict[str, Any] = dict.fromkeys({"name", *SCHEDULE}, True)

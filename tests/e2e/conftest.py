@@ -13,17 +13,14 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from gaplab.schemas.lifecycle import OPEN
 from gaplab.services.archives import import_archive
 from gaplab.services.core import external_plugins
-from gaplab.services.experiments.listing import ListFilter, list_experiments
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.session import Store
 from tests.drawn_robot import FILES, strode
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
 from tests.e2e.service import Service
-from tests.experiments import cancel, toy
+from tests.experiments import cancel, listed, submit_one, toy
 from tests.filling import fill
 from tests.made_studies import Made, Study, make
 
@@ -104,7 +101,7 @@ def known(written_file: Path, plugins: Path) -> Known:
     fill(store, 70)
     study = make(store, "a study", Study(CURVES, repetitions=4))
     strider = strode(store, iterations=2)
-    cancel(store, submit_experiment(store, toy(name="given up")).id)
+    cancel(store, submit_one(store, toy(name="given up")).id)
     store.dispose()
     external_plugins.set_folders(before)
     return Known(study.id, [each.id for each in study.experiments], strider)
@@ -123,8 +120,8 @@ def written(written_file: Any) -> Iterator[Any]:
     """The database of `api`, in which nothing is queued when a test begins."""
     store = Store(f"sqlite:///{written_file}")
     yield store
-    for state in OPEN:
-        for each in list_experiments(store, ListFilter(state=state), limit=500, cursor=None).items:
+    for each in listed(store):
+        if not each.state.ended:
             cancel(store, each.id)
     store.dispose()
 
@@ -138,7 +135,7 @@ def archive(folder: Path, sqlite_template: Path) -> Iterator[Any]:
     fill(store, 70)
     with STUDY.open("rb") as archived:
         import_archive(store, archived)
-    cancel(store, submit_experiment(store, toy(name="given up")).id)
+    cancel(store, submit_one(store, toy(name="given up")).id)
     store.dispose()
     api = Api(f"sqlite:///{file}", folder / "archive.log").start()
     yield api

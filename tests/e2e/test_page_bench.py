@@ -15,9 +15,9 @@ from gaplab.services.bench import answering, attachments, taking
 from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
+from tests.experiments import submit_one
 from tests.integration.test_bench import bench, compute, fall_silent, finish
 from tests.integration.test_bench_http import traces_of
 
@@ -30,7 +30,7 @@ KEYS = "() => Object.keys(localStorage).filter((key) => key.includes(' answer ')
 def asked(store: Store, name: str, **changes: Any) -> Any:
     """An experiment on a bench of this name, and what it waits for."""
     reality = {"bench": name, "repeats": 3} | changes.pop("reality", {})
-    experiment = submit_experiment(store, bench(name=name, reality=reality, **changes))
+    experiment = submit_one(store, bench(name=name, reality=reality, **changes))
     compute(store)
     return experiment, *waiting(store, experiment)
 
@@ -150,7 +150,7 @@ def test_an_operator_keeps_the_form_when_the_experiment_is_paused(visit: Any, ap
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}", height=4000)  # so that all is in sight
     take(page)
     fill(page, "0.41", "0.44")
-    lifecycle.ask_experiment(written, experiment.id, Verb.PAUSE)
+    lifecycle.ask(written, experiment.id, Verb.PAUSE)
     page.reload()
     expect(page.get_by_label("Repeat 2 (m/s)", exact=True)).to_have_value("0.44")
     page.get_by_role("button", name="Give it back").click()
@@ -162,7 +162,7 @@ def test_an_operator_keeps_the_form_when_the_experiment_is_paused(visit: Any, ap
     panel = page.get_by_role("tabpanel")
     expect(panel.get_by_text("○ open, but the experiment is paused")).to_be_visible()
     expect(panel.get_by_role("link", name="To the bench")).to_have_count(0)
-    lifecycle.ask_experiment(written, experiment.id, Verb.RESUME)
+    lifecycle.ask(written, experiment.id, Verb.RESUME)
     expect(panel.get_by_role("link", name="To the bench")).to_have_count(1)
 
 
@@ -340,7 +340,7 @@ def test_the_bench_and_its_experiment_are_accessible(visit: Any, api: Any, writt
 def test_an_experiment_shows_repeats_history_and_closed_branches(visit: Any, api: Any, written: Store) -> None:
     known = [{"genome": [0.3], "values": [0.31, 0.33]}]
     reality = {"bench": "told", "repeats": 2, "samples": known}
-    experiment = submit_experiment(written, bench(name="told", reality=reality))
+    experiment = submit_one(written, bench(name="told", reality=reality))
     finish(written, lambda genome: genome[0])
     page = visit(f"{api.url}/#/experiments/{experiment.id}?tab=samples")
     page.locator(".state-now .completed").wait_for()

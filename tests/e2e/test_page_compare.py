@@ -7,11 +7,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
-from tests.experiments import run, some_log, toy
+from tests.experiments import run, some_log, submit_one, toy
 
 STUDY = "Fig. 4, lean: MuJoCo in MuJoCo"
 MADE = "made: a study"
@@ -151,7 +150,7 @@ def test_what_differs_is_what_the_service_found(api: Any, known: Any, visit: Any
 def test_a_pair_that_shares_random_streams_is_marked_and_a_margin_is_judged(
     api: Any, written: Store, visit: Any
 ) -> None:
-    ids = [submission.submit_experiment(written, toy(name=name, repetitions=6)).id for name in ("one", "two")]
+    ids = [submit_one(written, toy(name=name, repetitions=6)).id for name in ("one", "two")]
     for claim in execution.claim(written, "tests", 12):
         better = 0.5 + 0.01 * (claim.number % 3) if claim.experiment_id == ids[0] else 0.0
         run(written, claim, some_log(recorded=1.0 + 0.02 * claim.number + better))
@@ -182,7 +181,7 @@ def test_what_should_not_be_compared_is_warned_of(archive: Any, ids: Any, visit:
 
 @pytest.mark.release
 def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api: Any, written: Store, visit: Any) -> None:
-    first, second = (submission.submit_experiment(written, toy(name=name)).id for name in ("one", "two"))
+    first, second = (submit_one(written, toy(name=name)).id for name in ("one", "two"))
     page = visit(address(api, first, second, "nowhere"))
     expect(page.locator(".remark.warned")).to_contain_text("hidden until their experiments have ended")
     expect(page.get_by_text("There is no experiment nowhere")).to_be_visible()
@@ -205,7 +204,7 @@ def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive: 
 
 @pytest.mark.release
 def test_it_grows_as_an_experiment_goes_on(api: Any, written: Store, visit: Any) -> None:
-    submitted = submission.submit_experiment(written, toy(name="growing", repetitions=2))
+    submitted = submit_one(written, toy(name="growing", repetitions=2))
     claims = execution.claim(written, "tests", 2)
     logs = [some_log(2, recorded) for recorded in (1.0, 1.5)]
     page = visit(address(api, submitted.id))

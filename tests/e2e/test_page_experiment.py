@@ -8,12 +8,11 @@ import httpx2
 import pytest
 from playwright.sync_api import expect
 
-from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
-from tests.experiments import some_log, toy
+from tests.experiments import some_log, submit_one, toy
 from tests.waiting import LONGEST_S, wait_until
 
 NAME = "simulated_fit"
@@ -42,7 +41,7 @@ def markers(page: Any) -> Any:
 
 
 def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api: Any, written: Store, visit: Any) -> None:
-    submitted = submission.submit_experiment(written, toy(name="growing", repetitions=2, iterations=3))
+    submitted = submit_one(written, toy(name="growing", repetitions=2, iterations=3))
     claims = execution.claim(written, "tests", 2)
     logs = [some_log(3, recorded) for recorded in (1.0, 1.5)]
     for claim, log in zip(claims, logs, strict=True):
@@ -78,7 +77,7 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api: Any, writ
 def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(
     api: Any, written: Store, visit: Any
 ) -> None:
-    submitted = submission.submit_experiment(written, toy(repetitions=2))
+    submitted = submit_one(written, toy(repetitions=2))
     for claim in execution.claim(written, "tests", 2):
         steps(written, claim, some_log())
     page = visit(address(api, submitted.id))
@@ -98,7 +97,7 @@ def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(
 
 @pytest.mark.release
 def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api: Any, written: Store, visit: Any) -> None:
-    submitted = submission.submit_experiment(written, toy(repetitions=1))
+    submitted = submit_one(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     log = some_log()
     steps(written, claim, islice(log, 3))
@@ -117,7 +116,7 @@ def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api: Any, wri
 
 
 def test_what_failed_is_said_with_its_reason_and_attempts(api: Any, written: Store, visit: Any) -> None:
-    submitted = submission.submit_experiment(written, toy(repetitions=1))
+    submitted = submit_one(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     assert execution.fail(written, claim, Failure("a foot fell off"))
     page = visit(address(api, submitted.id))
@@ -131,7 +130,7 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api: Any, written: Sto
 
 @pytest.mark.release
 def test_there_is_nothing_yet_or_no_such_experiment(api: Any, written: Store, visit: Any) -> None:
-    submitted = submission.submit_experiment(written, toy())
+    submitted = submit_one(written, toy())
     page = visit(address(api, submitted.id, tab="samples"))
     expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()

@@ -7,9 +7,9 @@ from playwright.sync_api import expect
 
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import Verb
-from gaplab.services.experiments import editing, lifecycle, submission
+from gaplab.services.experiments import editing, lifecycle
 from tests.e2e.browser import axe, fits, screenshot
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 
 NOTES = """# Floor
 
@@ -33,10 +33,10 @@ OF_ANOTHER_SERVICE = """async () => {
 
 
 def ended(store: Any, name: str, **edit: Any) -> str:
-    made = submission.submit_experiment(store, toy(name=name)).id
-    lifecycle.ask_experiment(store, made, Verb.CANCEL)
+    made = submit_one(store, toy(name=name)).id
+    lifecycle.ask(store, made, Verb.CANCEL)
     if edit:
-        editing.edit_experiment(store, made, Edit(**edit), starting_from=None)
+        editing.edit(store, made, Edit(**edit), starting_from=None)
     return made
 
 
@@ -129,13 +129,13 @@ def test_what_has_ended_is_archived_and_deleted_by_its_name_and_what_runs_is_not
     visit: Any, api: Any, written: Any
 ) -> None:
     visit.forgive("404")
-    made = submission.submit_experiment(written, toy(name="obsolete")).id
+    made = submit_one(written, toy(name="obsolete")).id
     page = visit(f"{api.url}/#/experiments/{made}")
     watching = visit(f"{api.url}/#/experiments/{made}")
     page.get_by_role("button", name="Delete…").click(force=True)
     page.get_by_text("Only what has ended can be deleted").wait_for()
 
-    lifecycle.ask_experiment(written, made, Verb.CANCEL)
+    lifecycle.ask(written, made, Verb.CANCEL)
     page.locator(".state-now .cancelled").wait_for()
     page.get_by_role("button", name="Archive", exact=True).click()
     page.get_by_role("button", name="Unarchive").wait_for()

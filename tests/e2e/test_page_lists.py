@@ -9,11 +9,10 @@ import pytest
 
 from gaplab.schemas.access import Role
 from gaplab.services.access import create_token
-from gaplab.services.experiments import submission
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import CONTRAST, axe, fits, screenshot
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 
 PUBLISHED = "Fig. 4, lean: MuJoCo in MuJoCo"
 QUEUED = {"robot": "toy_function", "strategies": ["random", "direct"], "budget": "smoke"}
@@ -114,7 +113,7 @@ def test_what_is_submitted_and_cancelled_elsewhere_is_seen_also_without_a_study(
     page.locator("tr.study").first.wait_for()
 
     made = api.http.post("/studies", json=QUEUED | {"name": "from elsewhere"}).json()["id"]
-    submission.submit_experiment(written, toy(name="all alone"))
+    submit_one(written, toy(name="all alone"))
     row = page.locator("tr.study", has_text="from elsewhere")
     row.locator(".queued").wait_for()
     alone = page.locator("tr.experiment", has=page.get_by_role("link", name="all alone"))
@@ -245,7 +244,7 @@ def test_an_empty_service_with_tokens_asks_for_one_says_how_to_begin_and_a_reade
         page.get_by_role("button", name="Submit the study").click()
         page.get_by_text("The token does not permit this").wait_for()
 
-        submitted = submission.submit_experiment(sqlite_store, toy(name="guarded"))
+        submitted = submit_one(sqlite_store, toy(name="guarded"))
         page.goto(f"{api.url}/#/experiments/{submitted.id}")
         with page.expect_download() as saved:
             page.get_by_role("link", name="Archive of everything").click()

@@ -99,7 +99,7 @@ def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit: Any, api: An
     page.goto(f"{api.url}/#/experiments/{made}?tab=spec")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
     page.get_by_text(f'"seed": {seed}').wait_for()
-    api.http.post(f"/experiments/{made}/cancel")
+    api.http.post(f"/studies/{made}/cancel")
 
 
 @pytest.mark.release
@@ -117,7 +117,7 @@ def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_no
     page.unroute("**/figures/toy*")
 
     page.get_by_text("Nothing to draw yet.").wait_for()
-    archive.http.post(f"/experiments/{made.json()['id']}/cancel")
+    archive.http.post(f"/studies/{made.json()['id']}/cancel")
 
 
 @pytest.mark.release
@@ -195,7 +195,7 @@ def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit: A
     page.locator("tbody .state-badge.queued").first.wait_for()
 
     page.route("**/repetitions", lambda route: route.fulfill(status=500, json={"status": 500, "title": "Busy"}))
-    archive.http.post(f"/experiments/{made.json()['id']}/cancel")
+    archive.http.post(f"/studies/{made.json()['id']}/cancel")
     page.locator(".state-now .state-badge.cancelled").wait_for()
     page.wait_for_timeout(3000)
     page.unroute("**/repetitions")

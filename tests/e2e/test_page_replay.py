@@ -12,11 +12,10 @@ import pytest
 from PIL import Image
 
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
-from tests.experiments import some_log
+from tests.experiments import some_log, submit_one
 from tests.waiting import wait_until
 
 FLAT = "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...options) \
@@ -201,7 +200,7 @@ def test_what_is_not_there_says_so_and_another_may_be_chosen(visit: Any, archive
 def test_what_is_not_yet_there_may_be_looked_for_again(visit: Any, api: Any, written: Store) -> None:
     visit.forgive("409")
     spec = {"strategy": "random", "robot": "quadruped", "repetitions": 1, "budget": "smoke"}
-    begun = submission.submit_experiment(written, ExperimentSpec.model_validate(spec)).id
+    begun = submit_one(written, ExperimentSpec.model_validate(spec)).id
     (claim,) = execution.claim(written, "tests", 1)
     for step in islice(some_log(), 2):
         assert execution.record(written, claim, step)

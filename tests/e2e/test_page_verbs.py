@@ -10,7 +10,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
-from tests.experiments import run, some_log, toy
+from tests.experiments import run, some_log, submit_one, toy
 
 
 def address(api: Any, experiment: Any) -> str:
@@ -18,7 +18,7 @@ def address(api: Any, experiment: Any) -> str:
 
 
 def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api: Any, written: Store, visit: Any) -> None:
-    submitted = submission.submit_experiment(written, toy())
+    submitted = submit_one(written, toy())
     page = visit(address(api, submitted.id))
     verbs = page.get_by_role("group", name="Actions on this experiment")
     state = page.locator(".state-now")
@@ -50,7 +50,7 @@ def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api: Any, written
 
 @pytest.mark.release
 def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api: Any, written: Store, visit: Any) -> None:
-    submitted = submission.submit_experiment(written, toy(repetitions=1))
+    submitted = submit_one(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     run(written, claim)
     page = visit(address(api, submitted.id))
@@ -66,7 +66,7 @@ def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api: Any, 
 
 @pytest.mark.release
 def test_the_direct_baseline_is_extended_by_repetitions_alone(api: Any, written: Store, visit: Any) -> None:
-    submitted = submission.submit_experiment(written, toy(strategy="direct", repetitions=1))
+    submitted = submit_one(written, toy(strategy="direct", repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     run(written, claim, some_log(0))
     page = visit(address(api, submitted.id))
@@ -80,7 +80,7 @@ def test_the_direct_baseline_is_extended_by_repetitions_alone(api: Any, written:
 @pytest.mark.release
 def test_a_study_is_extended(api: Any, written: Store, visit: Any) -> None:
     spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "direct"]}
-    study = submission.submit_study(written, StudySpec.model_validate(spec | {"iterations": 2, "repetitions": 1}))
+    study = submission.submit(written, StudySpec.model_validate(spec | {"iterations": 2, "repetitions": 1}))
     for claim in execution.claim(written, "tests", 2):
         run(written, claim, some_log(2 if claim.spec.strategy.name == "random" else 0))
     page = visit(f"{api.url}/#/studies/{study.id}")
@@ -100,7 +100,7 @@ def test_a_study_gets_more_iterations_and_its_baseline_no_more_repetitions(
 ) -> None:
     spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "direct"]}
     size = {"iterations": 2, "repetitions": 1, "direct_repetitions": 3}
-    study = submission.submit_study(written, StudySpec.model_validate(spec | size))
+    study = submission.submit(written, StudySpec.model_validate(spec | size))
     for claim in execution.claim(written, "tests", 9):
         run(written, claim, some_log(2 if claim.spec.strategy.name == "random" else 0))
     page = visit(f"{api.url}/#/studies/{study.id}")
@@ -115,12 +115,12 @@ def test_a_study_gets_more_iterations_and_its_baseline_no_more_repetitions(
 
 
 def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api: Any, written: Store, visit: Any) -> None:
-    submitted = submission.submit_experiment(written, toy(name="mine"))
+    submitted = submit_one(written, toy(name="mine"))
     visit.forgive("412")
     page = visit(address(api, submitted.id))
     page.get_by_role("button", name="Edit name, notes and tags").click()
     page.get_by_label("Notes", exact=True).fill("On the second robot")
-    theirs = api.http.patch(f"/experiments/{submitted.id}", json={"name": "theirs"}, headers={"If-Match": "*"})
+    theirs = api.http.patch(f"/studies/{submitted.id}", json={"name": "theirs"}, headers={"If-Match": "*"})
     assert theirs.status_code == 200
     page.get_by_role("button", name="Save").click()
     expect(page.get_by_role("dialog").get_by_role("alert")).to_contain_text("“theirs”")

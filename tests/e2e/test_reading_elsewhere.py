@@ -77,7 +77,7 @@ def test_what_is_said_of_postgres_can_be_done(postgres: Any, shell: Any) -> None
         before = complete(gaplab)
     with reader.following(parts) as gaplab:
         after = complete(gaplab)
-        kept = [each.id for each in gaplab.experiments().items]
+        kept = [each.id for each in gaplab.studies().items]
 
     assert kept == [after, before]
     assert postgres.stored() == 2

@@ -15,7 +15,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.specs.resolution import resolve
 from gaplab.services.store.session import Store
 from tests.e2e.service import Service
 from tests.waiting import wait_until
@@ -84,7 +84,7 @@ def service(tmp_path: Path, service_in: Any) -> Any:
 def computed_here(spec: Any) -> Any:
     """Samples and recorded fitness of every experiment, computed in this process without any service."""
     experiments = []
-    for resolved in resolve_study(StudySpec.model_validate(spec)):
+    for resolved in resolve(StudySpec.model_validate(spec)):
         logs = [list(repetition(setting(resolved, number))) for number in range(resolved.repetitions)]
         experiments.append(
             {
@@ -98,7 +98,7 @@ def computed_here(spec: Any) -> Any:
 def told_by(service: Any, study: Any) -> Any:
     """The same, as the service tells it."""
     experiments = []
-    for curve in service.get(f"/studies/{study}/curves"):
+    for curve in service.get("/curves", study=study):
         values = [point["values"] for point in curve["points"]]
         samples = service.get(f"/experiments/{curve['experiment']}/samples", kind="sample", limit=1000)["items"]
         by_repetition = [[] for _ in values[0]]  # type: ignore[var-annotated]
@@ -127,7 +127,7 @@ def test_killed_it_goes_on_to_the_numbers_of_one_process_and_told_to_stop_it_han
     assert progress["rollouts_done"] + progress["rollouts_saved"] == progress["rollouts"]
     assert told_by(service, study) == computed_here(TOY)
     ids = [each["id"] for each in ended["experiments"]]
-    assert len(service.get("/comparisons", experiment=ids)) == 3
+    assert len(service.get("/comparisons", study=ids)) == 3
     assert "<svg" in service.http.get("/figures/curves", params={"study": study, "format": "svg"}).text
 
     long = service.get(f"/studies/{service.post('/studies', LONG_STEPS)['id']}")["experiments"][0]["id"]

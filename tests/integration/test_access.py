@@ -43,22 +43,22 @@ def test_on_loopback_all_is_open_until_a_token_is_made_and_stays_closed_after_th
 ) -> None:
     before = api.post("/experiments", json=TOY).status_code
     made = create_token(sqlite_store, Role.READER)
-    refused = api.get("/experiments")
-    let_in = api.get("/experiments", headers={"Authorization": f"Bearer {made.secret}"}).status_code
+    refused = api.get("/studies")
+    let_in = api.get("/studies", headers={"Authorization": f"Bearer {made.secret}"}).status_code
     access.revoke_token(sqlite_store, made.token.id)
-    revoked = api.get("/experiments", headers={"Authorization": f"Bearer {made.secret}"})
+    revoked = api.get("/studies", headers={"Authorization": f"Bearer {made.secret}"})
 
     assert (before, refused.status_code, let_in, revoked.status_code) == (202, 401, 200, 401)
     assert refused.headers["www-authenticate"] == 'Bearer realm="gaplab"'
     assert refused.headers["content-type"] == revoked.headers["content-type"] == "application/problem+json"
     assert 'error="invalid_token"' in revoked.headers["www-authenticate"]
-    assert api.get("/experiments").status_code == 401
+    assert api.get("/studies").status_code == 401
 
 
 def test_beyond_loopback_a_token_is_needed_even_where_none_was_ever_made(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store, Settings(host="0.0.0.0")))
 
-    assert api.get("/experiments").status_code == 401
+    assert api.get("/studies").status_code == 401
     assert [api.get(path).status_code for path in ("/livez", "/readyz")] == [200, 200]
 
 
@@ -80,9 +80,9 @@ def test_each_role_may_do_what_it_is_for_and_no_more(
         "estimate": api.post("/studies/estimate", json={"robot": "toy_function"}, headers=headers),
         "submit": api.post("/experiments", json=TOY, headers=headers),
         "check": api.post("/sensitivity", json={"robot": "toy_function"}, headers=headers),
-        "edit": api.patch(f"/experiments/{made}", json={"name": "x"}, headers=headers | {"If-Match": "*"}),
+        "edit": api.patch(f"/studies/{made}", json={"name": "x"}, headers=headers | {"If-Match": "*"}),
         "reveal": api.get(f"/experiments/{made}?reveal=true", headers=headers),
-        "cancel": api.post(f"/experiments/{made}/cancel", headers=headers),
+        "cancel": api.post(f"/studies/{made}/cancel", headers=headers),
     }
 
     assert {name for name, answer in answers.items() if answer.is_success} == permitted
@@ -125,7 +125,7 @@ def test_what_is_no_token_lets_nobody_in_even_where_none_is_needed(api: TestClie
         "Bearer \u00e9".encode("latin-1"),
     ]
 
-    found = {each: api.get("/experiments", headers={"Authorization": each}).status_code for each in headers}
+    found = {each: api.get("/studies", headers={"Authorization": each}).status_code for each in headers}
 
     assert found == dict.fromkeys(headers, 401)
 
@@ -218,10 +218,10 @@ def test_no_token_is_in_logs_answers_or_problems_whatever_happens(
     caplog.set_level(logging.DEBUG)
     headers = bearer(sqlite_store, Role.READER)
     secret = headers["Authorization"].rpartition("_")[2]
-    said = [api.get("/experiments", headers=headers), api.post("/experiments", json=TOY, headers=headers)]
-    monkeypatch.setattr("gaplab.services.experiments.listing.list_experiments", lambda *_, **__: 1 / 0)
-    said.append(api.get("/experiments", headers=headers))
-    said.append(api.get("/experiments", headers={"Authorization": f"Bearer gaplab_x_{secret}"}))
+    said = [api.get("/studies", headers=headers), api.post("/experiments", json=TOY, headers=headers)]
+    monkeypatch.setattr("gaplab.services.experiments.listing.list_studies", lambda *_, **__: 1 / 0)
+    said.append(api.get("/studies", headers=headers))
+    said.append(api.get("/studies", headers={"Authorization": f"Bearer gaplab_x_{secret}"}))
 
     assert [each.status_code for each in said] == [200, 403, 500, 401]
     assert secret not in caplog.text
@@ -238,19 +238,19 @@ def test_without_tokens_no_page_of_another_site_is_served(sqlite_store: Store) -
         {"origin": "http://["},
     ]
 
-    refused = [api.get("/experiments", headers=each).status_code for each in strange]
+    refused = [api.get("/studies", headers=each).status_code for each in strange]
     refused += [api.post("/experiments", json=TOY, headers=each).status_code for each in strange]
     own = ({"origin": "http://127.0.0.1:8000"}, {"host": "localhost:8000"})
-    served = [api.get("/experiments", headers=each).status_code for each in own]
+    served = [api.get("/studies", headers=each).status_code for each in own]
     token = bearer(sqlite_store, Role.READER)
-    served += [api.get("/experiments", headers=each | token).status_code for each in strange]
+    served += [api.get("/studies", headers=each | token).status_code for each in strange]
 
     assert refused == [403] * 10
     assert served == [200] * 7
 
 
 def test_other_origins_are_told_nothing_by_cors(api: TestClient) -> None:
-    plain = api.get("/experiments", headers={"origin": "http://evil.example"})
+    plain = api.get("/studies", headers={"origin": "http://evil.example"})
     asked = api.options(
         "/experiments", headers={"origin": "http://evil.example", "access-control-request-method": "POST"}
     )
@@ -321,7 +321,7 @@ def test_a_client_shows_the_token_that_it_is_given_or_that_of_the_environment(
 
     def items(token: str | None = None) -> tuple[Any, ...]:
         with Client("http://testserver", token=token, transport=transport) as client:
-            return client.experiments().items
+            return client.studies().items
 
     with pytest.raises(ServiceError, match="GAPLAB_TOKEN") as refused:
         items()

@@ -65,18 +65,17 @@ def test_an_empty_study_is_the_papers_six_strategies_and_the_direct_baseline(api
     assert study["progress"]["repetitions"] == 7 * 40
 
 
-def test_experiments_are_filtered_by_study_state_and_strategy(api: TestClient) -> None:
+def test_studies_are_filtered_by_state_and_strategy(api: TestClient) -> None:
     study = api.post("/studies", json=STUDY).json()
     alone = api.post("/experiments", json=TOY).json()
-    api.post(f"/experiments/{alone['id']}/cancel")
+    api.post(f"/studies/{alone['id']}/cancel")
 
     def listed(**which: str) -> set[str]:
-        return {each["id"] for each in api.get("/experiments", params=which).json()["items"]}
+        return {each["id"] for each in api.get("/studies", params=which).json()["items"]}
 
-    assert listed(study=study["id"]) == {each["id"] for each in study["experiments"]}
     assert listed(state="CANCELLED") == {alone["id"]}
-    assert listed(strategy="random") == {study["experiments"][1]["id"]}
-    assert [each["id"] for each in api.get("/studies").json()["items"]] == [study["id"]]
+    assert listed(strategy="random") == {study["id"]}
+    assert listed() == {study["id"], alone["id"]}
 
 
 def test_what_has_run_is_shown_by_repetition_sample_and_simulator(store: Store, api: TestClient) -> None:
@@ -113,13 +112,13 @@ def test_curves_of_a_study_are_those_of_its_experiments_also_as_comma_separated_
     finish(store)
 
     ids = [each["id"] for each in study["experiments"]]
-    curves = api.get(f"/studies/{study['id']}/curves").json()
+    curves = api.get("/curves", params={"study": study["id"]}).json()
     assert [each["experiment"] for each in curves] == ids
     assert [each["direct"] for each in curves] == [False, False, True]
-    assert api.get("/curves", params={"experiment": ids}).json() == curves
-    assert api.get("/curves", params={"experiment": ids[::-1]}).json() == curves[::-1]
+    assert api.get("/curves", params={"study": ids}).json() == curves
+    assert api.get("/curves", params={"study": ids[::-1]}).json() == curves[::-1]
 
-    answer = api.get(f"/studies/{study['id']}/curves", params={"format": "csv"})
+    answer = api.get("/curves", params={"study": study["id"], "format": "csv"})
     assert answer.headers["content-type"].startswith("text/csv")
     rows = list(csv.DictReader(io.StringIO(answer.text)))
     assert len(rows) == 2 * 2 * 3 + 2
@@ -131,7 +130,7 @@ def test_experiments_are_compared_pair_by_pair(store: Store, api: TestClient) ->
     finish(store)
     ids = [each["id"] for each in study["experiments"]]
 
-    pairs = api.get("/comparisons", params={"experiment": ids, "from": 1, "to": 2}).json()
+    pairs = api.get("/comparisons", params={"study": ids, "from": 1, "to": 2}).json()
 
     assert [(each["first"], each["second"]) for each in pairs] == [
         (ids[0], ids[1]),
@@ -149,7 +148,7 @@ def test_a_figure_is_a_page_without_links_to_elsewhere_or_a_file(store: Store, a
 
     page = api.get("/figures/curves", params={"study": study["id"]})
     drawing = api.get(
-        "/figures/curves", params={"experiment": [each["id"] for each in study["experiments"]], "format": "svg"}
+        "/figures/curves", params={"study": [each["id"] for each in study["experiments"]], "format": "svg"}
     )
 
     assert page.headers["content-type"].startswith("text/html")
@@ -195,7 +194,7 @@ def test_cancelling_keeps_what_is_stored(store: Store, api: TestClient) -> None:
     made = api.post("/experiments", json=TOY).json()
     run(store, execution.claim(store, "test", limit=1)[0])
 
-    answer = api.post(f"/experiments/{made['id']}/cancel")
+    answer = api.post(f"/studies/{made['id']}/cancel")
 
     assert answer.json()["state"] == "CANCELLED"
     assert api.get(f"/experiments/{made['id']}/curve").json()["points"][0]["n"] == 1
@@ -205,7 +204,7 @@ def test_the_verbs_of_an_experiment_and_of_a_study(api: TestClient) -> None:
     study = api.post("/studies", json={"robot": "toy_function", "budget": "smoke"}).json()
     first = study["experiments"][0]["id"]
 
-    answers = [api.post(f"/experiments/{first}/{verb}") for verb in ("pause", "pause", "resume", "stop", "resume")]
+    answers = [api.post(f"/studies/{first}/{verb}") for verb in ("pause", "pause", "resume", "stop", "resume")]
     answers += [api.post(f"/studies/{study['id']}/{verb}") for verb in ("pause", "resume", "stop", "cancel")]
 
     assert [each.status_code for each in answers] == [200, 409, 200, 200, 409, 200, 200, 200, 409]
@@ -216,19 +215,20 @@ def test_the_verbs_of_an_experiment_and_of_a_study(api: TestClient) -> None:
 
 def test_an_experiment_is_extended_to_totals_and_given_another_turn(store: Store, api: TestClient) -> None:
     made = api.post("/experiments", json=TOY | {"max_parallel": 1}).json()
-    too_early = api.post(f"/experiments/{made['id']}/extend", json={"repetitions": 50})
+    too_early = api.post(f"/studies/{made['id']}/extend", json={"repetitions": 50})
     while claims := execution.claim(store, "test", limit=1):
         run(store, claims[0])
 
-    less = api.post(f"/experiments/{made['id']}/extend", json={"iterations": 1})
-    more = api.post(f"/experiments/{made['id']}/extend", json={"repetitions": 50})
-    turn = api.patch(f"/experiments/{made['id']}/schedule", json={"priority": 3})
+    less = api.post(f"/studies/{made['id']}/extend", json={"iterations": 1})
+    more = api.post(f"/studies/{made['id']}/extend", json={"repetitions": 50})
+    turn = api.patch(f"/studies/{made['id']}/schedule", json={"priority": 3})
     attempts = api.get(f"/experiments/{made['id']}/repetitions/0/attempts").json()
 
     assert [each.status_code for each in (too_early, less, more, turn)] == [409, 422, 202, 200]
     assert less.json()["errors"][0]["pointer"] == "/iterations"
     assert (more.json()["state"], more.json()["progress"]["repetitions"]) == ("QUEUED", 50)
-    assert (turn.json()["priority"], turn.json()["max_parallel"]) == (3, 1)
+    (experiment,) = turn.json()["experiments"]
+    assert (experiment["priority"], experiment["max_parallel"]) == (3, 1)
     assert [each["ending"] for each in attempts] == ["completed"]
     assert api.get(f"/experiments/{made['id']}/repetitions/99/attempts").status_code == 404
 

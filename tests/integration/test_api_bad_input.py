@@ -277,9 +277,9 @@ def test_a_body_of_just_a_megabyte_is_read(api: TestClient) -> None:
 
 
 def test_an_unknown_id_is_not_found_wherever_it_is_asked_for(api: TestClient) -> None:
-    paths = ("/studies/{}", "/experiments/{}", "/experiments/{}/curve", "/studies/{}/curves")
+    paths = ("/studies/{}", "/experiments/{}", "/experiments/{}/curve", "/studies/{}/spec")
     addresses = [path.format(name) for path in paths for name in ("nope", "x" * 2000, "%00", "a'b", "ü", "-1", "%ff")]
-    addresses += ["/curves?experiment=nope", "/figures/curves?study=nope", "/comparisons?experiment=a&experiment=b"]
+    addresses += ["/curves?study=nope", "/figures/curves?study=nope", "/comparisons?study=a&study=b"]
 
     for address in addresses:
         problem(api.get(address), 404)
@@ -287,10 +287,10 @@ def test_an_unknown_id_is_not_found_wherever_it_is_asked_for(api: TestClient) ->
 
 def test_what_has_ended_cannot_be_cancelled(api: TestClient) -> None:
     made = api.post("/experiments", json=LEAST).json()["id"]
-    api.post(f"/experiments/{made}/cancel")
+    api.post(f"/studies/{made}/cancel")
 
-    assert "CANCELLED" in problem(api.post(f"/experiments/{made}/cancel"), 409)["detail"]
-    problem(api.post("/experiments/nope/cancel"), 404)
+    assert "CANCELLED" in problem(api.post(f"/studies/{made}/cancel"), 409)["detail"]
+    problem(api.post("/studies/nope/cancel"), 404)
 
 
 def test_an_unknown_address_and_a_wrong_method_are_problems_too(api: TestClient) -> None:
@@ -301,25 +301,25 @@ def test_an_unknown_address_and_a_wrong_method_are_problems_too(api: TestClient)
 
 
 BAD_QUERIES = [
-    ("/experiments?limit=0", "limit"),
-    ("/experiments?limit=501", "limit"),
-    ("/experiments?limit=x", "limit"),
-    ("/experiments?limit=" + "9" * 5000, "limit"),
-    ("/experiments?cursor=nonsense", "cursor"),
+    ("/studies?limit=0", "limit"),
+    ("/studies?limit=501", "limit"),
+    ("/studies?limit=x", "limit"),
+    ("/studies?limit=" + "9" * 5000, "limit"),
+    ("/studies?cursor=nonsense", "cursor"),
     ("/studies?cursor=%00", "cursor"),
-    ("/experiments?state=RUNING", "state"),
-    ("/experiments?limmit=3", "limmit"),
-    ("/experiments?strategy=%00", "strategy"),
-    ("/curves", "experiment"),
-    ("/curves?experiment=a&format=xml", "format"),
-    ("/comparisons?experiment=a", "experiment"),
-    ("/comparisons?experiment=a&experiment=b&from=-1", "from"),
+    ("/studies?state=RUNING", "state"),
+    ("/studies?limmit=3", "limmit"),
+    ("/studies?strategy=%00", "strategy"),
+    ("/curves", "study"),
+    ("/curves?study=a&format=xml", "format"),
+    ("/comparisons", "study"),
+    ("/comparisons?study=a&study=b&from=-1", "from"),
     ("/figures/curves?study=a&format=bmp", "format"),
-    ("/figures/curves", ""),
+    ("/figures/curves", "study"),
     ("/studies?state=RUNNING&state=QUEUED", "state"),
-    ("/experiments?limit=3&limit=3", "limit"),
+    ("/studies?limit=3&limit=3", "limit"),
     ("/figures/gait?experiment=a&experiment=b", "experiment"),
-    ("/comparisons?experiment=a&experiment=b&from=1&from=2", "from"),
+    ("/comparisons?study=a&study=b&from=1&from=2", "from"),
     ("/experiments/a/samples?kind=sample&kind=probe", "kind"),
     ("/events/page?after=1&after=2", "after"),
 ]
@@ -335,14 +335,14 @@ def test_a_wrong_query_is_refused_with_the_parameters_name(api: TestClient) -> N
 def test_a_comparison_over_no_range_or_with_itself_is_refused(api: TestClient) -> None:
     first, second = (api.post("/experiments", json=LEAST).json()["id"] for _ in range(2))
 
-    over_none = api.get(f"/comparisons?experiment={first}&experiment={second}&from=5&to=2")
-    with_itself = api.get(f"/comparisons?experiment={first}&experiment={first}")
+    over_none = api.get(f"/comparisons?study={first}&study={second}&from=5&to=2")
+    with_itself = api.get(f"/comparisons?study={first}&study={first}")
 
-    assert (only_error(over_none)["pointer"], only_error(with_itself)["pointer"]) == ("from", "experiment")
+    assert (only_error(over_none)["pointer"], only_error(with_itself)["pointer"]) == ("from", "study")
 
 
 def test_a_misspelt_choice_in_a_query_is_answered_with_the_nearest(api: TestClient) -> None:
-    error = only_error(api.get("/experiments?state=RUNING"))
+    error = only_error(api.get("/studies?state=RUNING"))
 
     assert error["nearest"] == "RUNNING"
     assert "COMPLETED" in error["permitted"]
@@ -360,7 +360,7 @@ def test_requests_without_a_database_are_problems_and_succeed_when_it_is_back(
 ) -> None:
     app, away = create_app(sqlite_store), Away(sqlite_url)
     api = TestClient(app)
-    for path in ("/studies", "/experiments", "/experiments/x/curve", "/readyz"):
+    for path in ("/studies", "/experiments/x/curve", "/readyz"):
         app.state.store = away
         refused, alive = api.get(path), api.get("/livez")
         app.state.store = sqlite_store

@@ -15,15 +15,13 @@ from referencing.jsonschema import DRAFT202012
 from gaplab.api.app import create_app
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
 from gaplab.schemas.plugin import PluginRef
-from gaplab.schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec, StudySpec
+from gaplab.schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec
 from gaplab.services.bench import answering, taking
 from gaplab.services.bench.taking import RequestFilter
-from gaplab.services.experiments import submission
 from gaplab.services.experiments.limits import FREELY
-from gaplab.services.experiments.listing import list_experiments
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
-from tests.experiments import cancel, run, toy
+from tests.experiments import cancel, listed, run, submit_one, toy
 from tests.integration.test_bench_safety import ask
 
 METHODS = {"get", "post", "put", "patch", "delete"}
@@ -51,14 +49,10 @@ ENDPOINTS = {
     "GET /robots/{robot}",
     "POST /studies",
     "POST /studies/estimate",
-    "POST /experiments/estimate",
     "GET /studies/{id}/spec",
-    "GET /experiments/{id}/spec",
     "GET /studies",
     "GET /studies/{id}",
-    "GET /studies/{id}/curves",
     "POST /experiments",
-    "GET /experiments",
     "GET /experiments/{id}",
     "GET /experiments/{id}/repetitions",
     "GET /experiments/{id}/samples",
@@ -68,31 +62,23 @@ ENDPOINTS = {
     "GET /experiments/{id}/replay",
     "GET /experiments/{id}/video",
     "GET /experiments/{id}/repetitions/{number}/attempts",
-    "POST /experiments/{id}/pause",
-    "POST /experiments/{id}/resume",
-    "POST /experiments/{id}/stop",
-    "GET /experiments/{id}/provenance",
-    "POST /experiments/{id}/accept-versions",
-    "GET /events",
-    "GET /events/page",
-    "PATCH /studies/{id}",
-    "PATCH /experiments/{id}",
-    "POST /experiments/{id}/cancel",
-    "POST /experiments/{id}/retry",
-    "POST /experiments/{id}/extend",
-    "PATCH /experiments/{id}/schedule",
     "POST /studies/{id}/pause",
     "POST /studies/{id}/resume",
     "POST /studies/{id}/stop",
+    "GET /experiments/{id}/provenance",
+    "POST /studies/{id}/accept-versions",
+    "GET /events",
+    "GET /events/page",
+    "PATCH /studies/{id}",
     "POST /studies/{id}/cancel",
     "POST /studies/{id}/retry",
     "POST /studies/{id}/extend",
+    "PATCH /studies/{id}/schedule",
     "GET /experiments/{id}/curve",
     "GET /curves",
     "GET /comparisons",
     "GET /differences",
     "GET /studies/{id}/report",
-    "GET /experiments/{id}/report",
     "GET /figures/curves",
     "GET /figures/coordinates",
     "GET /figures/simulators",
@@ -103,7 +89,6 @@ ENDPOINTS = {
     "GET /figures/toy",
     "POST /sensitivity",
     "GET /sensitivity/{id}",
-    "GET /experiments/{id}/export",
     "GET /studies/{id}/export",
     "POST /import",
     "GET /catalogue",
@@ -111,22 +96,15 @@ ENDPOINTS = {
     "GET /livez",
     "GET /readyz",
     "GET /metrics",
-    "DELETE /experiments/{id}",
-    "DELETE /experiments/{id}/webhook",
-    "DELETE /studies/{id}",
     "DELETE /studies/{id}/webhook",
+    "DELETE /studies/{id}",
     "DELETE /views/{name}",
-    "GET /experiments/{id}/notes",
-    "GET /experiments/{id}/webhook",
     "GET /studies/{id}/notes",
     "GET /studies/{id}/webhook",
     "GET /views",
     "GET /views/{name}",
-    "POST /experiments/{id}/archive",
-    "POST /experiments/{id}/unarchive",
     "POST /studies/{id}/archive",
     "POST /studies/{id}/unarchive",
-    "PUT /experiments/{id}/webhook",
     "PUT /studies/{id}/webhook",
     "PUT /views/{name}",
 }
@@ -152,18 +130,12 @@ OPERATIONS = {
     "void_measurement",
     "submit_study",
     "estimate_study",
-    "estimate_experiment",
-    "read_study_spec",
-    "read_experiment_spec",
+    "read_spec",
     "list_studies",
     "read_study",
     "edit_study",
-    "read_study_curves",
     "submit_experiment",
-    "list_experiments",
     "read_experiment",
-    "edit_experiment",
-    "cancel_experiment",
     "list_repetitions",
     "list_samples",
     "list_simulators",
@@ -182,7 +154,6 @@ OPERATIONS = {
     "draw_readings",
     "draw_video",
     "read_spec_differences",
-    "report_experiment",
     "report_study",
     "draw_toy",
     "submit_sensitivity",
@@ -196,42 +167,29 @@ OPERATIONS = {
     "read_robot",
     "accept_versions",
     "cancel_study",
-    "export_experiment",
     "export_study",
-    "extend_experiment",
     "extend_study",
     "import_archive",
     "list_attempts",
     "list_events",
-    "pause_experiment",
     "pause_study",
     "read_metrics",
     "read_provenance",
-    "resume_experiment",
     "resume_study",
-    "retry_experiment",
     "retry_study",
-    "schedule_experiment",
-    "stop_experiment",
+    "schedule_study",
     "stop_study",
     "stream_events",
-    "archive_experiment",
     "archive_study",
-    "delete_experiment",
     "delete_study",
     "delete_view",
-    "drop_experiment_webhook",
-    "drop_study_webhook",
+    "drop_webhook",
     "list_views",
-    "read_experiment_notes",
-    "read_experiment_webhook",
-    "read_study_notes",
-    "read_study_webhook",
+    "read_notes",
+    "read_webhook",
     "read_view",
     "save_view",
-    "set_experiment_webhook",
-    "set_study_webhook",
-    "unarchive_experiment",
+    "set_webhook",
     "unarchive_study",
 }
 
@@ -342,11 +300,11 @@ def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_st
 
 def _subject(store: Store, path: str) -> str:
     """The id of what the examples of a path are about, when nothing else is queued."""
-    for each in list_experiments(store, limit=1_000).items:
+    for each in listed(store):
         if not each.state.ended:
             cancel(store, each.id)
     if not path.startswith(("/requests", "/measurements")):
-        return _completed(store, study=path.startswith("/studies"))
+        return _completed(store)
     request = _waiting(store)
     if path == "/requests/{id}/take":
         return request
@@ -371,24 +329,17 @@ def _waiting(store: Store) -> str:
         budget=BudgetSpec(controller_evaluations=20, selection_evaluations=20, simulator_evaluations=20),
         reality=RealitySpec(kind="physical", repeats=3, probes="each", bench=token_hex(4)),
     )
-    experiment = submission.submit_experiment(store, spec).id
+    experiment = submit_one(store, spec).id
     ask(store)
     (request,) = taking.list_requests(store, RequestFilter(experiment)).items
     return request.id
 
 
-def _completed(store: Store, *, study: bool) -> str:
-    """The id of an experiment, or of the study that has it alone."""
-    spec = toy(repetitions=1)
-    made = submission.submit_study(store, study_of(spec)) if study else submission.submit_experiment(store, spec)
+def _completed(store: Store) -> str:
+    """The id of a study of one."""
+    made = submit_one(store, toy(repetitions=1))
     run(store, *execution.claim(store, "me", 1))  # type: ignore[arg-type]
     return made.id
-
-
-def study_of(spec: ExperimentSpec) -> StudySpec:
-    return StudySpec.model_validate(
-        {"strategies": [spec.strategy], **spec.model_dump(exclude={"strategy"}, exclude_unset=True)}
-    )
 
 
 def test_every_error_is_documented_as_a_problem(document: dict[str, Any]) -> None:
@@ -407,7 +358,7 @@ def test_what_takes_json_says_what_it_answers_to_anything_else(document: dict[st
         if "application/json" in operation.get("requestBody", {}).get("content", {})
     }
 
-    assert {"extend_experiment", "schedule_experiment", "submit_study"} <= set(bodies)
+    assert {"extend_study", "schedule_study", "submit_study"} <= set(bodies)
     assert [name for name, answers in bodies.items() if "415" not in answers] == []
 
 

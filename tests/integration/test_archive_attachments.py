@@ -13,17 +13,17 @@ from sqlalchemy import select
 
 from gaplab.api.app import create_app
 from gaplab.schemas.spec import StudySpec
-from gaplab.services.archives import export_experiment, export_study, opening
+from gaplab.services.archives import export, opening
 from gaplab.services.bench import attachments
 from gaplab.services.core.errors import InvalidArchive
-from gaplab.services.experiments.deletion import Deleter, delete_experiment
-from gaplab.services.experiments.listing import list_experiments
+from gaplab.services.experiments.deletion import Deleter, delete
 from gaplab.services.experiments.reading import read_experiment
-from gaplab.services.experiments.submission import submit_experiment, submit_study
+from gaplab.services.experiments.submission import submit
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.session import Store
 from tests.archiving import exported, imported
+from tests.experiments import listed, submit_one
 from tests.integration.test_archives_bad import packed, set_in, with_table
 from tests.integration.test_bench import bench, compute, measure, pending
 
@@ -41,7 +41,7 @@ def send(store: Store, content: bytes, name: str, media_type: str = "image/jpeg"
 
 def measured(store: Store) -> Any:
     """A complete experiment on a bench, and the hashes of its photograph and its trace."""
-    experiment = submit_experiment(store, bench(iterations=1, reality={"probes": "never"}))
+    experiment = submit_one(store, bench(iterations=1, reality={"probes": "never"}))
     compute(store)
     files = [send(store, PHOTO, "größe.jpg"), send(store, TRACE, "trace.csv", "text/csv")]
     (request,) = pending(store)
@@ -60,27 +60,27 @@ def test_what_was_exported_and_deleted_comes_back_with_its_files(store: Store, o
     experiment, files = measured(store)
     unnamed = send(store, b"no answer names it", "x")
     before = [attachments.read_attachment(store, each) for each in files]
-    archive = exported(export_experiment(store, experiment))
-    delete_experiment(store, experiment, Deleter(None))
+    archive = exported(export(store, experiment))
+    delete(store, experiment, Deleter(None))
     assert stored(store) == {unnamed}
 
     for place in (store, other):
         imported(place, archive)
         assert [attachments.read_attachment(place, each) for each in files] == before
-        assert exported(export_experiment(place, experiment)) == archive
+        assert exported(export(place, experiment)) == archive
 
     manifest = json.loads(members_of(archive)["manifest.json"])["members"]
     named = {name for name in manifest if name.startswith("attachments/")}
     assert named == {f"attachments/{each}" for each in files}
     assert all(manifest[f"attachments/{each}"]["sha256"] == each for each in files)
     assert manifest["attachment.parquet"]["rows"] == 2
-    delete_experiment(other, experiment, Deleter(None))
+    delete(other, experiment, Deleter(None))
     assert stored(other) == set()
 
 
 def test_a_file_that_is_there_already_stays_as_it_is(store: Store, other: Store) -> None:
     experiment, (photo, trace) = measured(store)
-    archive = exported(export_experiment(store, experiment))
+    archive = exported(export(store, experiment))
     send(other, PHOTO, "mine.png", "image/png")
 
     imported(other, archive)
@@ -92,7 +92,7 @@ def test_a_file_that_is_there_already_stays_as_it_is(store: Store, other: Store)
 
 def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store) -> None:
     alike = bench(iterations=1, reality={"probes": "never"}).model_dump(mode="json", exclude={"strategy", "name"})
-    study = submit_study(sqlite_store, StudySpec.model_validate(alike | {"strategies": ["random", "known_fit"]}))
+    study = submit(sqlite_store, StudySpec.model_validate(alike | {"strategies": ["random", "known_fit"]}))
     compute(sqlite_store)
     shared = send(sqlite_store, PHOTO, "shared")
     own = [send(sqlite_store, name, "own") for name in (b"first", b"second")]
@@ -100,7 +100,7 @@ def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store) 
         measure(sqlite_store, request, 0.5, attachments=[shared, file])
     compute(sqlite_store)
 
-    archive = exported(export_study(sqlite_store, study.id))
+    archive = exported(export(sqlite_store, study.id))
 
     assert [name for name in members_of(archive) if name.startswith("attachments/")] == [
         f"attachments/{each}" for each in sorted([shared, *own])
@@ -112,8 +112,8 @@ def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store) 
 def good(sqlite_store: Store) -> dict[str, bytes]:
     """The members of an archive with files; the database has it no more."""
     experiment, _ = measured(sqlite_store)
-    archive = exported(export_experiment(sqlite_store, experiment))
-    delete_experiment(sqlite_store, experiment, Deleter(None))
+    archive = exported(export(sqlite_store, experiment))
+    delete(sqlite_store, experiment, Deleter(None))
     return members_of(archive)
 
 
@@ -131,7 +131,7 @@ def with_file(members: dict[str, bytes], name: str, content: bytes | None) -> by
 def refused(store: Store, archive: bytes, what: str) -> None:
     with pytest.raises(InvalidArchive, match=what):
         imported(store, archive)
-    assert list_experiments(store).items == ()
+    assert listed(store) == []
     assert stored(store) == set()
 
 
@@ -183,8 +183,8 @@ def test_a_file_larger_than_one_that_is_stored(sqlite_store: Store, good: dict[s
 def test_an_archive_with_photographs_is_let_in_over_http(store: Store) -> None:
     experiment, (photo, _) = measured(store)
     with TestClient(create_app(store)) as api:
-        archive = api.get(f"/experiments/{experiment}/export").content
-        api.delete(f"/experiments/{experiment}")
+        archive = api.get(f"/studies/{experiment}/export").content
+        api.delete(f"/studies/{experiment}")
         gone = api.get(f"/attachments/{photo}").status_code
 
         answer = api.post("/import", content=archive)
@@ -226,8 +226,8 @@ def test_whatever_a_request_later_reads_is_checked_when_it_arrives(sqlite_store:
 
 
 def test_what_goes_on_here_stays_within_the_limits_of_a_submission(sqlite_store: Store, other: Store) -> None:
-    experiment = submit_experiment(sqlite_store, bench(repetitions=2, budget={"controller_evaluations": 10**7})).id
-    members = members_of(exported(export_experiment(sqlite_store, experiment)))
+    experiment = submit_one(sqlite_store, bench(repetitions=2, budget={"controller_evaluations": 10**7})).id
+    members = members_of(exported(export(sqlite_store, experiment)))
     archive = changed(members, "experiment", rollouts=2**47)
     expected = read_experiment(sqlite_store, experiment).progress.rollouts
 

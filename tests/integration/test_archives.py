@@ -21,7 +21,7 @@ from sqlalchemy import insert
 
 from gaplab.schemas.lifecycle import Ending, ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
-from gaplab.services.archives import export_experiment, export_study, import_archive
+from gaplab.services.archives import export, import_archive
 from gaplab.services.archives import reading as importing
 from gaplab.services.archives.columns import EXPORTED
 from gaplab.services.archives.consistency import check_logs
@@ -29,7 +29,7 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.experiments import extension, lifecycle, listing, reading, submission
+from gaplab.services.experiments import extension, lifecycle, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
@@ -38,7 +38,7 @@ from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, Sim
 from gaplab.services.store.queries.attempts import attempts_of
 from gaplab.services.store.session import Store
 from tests.archiving import exported, imported
-from tests.experiments import AWKWARD, cancel, run, some_log, toy
+from tests.experiments import AWKWARD, cancel, listed, run, some_log, submit_one, toy
 
 EVERY = settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -70,7 +70,7 @@ def _steps(draw: Any) -> Iterator[Any]:
 
 def finished(store: Store, log: Any = None, **changes: Any) -> Any:
     """The id of an experiment whose repetitions are all complete."""
-    submitted = submission.submit_experiment(store, toy(**changes)).id
+    submitted = submit_one(store, toy(**changes)).id
     while claims := execution.claim(store, "me", 9):
         for claim in claims:
             run(store, claim, iter(log) if log else some_log())
@@ -100,16 +100,16 @@ def forget(store: Store) -> None:
 @pytest.mark.dialects
 def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store: Store, other: Any) -> None:
     submitted = finished(store, reality={"parameters": {"static_friction": 0.9}})
-    before, archive = shown(store, submitted), exported(export_experiment(store, submitted))
+    before, archive = shown(store, submitted), exported(export(store, submitted))
 
     there = import_archive(other, BytesIO(archive))
     assert shown(other, submitted) == before
-    back = exported(export_experiment(other, submitted))
+    back = exported(export(other, submitted))
     forget(store)
     imported(store, back)
 
     assert (there.experiments, there.renamed, there.called_off) == ((submitted,), {}, ())
-    assert back == archive == exported(export_experiment(store, submitted))
+    assert back == archive == exported(export(store, submitted))
     assert shown(store, submitted) == before
 
 
@@ -120,29 +120,29 @@ def test_whatever_numbers_and_names_go_there_and_back(store: Store, other: Any, 
     forget(store)
     forget(other)
     submitted = finished(store, data.draw(logs()), repetitions=1, name=data.draw(NAME))
-    archive = exported(export_experiment(store, submitted))
+    archive = exported(export(store, submitted))
 
     imported(other, archive)
 
-    assert exported(export_experiment(other, submitted)) == archive
+    assert exported(export(other, submitted)) == archive
     assert repr(shown(other, submitted)) == repr(shown(store, submitted))
 
 
 @pytest.mark.dialects
 def test_a_zero_has_no_sign_in_either_database(store: Store, other: Any) -> None:
     submitted = finished(store, list(some_log(recorded=-0.0)), repetitions=1)
-    archive = exported(export_experiment(store, submitted))
+    archive = exported(export(store, submitted))
 
     imported(other, archive)
 
-    assert exported(export_experiment(other, submitted)) == archive
+    assert exported(export(other, submitted)) == archive
     values = [value for point in curves.curve(store, submitted).points for value in point.values if value is not None]
     assert copysign(1, values[0]) == 1
 
 
 @pytest.mark.dialects
 def test_an_archive_may_arrive_twice_at_once(store: Store, other: Any) -> None:
-    archive, ready = exported(export_experiment(store, finished(store))), Barrier(2)
+    archive, ready = exported(export(store, finished(store))), Barrier(2)
 
     def write(*work: Any) -> Any:
         """Begin when the other one does."""
@@ -164,7 +164,7 @@ def test_the_best_of_repetitions_whose_sum_is_no_number_is_one(store: Store) -> 
 
 
 def test_a_study_goes_there_with_all_that_is_its_own(store: Store, other: Any) -> None:
-    study = submission.submit_study(
+    study = submission.submit(
         store,
         StudySpec.model_validate(TOY_STUDY | {"strategies": ["random", "direct"]}),
     )
@@ -177,14 +177,14 @@ def test_a_study_goes_there_with_all_that_is_its_own(store: Store, other: Any) -
             run(store, claim, iter(log))
     finished(store)
 
-    archive = exported(export_study(store, study.id))
+    archive = exported(export(store, study.id))
     stored = imported(other, archive)
 
     assert stored.study == study.id
     assert stored.experiments == tuple(each.id for each in study.experiments)
-    assert len(listing.list_experiments(other).items) == 2
-    assert curves.study_curves(other, study.id) == curves.study_curves(store, study.id)
-    assert exported(export_study(other, study.id)) == archive
+    assert len(listed(other)) == 2
+    assert curves.curves(other, [study.id]) == curves.curves(store, [study.id])
+    assert exported(export(other, study.id)) == archive
 
 
 def _fitting(step: Any, tunables: Any) -> Any:
@@ -196,19 +196,20 @@ def _fitting(step: Any, tunables: Any) -> Any:
 
 
 def test_an_experiment_of_a_study_goes_on_its_own(store: Store, other: Any) -> None:
-    study = submission.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["random"]}))
-    (experiment,) = (each.id for each in study.experiments)
+    study = submission.submit(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["random", "direct"]}))
+    experiment, left = (each.id for each in study.experiments)
 
-    imported(other, exported(export_experiment(store, experiment)))
+    imported(other, exported(export(store, experiment)))
 
-    assert reading.read_experiment(other, experiment).study is None
+    arrived = reading.read(other, study.id)
+    assert (arrived.name, [each.id for each in arrived.experiments]) == (study.name, [experiment])
     with pytest.raises(NotFound):
-        reading.read_study(other, study.id)
+        reading.read(other, left)
 
 
 def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store: Store) -> None:
     submitted = finished(store)
-    archive = exported(export_experiment(store, submitted))
+    archive = exported(export(store, submitted))
 
     stored = imported(store, archive)
 
@@ -220,13 +221,13 @@ def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store: Stor
 
 
 def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(store: Store, other: Any) -> None:
-    submitted = submission.submit_experiment(store, toy()).id
+    submitted = submit_one(store, toy()).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
     for step in list(some_log())[:4]:
         assert execution.record(store, second, step)
 
-    stored = imported(other, exported(export_experiment(store, submitted)))
+    stored = imported(other, exported(export(store, submitted)))
 
     assert stored.called_off == (submitted,)
     assert reading.read_experiment(other, submitted).state is State.CANCELLED
@@ -243,13 +244,13 @@ def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(sto
 def test_reality_is_hidden_until_its_study_has_ended(store: Store, other: Any, ended: Any) -> None:
     spec = TOY_STUDY | {"strategies": ["direct", "random"], "repetitions": 1}
     truth = {"reality": {"parameters": {"static_friction": 0.98765}}, "tunables": ["static_friction", "restitution"]}
-    study = submission.submit_study(store, StudySpec.model_validate(spec | truth))
+    study = submission.submit(store, StudySpec.model_validate(spec | truth))
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(0))
     if ended:
         cancel(store, study.experiments[1].id)
 
-    archives = [exported(export_study(store, study.id)), exported(export_experiment(store, study.experiments[0].id))]
+    archives = [exported(export(store, study.id)), exported(export(store, study.experiments[0].id))]
 
     for archive in archives:
         with ZipFile(BytesIO(archive)) as opened:
@@ -265,10 +266,10 @@ def test_reality_is_hidden_until_its_study_has_ended(store: Store, other: Any, e
 
 @pytest.mark.dialects
 def test_an_export_is_of_one_moment_while_a_supervisor_writes(store: Store, other: Any) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=6)).id
+    submitted = submit_one(store, toy(repetitions=6)).id
     for claim in execution.claim(store, "me", 6):
         run(store, claim)
-        archive = export_experiment(store, submitted)
+        archive = export(store, submitted)
         if claim.number == 3:
             stored = imported(other, archive.file.read())  # which refuses rows that are no whole logs
             assert reading.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
@@ -278,7 +279,7 @@ def test_an_export_is_of_one_moment_while_a_supervisor_writes(store: Store, othe
 def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store: Store) -> None:
     submitted = finished(sqlite_store)
 
-    with ZipFile(BytesIO(exported(export_experiment(sqlite_store, submitted)))) as opened:
+    with ZipFile(BytesIO(exported(export(sqlite_store, submitted)))) as opened:
         measurements = pyarrow.parquet.read_table(BytesIO(opened.read("measurement.parquet"))).to_pylist()
         (curve,) = json.loads(opened.read("curves.json"))
         (row,) = map(json.loads, opened.read("experiment.jsonl").splitlines())
@@ -296,13 +297,13 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store: Store) -
 
 
 def test_attempts_go_with_it_and_none_goes_on(store: Store, other: Any) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=2)).id
+    submitted = submit_one(store, toy(repetitions=2)).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
     assert execution.release(store, second, "its worker was lost")
     execution.claim(store, "another", 1)
 
-    imported(other, exported(export_experiment(store, submitted)))
+    imported(other, exported(export(store, submitted)))
 
     there, here = (attempts(each, submitted, 0) for each in (store, other))
     assert here == there
@@ -318,34 +319,34 @@ def attempts(store: Store, experiment: Any, number: Any) -> Any:
 
 
 def test_what_came_without_its_reality_cannot_be_extended(store: Store, other: Any) -> None:
-    study = submission.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["direct", "random"]}))
+    study = submission.submit(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["direct", "random"]}))
     direct = study.experiments[0].id
     for claim in execution.claim(store, "me", 9):
         if claim.experiment_id == direct:
             run(store, claim, (_fitting(step, len(claim.spec.tunables)) for step in some_log(0)))
 
-    imported(other, exported(export_study(store, study.id)))
+    imported(other, exported(export(store, study.id)))
 
     assert reading.read_experiment(other, direct).state is State.COMPLETED
     with pytest.raises(Conflict, match="while its reality was hidden"):
-        extension.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
+        extension.extend(other, direct, ExtensionSpec(repetitions=3))
 
 
 def test_a_stopped_study_goes_on_from_its_archive_as_if_it_had_never_stopped(store: Store, other: Any) -> None:
     spec = StudySpec.model_validate(TOY_STUDY | {"strategies": ["simulated_fit", "random"]})
-    whole = submission.submit_study(other, spec)
+    whole = submission.submit(other, spec)
     compute(other)
     expected = [curves.curve(other, each.id).points for each in whole.experiments]
-    study = submission.submit_study(store, spec)
+    study = submission.submit(store, spec)
     for claim in execution.claim(store, "me", 2):
         for step, _ in zip(repetition(setting(claim.spec, claim.number)), range(7), strict=False):
             assert execution.record(store, claim, step)
         execution.release(store, claim, "its worker was lost")
-    lifecycle.ask_study(store, study.id, Verb.STOP)
+    lifecycle.ask(store, study.id, Verb.STOP)
 
-    imported(other, exported(export_study(store, study.id)))
-    stopped = reading.read_study(other, study.id)
-    extension.extend_study(other, study.id, ExtensionSpec(repetitions=2))
+    imported(other, exported(export(store, study.id)))
+    stopped = reading.read(other, study.id)
+    extension.extend(other, study.id, ExtensionSpec(repetitions=2))
     compute(other)
 
     assert (stopped.state, stopped.experiments[0].progress.iterations_done) == (State.COMPLETED, 1)
@@ -367,24 +368,24 @@ def test_times_keep_their_microseconds(store: Store, other: Any) -> None:
         session.get(ExperimentRow, submitted).created_at = moment
         session.get(ExperimentRow, submitted).ended_at = moment + timedelta(days=4000)
 
-    imported(other, exported(export_experiment(store, submitted)))
+    imported(other, exported(export(store, submitted)))
 
     assert reading.read_experiment(other, submitted).created_at == moment
 
 
 def test_others_write_while_an_archive_is_checked(store: Store, other: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     submitted = finished(store)
-    archive = exported(export_experiment(store, submitted))
+    archive = exported(export(store, submitted))
 
     def check_slowly(*given: Any) -> None:
-        submission.submit_experiment(other, toy(name="meanwhile"))
+        submit_one(other, toy(name="meanwhile"))
         check_logs(*given)
 
     monkeypatch.setattr(importing, "check_logs", check_slowly)
     stored = imported(other, archive)  # or SQLite refuses the writer, after its patience
 
     assert stored.experiments == (submitted,)
-    assert {each.name for each in listing.list_experiments(other).items} == {"meanwhile", "simulated_fit"}
+    assert {each.name for each in listed(other)} == {"meanwhile", "simulated_fit"}
 
 
 @pytest.mark.release
@@ -398,11 +399,11 @@ def test_memory_does_not_grow_with_what_is_exported(sqlite_store: Store) -> None
             for rank in range(10, 12_010)
         ]
         session.execute(insert(SimulatorRow), many)
-    export_experiment(sqlite_store, submitted).file.close()
+    export(sqlite_store, submitted).file.close()
     del many
 
     tracemalloc.start()
-    export_experiment(sqlite_store, submitted).file.close()
+    export(sqlite_store, submitted).file.close()
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
 

@@ -13,11 +13,10 @@ from gaplab.api.app import create_app
 from gaplab.api.clients.archives import Archives
 from gaplab.api.clients.client import Client
 from gaplab.api.commands import archives as archive_commands
-from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
-from tests.experiments import run, toy
+from tests.experiments import run, submit_one, toy
 
 
 @pytest.fixture
@@ -28,14 +27,14 @@ def api(sqlite_store: Store) -> TestClient:
 @pytest.fixture
 def submitted(sqlite_store: Store) -> str:
     """An experiment that is complete."""
-    found = submission.submit_experiment(sqlite_store, toy()).id
+    found = submit_one(sqlite_store, toy()).id
     for claim in execution.claim(sqlite_store, "me", 9):
         run(sqlite_store, claim)
     return found
 
 
 def test_an_export_says_what_it_is_and_how_large(api: TestClient, submitted: str) -> None:
-    answer = api.get(f"/experiments/{submitted}/export")
+    answer = api.get(f"/studies/{submitted}/export")
 
     assert answer.status_code == 200
     assert answer.headers["content-type"] == "application/zip"
@@ -45,14 +44,14 @@ def test_an_export_says_what_it_is_and_how_large(api: TestClient, submitted: str
 
 
 def test_an_import_leads_to_what_it_stored(api: TestClient, submitted: str) -> None:
-    archive = api.get(f"/experiments/{submitted}/export").content
+    archive = api.get(f"/studies/{submitted}/export").content
 
     answer = api.post("/import", content=archive)
 
     (new,) = answer.json()["experiments"]
     assert answer.status_code == 201
     assert answer.json()["renamed"] == {submitted: new}
-    assert answer.headers["location"] == f"/experiments/{new}"
+    assert answer.headers["location"] == f"/studies/{new}"
     first, second = (api.get(f"/experiments/{each}/samples").json() for each in (submitted, new))
     assert first == second
 
@@ -67,9 +66,8 @@ def test_a_study_goes_the_same_way(api: TestClient) -> None:
     assert api.get(answer.headers["location"]).json()["state"] == "CANCELLED"
 
 
-@pytest.mark.parametrize("path", ["/experiments/none/export", "/studies/none/export"])
-def test_what_there_is_not_cannot_be_exported(api: TestClient, path: str) -> None:
-    assert api.get(path).status_code == 404
+def test_what_there_is_not_cannot_be_exported(api: TestClient) -> None:
+    assert api.get("/studies/none/export").status_code == 404
 
 
 def test_only_its_owner_can_read_an_archive(url: str, submitted: str, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from gaplab.api.routes.dashboard import FILES
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.plugins.catalogue import catalogue
-from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.specs.resolution import resolve
 from gaplab.services.store.session import Store
 from tests.figures import FIGURES
 
@@ -144,11 +144,11 @@ def test_long_lists_are_sent_compressed(api: TestClient) -> None:
 
 
 def test_the_starts_of_the_form_can_be_submitted_and_have_the_examples() -> None:
-    starts = [resolve_study(StudySpec.model_validate(spec)) for spec in PRESETS.values()]
+    starts = [resolve(StudySpec.model_validate(spec)) for spec in PRESETS.values()]
     for file in ("toy", "quadruped", "weights", "figure_4"):
         example = json.loads((EXAMPLES / f"{file}.json").read_text())
 
-        assert starts.count(resolve_study(StudySpec.model_validate(example))) == 1, file
+        assert starts.count(resolve(StudySpec.model_validate(example))) == 1, file
 
 
 def test_the_catalogue_has_the_named_budgets() -> None:

@@ -12,7 +12,7 @@ import pytest
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import StoreUnavailable, Unsupported
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import listing, submission
+from gaplab.services.experiments import listing
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
@@ -20,7 +20,7 @@ from gaplab.services.store import backup as backing_up
 from gaplab.services.store.backup import backup
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
-from tests.experiments import toy
+from tests.experiments import listed, submit_one, toy
 
 
 def work(store: Store) -> None:
@@ -35,7 +35,7 @@ def work(store: Store) -> None:
 @pytest.mark.release
 def test_copies_made_while_a_supervisor_writes_go_on_to_the_same_end(sqlite_url: str, tmp_path: Path) -> None:
     store = Store(sqlite_url)
-    submitted = submission.submit_experiment(store, toy(repetitions=2)).id
+    submitted = submit_one(store, toy(repetitions=2)).id
     worker = Thread(target=work, args=(store,))
     worker.start()
     copies: list[Any] = []
@@ -69,7 +69,7 @@ def test_a_copy_waits_for_whoever_writes_and_has_all_of_it_or_nothing(sqlite_url
 
     copying = Thread(target=copy)
     copying.start()
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     with store.transaction() as session:
         session.connection().exec_driver_sql("UPDATE experiment SET name = 'written'")
         half_way.set()
@@ -77,7 +77,7 @@ def test_a_copy_waits_for_whoever_writes_and_has_all_of_it_or_nothing(sqlite_url
     store.dispose()
 
     copied = Store(f"sqlite:///{tmp_path / 'copy.db'}")
-    names = [each.name for each in listing.list_experiments(copied).items]
+    names = [each.name for each in listed(copied)]
     copied.dispose()
     assert names in (["written"], ["simulated_fit"])
     assert made == [(tmp_path / "copy.db").stat().st_size]
@@ -103,7 +103,7 @@ def with_space_left(url: str) -> Path:
 
 def test_a_copy_lacks_the_space_that_deletion_left(sqlite_url: str, tmp_path: Path) -> None:
     store = Store(sqlite_url)
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     file = with_space_left(sqlite_url)
 
     size = backup(sqlite_url, tmp_path / "copy.db")
@@ -111,7 +111,7 @@ def test_a_copy_lacks_the_space_that_deletion_left(sqlite_url: str, tmp_path: Pa
     copy = Store(f"sqlite:///{tmp_path / 'copy.db'}")
     copy.check()
     assert file.stat().st_size > 2_000_000 > 2 * size
-    assert listing.list_experiments(copy) == listing.list_experiments(store)
+    assert listing.list_studies(copy) == listing.list_studies(store)
     assert (tmp_path / "copy.db").stat().st_mode & 0o777 == 0o600
     copy.dispose()
     store.dispose()

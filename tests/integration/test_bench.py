@@ -19,7 +19,7 @@ from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, ReleaseSpec
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.archives import export_experiment
+from gaplab.services.archives import export
 from gaplab.services.archives.rerunning import Part, verify
 from gaplab.services.bench import answering, attachments, corrections, doubts, taking
 from gaplab.services.bench.branches import list_branches
@@ -27,11 +27,10 @@ from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.core.errors import Conflict, InvalidSpec, KeyReused, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import lifecycle
-from gaplab.services.experiments.deletion import Deleter, delete_experiment
+from gaplab.services.experiments.deletion import Deleter, delete
 from gaplab.services.experiments.limits import FREELY, Admission
-from gaplab.services.experiments.reading import list_samples, read_experiment
+from gaplab.services.experiments.reading import list_samples, read, read_experiment
 from gaplab.services.experiments.states import settle
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.reports.content import verdict_on
 from gaplab.services.reports.outcome import outcome_of
 from gaplab.services.results.misfit import misfit
@@ -48,7 +47,7 @@ from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
 from tests.archiving import exported, imported
-from tests.experiments import same, toy
+from tests.experiments import same, submit_one, toy
 
 HOUR = timedelta(hours=1)
 PHYSICAL = {"kind": "physical", "probes": "each"}
@@ -126,7 +125,7 @@ def log_of(store: Store, experiment: ExperimentRead) -> Any:
 
 def test_without_noise_the_steps_equal_those_of_a_simulated_reality_to_the_bit(store: Store) -> None:
     spec = bench(strategy="simulated_fit_and_informative", repetitions=2)
-    experiment = submit_experiment(store, spec)
+    experiment = submit_one(store, spec)
     finish(store, truth(spec))
 
     simulated = spec.model_copy(update={"reality": spec.reality.model_copy(update={"kind": "simulated"})})
@@ -140,7 +139,7 @@ def test_without_noise_the_steps_equal_those_of_a_simulated_reality_to_the_bit(s
 
 
 def test_a_repetition_that_waits_holds_nothing_and_its_experiment_says_so(store: Store) -> None:
-    experiment = submit_experiment(store, bench())
+    experiment = submit_one(store, bench())
     assert compute(store) == 1
 
     (request,) = pending(store)
@@ -156,7 +155,7 @@ def test_a_repetition_that_waits_holds_nothing_and_its_experiment_says_so(store:
 
 
 def test_probes_that_are_left_out_are_not_asked_for(store: Store) -> None:
-    experiment = submit_experiment(store, bench(reality={"probes": "last"}))
+    experiment = submit_one(store, bench(reality={"probes": "last"}))
     asked = finish(store, lambda _: 0.5)
     assert [(each.iteration, each.kind) for each in asked] == [(1, "sample"), (2, "sample"), (2, "probe")]
     (log,) = log_of(store, experiment)
@@ -170,7 +169,7 @@ def test_probes_that_are_left_out_are_not_asked_for(store: Store) -> None:
 
 def test_a_controller_is_measured_once_even_if_it_is_probe_and_sample(store: Store) -> None:
     spec = bench(budget={"preset": "smoke", "reuse_transfer": True})
-    submit_experiment(store, spec)
+    submit_one(store, spec)
     asked = finish(store, truth(spec))
     genomes = [each.genome for each in asked]
     assert len(genomes) == len(set(genomes))
@@ -179,7 +178,7 @@ def test_a_controller_is_measured_once_even_if_it_is_probe_and_sample(store: Sto
 
 @pytest.mark.dialects
 def test_a_take_has_one_holder_and_a_bench_one_take(store: Store) -> None:
-    submit_experiment(store, bench(repetitions=2))
+    submit_one(store, bench(repetitions=2))
     compute(store)
     first, second = pending(store)
     taken = taking.take(store, first.id, TakeSpec(operator="Ada"), FREELY).answer
@@ -198,7 +197,7 @@ def test_a_take_has_one_holder_and_a_bench_one_take(store: Store) -> None:
 @pytest.mark.dialects
 @pytest.mark.parametrize("by_s", [-3600, 3600])
 def test_a_take_ends_by_silence_and_a_clock_that_was_set_ends_none(store: Store, by_s: float) -> None:
-    submit_experiment(store, bench(repetitions=2))
+    submit_one(store, bench(repetitions=2))
     compute(store)
     request, other = pending(store)
     time = [0.0]
@@ -232,7 +231,7 @@ def test_a_take_ends_by_silence_and_a_clock_that_was_set_ends_none(store: Store,
 def test_an_answer_of_a_take_that_ended_by_silence_counts_unless_another_took_the_bench_since(
     store: Store, taken_since: bool
 ) -> None:
-    submit_experiment(store, bench(repetitions=2))
+    submit_one(store, bench(repetitions=2))
     compute(store)
     hers, his = pending(store)
     taking.take(store, hers.id, TakeSpec(operator="Ada"), FREELY)
@@ -252,7 +251,7 @@ def test_an_answer_of_a_take_that_ended_by_silence_counts_unless_another_took_th
 @pytest.mark.dialects
 def test_a_bench_is_one_however_its_name_is_spaced_and_capitalised(store: Store) -> None:
     for name in ("The table", " the  TABLE "):
-        submit_experiment(store, bench(reality={"bench": name}))
+        submit_one(store, bench(reality={"bench": name}))
         compute(store)
     first, second = pending(store)
     taking.take(store, first.id, TakeSpec(operator="Ada"), FREELY)
@@ -266,7 +265,7 @@ def test_a_bench_is_one_however_its_name_is_spaced_and_capitalised(store: Store)
 
 def test_no_take_ends_while_its_request_is_answered(postgres_store: Store) -> None:
     """As it would if a supervisor ended takes between the moment a request is read and the moment it is written."""
-    submit_experiment(postgres_store, bench())
+    submit_one(postgres_store, bench())
     compute(postgres_store)
     (request,) = pending(postgres_store)
     seen = select(RequestRow.id).with_for_update(skip_locked=True)
@@ -279,7 +278,7 @@ def test_no_take_ends_while_its_request_is_answered(postgres_store: Store) -> No
 
 @pytest.mark.dialects
 def test_the_same_answer_twice_counts_once_and_another_is_a_conflict(store: Store) -> None:
-    submit_experiment(store, bench())
+    submit_one(store, bench())
     compute(store)
     (request,) = pending(store)
     taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
@@ -306,12 +305,12 @@ def test_the_same_answer_twice_counts_once_and_another_is_a_conflict(store: Stor
 
 
 def test_an_answer_that_comes_to_count_when_nobody_wants_it_any_more_is_refused(store: Store) -> None:
-    experiment = submit_experiment(store, bench())
+    experiment = submit_one(store, bench())
     compute(store)
     (request,) = pending(store)
     taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
     other = measure(store, request, 0.3)
-    lifecycle.ask_experiment(store, experiment.id, Verb.CANCEL)
+    lifecycle.ask(store, experiment.id, Verb.CANCEL)
 
     with pytest.raises(Conflict, match="wanted no more"):
         corrections.decide(store, other.id, ConflictSpec(counts="this", reason="Bo is right"), FREELY)
@@ -320,7 +319,7 @@ def test_an_answer_that_comes_to_count_when_nobody_wants_it_any_more_is_refused(
 
 
 def test_bad_values_are_refused_with_their_place(store: Store) -> None:
-    submit_experiment(store, bench(reality={"repeats": 3}))
+    submit_one(store, bench(reality={"repeats": 3}))
     compute(store)
     (request,) = pending(store)
     with pytest.raises(InvalidSpec) as refused:
@@ -332,7 +331,7 @@ def test_bad_values_are_refused_with_their_place(store: Store) -> None:
 @pytest.mark.dialects
 def test_a_correction_closes_what_followed_and_measurements_are_reused(store: Store) -> None:
     spec = bench(iterations=3)
-    experiment = submit_experiment(store, spec)
+    experiment = submit_one(store, spec)
     real = truth(spec)
     asked = finish(store, real)
     wrong = next(each for each in asked if (each.iteration, each.kind) == (1, "sample"))
@@ -363,7 +362,7 @@ def test_a_correction_closes_what_followed_and_measurements_are_reused(store: St
 
 
 def test_seconds_of_closed_steps_are_taken_back(store: Store) -> None:
-    submit_experiment(store, bench(strategy="random", iterations=3))
+    submit_one(store, bench(strategy="random", iterations=3))
     asked = finish(store, lambda genome: genome[0])
 
     def worked() -> tuple[float, list[float]]:
@@ -389,7 +388,7 @@ def test_seconds_of_closed_steps_are_taken_back(store: Store) -> None:
 
 def test_a_void_measurement_is_asked_for_again(store: Store) -> None:
     spec = bench()
-    experiment = submit_experiment(store, spec)
+    experiment = submit_one(store, spec)
     asked = finish(store, truth(spec))
     (before,) = log_of(store, experiment)
     sample = next(each for each in asked if each.kind == "sample")
@@ -413,12 +412,12 @@ def test_a_void_measurement_is_asked_for_again(store: Store) -> None:
 
 
 def test_a_void_answer_of_a_paused_experiment_leaves_it_paused(store: Store) -> None:
-    experiment = submit_experiment(store, bench()).id
+    experiment = submit_one(store, bench()).id
     compute(store)
     (request,) = pending(store)
     measure(store, request, 0.5)
     compute(store)
-    lifecycle.ask_experiment(store, experiment, Verb.PAUSE)
+    lifecycle.ask(store, experiment, Verb.PAUSE)
     answer = taking.read_request(store, request.id).answers[0]
 
     corrections.void(store, answer.id, VoidSpec(reason="the floor was wet"), FREELY)
@@ -427,7 +426,7 @@ def test_a_void_answer_of_a_paused_experiment_leaves_it_paused(store: Store) -> 
 
 
 def test_requests_come_in_pages(store: Store) -> None:
-    submit_experiment(store, bench(repetitions=3))
+    submit_one(store, bench(repetitions=3))
     compute(store)
     with store.transaction() as session:
         for hours, each in enumerate(session.scalars(select(RequestRow).order_by(RequestRow.id)).all()):
@@ -442,7 +441,7 @@ def test_requests_come_in_pages(store: Store) -> None:
 
 @pytest.mark.dialects
 def test_a_correction_of_a_probe_changes_its_point_alone(store: Store) -> None:
-    experiment = submit_experiment(store, bench())
+    experiment = submit_one(store, bench())
     asked = finish(store, lambda _: 0.5)
     answer = taking.read_request(store, asked[0].id).answers[0]
     told = corrections.correct(store, answer.id, CorrectionSpec(values=(0.9,), reason="a slip"), FREELY).answer
@@ -454,14 +453,14 @@ def test_a_correction_of_a_probe_changes_its_point_alone(store: Store) -> None:
 
 def stopped_after_a_step(store: Store) -> tuple[ExperimentRead, list[Any]]:
     """An experiment of three iterations that was stopped after its first sample and probe, with its requests."""
-    experiment = submit_experiment(store, bench(iterations=3))
+    experiment = submit_one(store, bench(iterations=3))
     asked = []
     for _ in range(3):
         compute(store)
         asked.append(pending(store)[0])
         measure(store, asked[-1], 0.5)
     compute(store)
-    assert lifecycle.ask_experiment(store, experiment.id, Verb.STOP).state is State.COMPLETED
+    assert lifecycle.ask(store, experiment.id, Verb.STOP).state is State.COMPLETED
     return experiment, [taking.read_request(store, each.id) for each in asked]
 
 
@@ -493,7 +492,7 @@ def test_a_correction_of_a_sample_says_that_a_stopped_experiment_goes_on(store: 
 
 @pytest.mark.dialects
 def test_a_void_answer_of_a_closed_branch_is_not_answered_again(store: Store) -> None:
-    experiment = submit_experiment(store, bench(strategy="simulated_fit", iterations=3))
+    experiment = submit_one(store, bench(strategy="simulated_fit", iterations=3))
     finish(store, lambda genome: genome[0])
     asked = taking.list_requests(store, RequestFilter(pending=False)).items
     first = next(each for each in asked if each.kind == "sample")
@@ -518,7 +517,7 @@ def test_a_void_answer_of_a_closed_branch_is_not_answered_again(store: Store) ->
 
 @pytest.mark.dialects
 def test_a_correction_while_the_repetition_is_computed_fences_its_worker(store: Store) -> None:
-    experiment = submit_experiment(store, bench())
+    experiment = submit_one(store, bench())
     compute(store)
     measure(store, pending(store)[0], 0.5)
     compute(store)
@@ -536,20 +535,20 @@ def test_a_correction_while_the_repetition_is_computed_fences_its_worker(store: 
 
 
 def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
-    one, two, three = (submit_experiment(store, bench(reality={"bench": name})) for name in "abc")
+    one, two, three = (submit_one(store, bench(reality={"bench": name})) for name in "abc")
     compute(store)
     requests = {each.experiment: each for each in pending(store)}
     taken = taking.take(store, requests[one.id].id, TakeSpec(operator="Ada"), FREELY).answer
-    assert lifecycle.ask_experiment(store, one.id, Verb.PAUSE).state is State.PAUSED
+    assert lifecycle.ask(store, one.id, Verb.PAUSE).state is State.PAUSED
     assert {each.experiment for each in pending(store)} == {one.id, two.id, three.id}  # a taken one is being measured
     taking.release(store, taken.id, ReleaseSpec(take=taken.takes))
     assert {each.experiment for each in pending(store)} == {two.id, three.id}
     with pytest.raises(Conflict, match="PAUSED"):
         taking.take(store, requests[one.id].id, TakeSpec(operator="Ada"), FREELY)
     measure(store, requests[one.id], 0.4)  # whoever measured it nevertheless is not sent away
-    assert lifecycle.ask_experiment(store, one.id, Verb.RESUME).state is State.QUEUED
-    assert lifecycle.ask_experiment(store, two.id, Verb.STOP).state is State.CANCELLED
-    assert lifecycle.ask_experiment(store, three.id, Verb.CANCEL).state is State.CANCELLED
+    assert lifecycle.ask(store, one.id, Verb.RESUME).state is State.QUEUED
+    assert lifecycle.ask(store, two.id, Verb.STOP).state is State.CANCELLED
+    assert lifecycle.ask(store, three.id, Verb.CANCEL).state is State.CANCELLED
     with pytest.raises(Conflict, match="wanted no more"):
         measure(store, requests[three.id], 0.4)
     waiting_for = [RequestFilter(experiment=id_) for id_ in (one.id, three.id)]
@@ -559,13 +558,13 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
 @pytest.mark.dialects
 def test_a_bench_stays_taken_until_its_holder_has_let_go_or_is_silent(store: Store) -> None:
     """Also if the request is wanted no more, or somebody else's answer counts: a driver may still move the robot."""
-    first, second, third = (submit_experiment(store, bench(reality={"bench": "table"})) for _ in range(3))
+    first, second, third = (submit_one(store, bench(reality={"bench": "table"})) for _ in range(3))
     compute(store)
     one, two, three = pending(store)
     for request, experiment in ((one, first), (two, second)):
         taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
         if request is one:
-            lifecycle.ask_experiment(store, experiment.id, Verb.CANCEL)
+            lifecycle.ask(store, experiment.id, Verb.CANCEL)
         else:
             other = measure(store, request, 0.3)
             corrections.decide(store, other.id, ConflictSpec(counts="this", reason="Ada's phone is dead"), FREELY)
@@ -586,7 +585,7 @@ def test_known_samples_tune_the_first_simulators(store: Store) -> None:
     real = truth(spec)
     genomes = [[0.2], [0.7]]
     known = [{"genome": genome, "values": [real(genome)]} for genome in genomes]
-    experiment = submit_experiment(store, bench(reality={"samples": known}))
+    experiment = submit_one(store, bench(reality={"samples": known}))
     compute(store)
     (log,) = log_of(store, experiment)
     assert log[0].cost.rollouts > 0
@@ -597,7 +596,7 @@ def test_without_iterations_one_tunes_on_what_was_measured_before(store: Store) 
     real = truth(bench())
     known = [{"genome": [gene], "values": [real([gene])]} for gene in (0.2, 0.7, 0.4, 0.9)]
     spec = bench(iterations=0, held_out=0.25, reality={"samples": known, "probes": None})
-    experiment = submit_experiment(store, spec)
+    experiment = submit_one(store, spec)
 
     assert compute(store) == 1
 
@@ -617,7 +616,7 @@ def test_without_iterations_one_tunes_on_what_was_measured_before(store: Store) 
 
 
 def test_an_unlikely_number_stays_a_remark_until_a_person_confirms_or_corrects_it(store: Store) -> None:
-    experiment = submit_experiment(store, bench(reality={"repeats": 3}))
+    experiment = submit_one(store, bench(reality={"repeats": 3}))
     compute(store)
     request, slip = pending(store)[0], (0.31, 31.0, 0.29)
 
@@ -632,7 +631,7 @@ def test_an_unlikely_number_stays_a_remark_until_a_person_confirms_or_corrects_i
     (warning,) = read_experiment(store, experiment.id).warnings
     assert warning.startswith("repetition 0, iteration 0: 31 is 1e+02 times the other repeats; ")
     assert f"gaplab decide {answer.id} this" in warning
-    assert any(warning in sentence for sentence in verdict_on(store, read_experiment(store, experiment.id)).sentences)
+    assert any(warning in sentence for sentence in verdict_on(store, read(store, experiment.id)).sentences)
 
     decision = ConflictSpec(counts="this", reason="it flew")
     assert "confirmed" in corrections.decide(store, answer.id, decision, FREELY, dry_run=True).answer.words
@@ -652,7 +651,7 @@ def test_an_unlikely_number_stays_a_remark_until_a_person_confirms_or_corrects_i
 
 
 def test_repeats_weigh_samples_and_put_a_floor_under_weights(store: Store) -> None:
-    experiment = submit_experiment(store, bench(reality={"repeats": 3}, strategy="simulated_fit_and_informative"))
+    experiment = submit_one(store, bench(reality={"repeats": 3}, strategy="simulated_fit_and_informative"))
     compute(store)
     while items := pending(store):
         measure(store, items[0], 0.4, 0.5, 0.6)
@@ -683,7 +682,7 @@ def test_a_resolved_physical_spec_resolves_to_itself() -> None:
 @pytest.mark.dialects
 def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) -> None:
     spec = bench(iterations=3)
-    experiment = submit_experiment(store, spec)
+    experiment = submit_one(store, spec)
     real = truth(spec)
     compute(store)
     measure(store, pending(store)[0], real(pending(store)[0].genome))
@@ -694,7 +693,7 @@ def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) 
     corrections.correct(store, given.id, CorrectionSpec(values=(real(sample.genome),), reason="a slip"), FREELY)
     compute(store)
     taken = taking.take(store, pending(store)[0].id, TakeSpec(operator="Ada"), FREELY).answer
-    archive = exported(export_experiment(store, experiment.id))
+    archive = exported(export(store, experiment.id))
     taking.release(store, taken.id, ReleaseSpec(take=1))
 
     for _ in range(2):  # the second time under other ids
@@ -708,7 +707,7 @@ def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) 
         assert [request.state for request in asked] == ["measured", "measured", "withdrawn", "withdrawn"]
     assert compute(other) == 0
     for each in (first, second):
-        lifecycle.ask_experiment(other, each.id, Verb.RESUME)
+        lifecycle.ask(other, each.id, Verb.RESUME)
     finish(other, real)
     finish(store, real)
     (expected,) = log_of(store, experiment)
@@ -718,9 +717,9 @@ def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) 
 
 
 def test_a_rerun_of_a_bench_takes_the_stored_answers(sqlite_store: Store) -> None:
-    experiment = submit_experiment(sqlite_store, bench(reality={"repeats": 2}, repetitions=2))
+    experiment = submit_one(sqlite_store, bench(reality={"repeats": 2}, repetitions=2))
     finish(sqlite_store, truth(bench()))
-    archive = exported(export_experiment(sqlite_store, experiment.id))
+    archive = exported(export(sqlite_store, experiment.id))
 
     found = verify(BytesIO(archive), cores=1)
     part = verify(BytesIO(archive), Part(experiment=experiment.name, repetition=1), cores=1)
@@ -734,9 +733,9 @@ def test_a_rerun_of_a_bench_takes_the_stored_answers(sqlite_store: Store) -> Non
 
 
 def test_a_deleted_experiment_leaves_no_requests(store: Store) -> None:
-    experiment = submit_experiment(store, bench())
+    experiment = submit_one(store, bench())
     finish(store, lambda _: 0.5)
-    delete_experiment(store, experiment.id, Deleter(None))
+    delete(store, experiment.id, Deleter(None))
     assert taking.list_requests(store, RequestFilter(pending=False)).items == ()
 
 
@@ -754,7 +753,7 @@ def test_a_file_has_a_byte_or_more(sqlite_store: Store) -> None:
 @pytest.mark.dialects
 def test_a_file_goes_with_the_last_answer_that_names_it(store: Store) -> None:
     shared, own, waits, old, again = (sent(store, name) for name in ("shared", "own", "waits", "old", "again"))
-    first, second = (submit_experiment(store, bench(iterations=1, reality={"probes": "never"})) for _ in range(2))
+    first, second = (submit_one(store, bench(iterations=1, reality={"probes": "never"})) for _ in range(2))
     compute(store)
     for request in pending(store):
         named = [shared, own] if request.experiment == first.id else [shared]
@@ -764,22 +763,24 @@ def test_a_file_goes_with_the_last_answer_that_names_it(store: Store) -> None:
     store.write(lambda session: session.execute(long_ago.values(created_at=datetime.now(UTC) - timedelta(days=8))))
     sent(store, "again")
 
-    delete_experiment(store, first.id, Deleter(None))
+    delete(store, first.id, Deleter(None))
 
     assert set(store.write(lambda session: session.scalars(select(AttachmentRow.id)).all())) == {shared, waits, again}
-    delete_experiment(store, second.id, Deleter(None))
+    delete(store, second.id, Deleter(None))
     with pytest.raises(NotFound, match="no attachment"):
         attachments.read_attachment(store, shared)
 
 
 def test_every_result_of_a_bench_is_served(store: Store) -> None:
-    experiment = submit_experiment(store, bench(reality={"repeats": 2, "probes": "last"}))
+    experiment = submit_one(store, bench(reality={"repeats": 2, "probes": "last"}))
     finish(store, lambda genome: genome[0])
     api = TestClient(create_app(store))
     of_it = f"/experiments/{experiment.id}"
-    figures = ("curves", "predictions", "squared-error", "simulators", "coordinates", "toy")
-    paths = [f"{of_it}{each}" for each in ("", "/curve", "/samples", "/misfit", "/simulators", "/spec", "/repetitions")]
+    figures = ("predictions", "squared-error", "simulators", "toy")
+    paths = [f"{of_it}{each}" for each in ("", "/curve", "/samples", "/misfit", "/simulators", "/repetitions")]
     paths += [f"/figures/{kind}?experiment={experiment.id}&format=json" for kind in figures]
+    paths += [f"/figures/{kind}?study={experiment.id}&format=json" for kind in ("curves", "coordinates")]
+    paths += [f"/studies/{experiment.id}/spec"]
 
     refused = {path: answer.text for path in paths if (answer := api.get(path)).status_code != 200}
 
@@ -788,9 +789,9 @@ def test_every_result_of_a_bench_is_served(store: Store) -> None:
 
 @pytest.mark.dialects
 def test_fifty_operators_at_once_get_one_request_each_or_none(store: Store) -> None:
-    submit_experiment(store, bench(repetitions=3, reality={"bench": "one"}))
-    submit_experiment(store, bench(repetitions=2, reality={"bench": "two"}))
-    submit_experiment(store, bench(repetitions=1, reality={"bench": "one"}))
+    submit_one(store, bench(repetitions=3, reality={"bench": "one"}))
+    submit_one(store, bench(repetitions=2, reality={"bench": "two"}))
+    submit_one(store, bench(repetitions=1, reality={"bench": "one"}))
     compute(store)
     wanted = [each.id for each in pending(store)]
     assert len(wanted) == 6
@@ -813,7 +814,7 @@ def test_fifty_operators_at_once_get_one_request_each_or_none(store: Store) -> N
 @pytest.mark.dialects
 @pytest.mark.parametrize("claimed", [False, True])
 def test_an_answer_counts_also_while_a_repetition_is_on_its_way_to_the_request(store: Store, claimed: bool) -> None:
-    experiment = submit_experiment(store, bench())
+    experiment = submit_one(store, bench())
     compute(store)
     with store.transaction() as session:  # as earlier versions imported it
         session.execute(update(RepetitionRow).values(state=State.QUEUED))

@@ -11,12 +11,12 @@ from gaplab.services.bench import answering, corrections, taking
 from gaplab.services.core.errors import LimitReached
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.limits import FREELY
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.sent_specs import sent as sent_spec
 from gaplab.services.replay.traces import evaluate_traces, said_by_files
 from gaplab.services.store.session import Store
 from gaplab.services.waiting_line import WaitingLine
+from tests.experiments import submit_one
 from tests.integration.test_bench import bench, compute, pending, sent, undecided
 
 ROBOT = '''
@@ -47,7 +47,7 @@ def given(store: Store, request: Any, **parts: Any) -> Any:
 def request_(store: Store, put: Any) -> Any:
     """The request of a robot that senses, taken by Ada."""
     put(sensing=ROBOT)
-    submit_experiment(store, bench(robot="sensing", strategy="random"))
+    submit_one(store, bench(robot="sensing", strategy="random"))
     compute(store)
     (found,) = pending(store)
     return taking.take(store, found.id, TakeSpec(operator="Ada"), FREELY).answer
@@ -152,7 +152,7 @@ class Opened(dict[str, bytes]):
 
 
 def test_a_trace_is_read_once_and_in_the_line_of_rollouts(store: Store) -> None:
-    experiment = submit_experiment(store, bench(reality={"repeats": 3}))
+    experiment = submit_one(store, bench(reality={"repeats": 3}))
     compute(store)
     (request,) = pending(store)
     trace = b"time_s,x,y,z,qx,qy,qz,qw\n3,0,0,0,0,0,0,1\n5,1,0,0,0,0,0,1\n"

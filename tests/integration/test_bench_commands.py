@@ -17,11 +17,10 @@ from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.measurements import TakeSpec
 from gaplab.services.bench import taking
 from gaplab.services.experiments.limits import FREELY
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.models import EventRow
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 from tests.integration.test_bench import compute, measure, pending
 from tests.integration.test_bench_http import traces_of
 from tests.integration.test_bench_safety import BEYOND, ask, safety, submit
@@ -31,7 +30,7 @@ PHYSICAL = {"kind": "physical", "probes": "never"}
 
 def asked(store: Store, **changes: Any) -> Any:
     """The request of a new experiment."""
-    submit_experiment(store, toy(**{"strategy": "random", "repetitions": 1, "reality": PHYSICAL} | changes))
+    submit_one(store, toy(**{"strategy": "random", "repetitions": 1, "reality": PHYSICAL} | changes))
     compute(store)
     return pending(store)[0]
 
@@ -238,11 +237,13 @@ def test_an_experiment_that_waits_for_its_robot_is_listed_shown_and_watched(
     id_ = asked(sqlite_store, iterations=1).experiment
     watched = io.StringIO()
 
-    listings = [gaplab("list"), gaplab("list", "--experiments"), gaplab("show", id_)]
+    listings = [gaplab("list"), gaplab("show", id_)]
     with Client(url) as client:
-        log.show([Snapshot((RecordProgress(client.experiment(id_)),))], Console(file=watched, width=160))
+        log.show(
+            [Snapshot(client.study(id_), (RecordProgress(client.experiment(id_)),))], Console(file=watched, width=160)
+        )
 
-    assert [said.code for said in listings] == [0, 0, 0]
+    assert [said.code for said in listings] == [0, 0]
     assert all("WAITING" in said.out for said in listings)
     assert "rollouts" in watched.getvalue()
     assert "; WAITING" in watched.getvalue()
@@ -272,7 +273,7 @@ def test_a_reason_is_asked_for_before_the_service_is(gaplab: Gaplab, command: tu
 
 def test_all_requests_are_listed_on_one_line_each(sqlite_store: Store, gaplab: Gaplab) -> None:
     reality = PHYSICAL | {"bench": "the long table at the window of the second laboratory", "probes": "each"}
-    submit_experiment(sqlite_store, toy(robot="quadruped", engine="mujoco", repetitions=55, reality=reality))
+    submit_one(sqlite_store, toy(robot="quadruped", engine="mujoco", repetitions=55, reality=reality))
     for _ in range(55):
         ask(sqlite_store)
 

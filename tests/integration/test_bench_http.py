@@ -408,7 +408,7 @@ def test_the_take_of_a_dead_phone_is_ended_by_somebody_else_with_the_reason(clie
     by = {"take": taken.takes, "operator": "Bea", "reason": "her phone is dead"}
     assert client._connection.change(RequestRead, "POST", path, json=by).state == "open"
 
-    (event,) = client.events(follow=False, experiment=experiment.id, kind="released")
+    (event,) = client.events(follow=False, study=experiment.id, kind="released")
     assert {"by": "Bea", "operator": "Ada", "reason": "her phone is dead"}.items() <= event.body.items()
     late = client.bench.answer(request.id, [0.4], take=taken.takes)
     assert (late.state, late.operator) == ("counted", "Ada")

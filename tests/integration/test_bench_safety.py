@@ -9,20 +9,19 @@ from gaplab.schemas.corrections import VoidSpec
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.measurements import AnswerState, MeasurementSpec
 from gaplab.schemas.records import MeasurementKind
-from gaplab.services.archives import export_experiment
+from gaplab.services.archives import export
 from gaplab.services.bench import answering, corrections, taking
 from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Probed, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Claim, Requested
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from tests.archiving import exported, imported
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 
 GENOME = frozen(np.full(24, 0.5))
 BEYOND = "the tilt of the base reaches 1.2 rad in 2 of 2 simulators; permitted: at most 0.5 rad"
@@ -34,7 +33,7 @@ def safety(*beyond: str) -> dict[str, Any]:
 
 def submit(store: Store, beyond: str) -> str:
     reality = {"kind": "physical", "limits": {"tilt": 0.5}, "beyond": beyond, "probes": "each"}
-    return submit_experiment(store, toy(robot="quadruped", engine="mujoco", repetitions=1, reality=reality)).id
+    return submit_one(store, toy(robot="quadruped", engine="mujoco", repetitions=1, reality=reality)).id
 
 
 def ask(store: Store, **told: Any) -> Claim:
@@ -113,10 +112,10 @@ def test_a_controller_is_offered_with_its_forecast(store: Store, beyond: str, to
 def test_a_forecast_is_made_here_and_never_imported(store: Store, other: Store) -> None:
     experiment = submit(store, "warn")
     ask(store, safety=safety())
-    archives = [exported(export_experiment(store, experiment))]
+    archives = [exported(export(store, experiment))]
     (request,) = requests_of(store, experiment)
     answering.answer(store, request.id, MeasurementSpec(values=(0.4,), operator="Ada"), FREELY)
-    archives.append(exported(export_experiment(store, experiment)))
+    archives.append(exported(export(store, experiment)))
 
     open_, answered = (imported(other, each).experiments[0] for each in archives)
     (withdrawn,), (measured,) = requests_of(other, open_), requests_of(other, answered)
@@ -127,5 +126,5 @@ def test_a_forecast_is_made_here_and_never_imported(store: Store, other: Store) 
     assert withdrawn.safety is measured.safety is again.safety is None
     assert request.safety is not None
     for each in (open_, answered):
-        lifecycle.ask_experiment(other, each, Verb.RESUME)
+        lifecycle.ask(other, each, Verb.RESUME)
     assert {claim.experiment_id for claim in execution.claim(other, "here", 9)} == {open_, answered}

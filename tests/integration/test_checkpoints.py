@@ -14,8 +14,8 @@ from gaplab.schemas.records import Progress
 from gaplab.services.core.answers import unpack
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import reading, submission
-from gaplab.services.experiments.lifecycle import ask_experiment
+from gaplab.services.experiments import reading
+from gaplab.services.experiments.lifecycle import ask
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint
 from gaplab.services.running.leases import MAX_LOSSES
@@ -24,7 +24,7 @@ from gaplab.services.store.lease import Failure, Pulse
 from gaplab.services.store.models import CheckpointRow
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import StepRecorder, recorded
-from tests.experiments import cancel, same, some_log, toy
+from tests.experiments import cancel, same, some_log, submit_one, toy
 from tests.fakes import Recorder, flat, paraboloid, small_setting
 from tests.waiting import wait_until
 
@@ -113,7 +113,7 @@ def checkpoints_left(store: Store) -> Any:
 
 @pytest.mark.dialects
 def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     first = next(some_log())
 
@@ -128,7 +128,7 @@ def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store: 
 
 @pytest.mark.dialects
 def test_a_checkpoint_that_is_delivered_twice_is_stored_once(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     (claim,) = execution.claim(store, "me", 1)
 
     for delivered in ([part(0, 0)], [part(0, 0)], [part(0, 0), part(0, 1)]):
@@ -138,7 +138,7 @@ def test_a_checkpoint_that_is_delivered_twice_is_stored_once(store: Store) -> No
 
 
 def test_checkpoints_are_gone_once_their_step_is_recorded(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     claims = execution.claim(store, "me", 2)
     execution.record_all(store, [(claim, [part(0, 0), part(0, 1)]) for claim in claims])
     first, second, *_ = [execution.TimedStep(each, 0.5) for each in some_log()]
@@ -153,7 +153,7 @@ def test_checkpoints_are_gone_once_their_step_is_recorded(store: Store) -> None:
 
 @pytest.mark.parametrize("wrong", [part(0, 1), part(1, 0)])
 def test_a_checkpoint_that_would_leave_a_hole_is_refused(store: Store, wrong: Any) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     (claim,) = execution.claim(store, "me", 1)
 
     with pytest.raises(Conflict, match="next is part 0 of step 0"):
@@ -163,7 +163,7 @@ def test_a_checkpoint_that_would_leave_a_hole_is_refused(store: Store, wrong: An
 
 
 def test_a_late_checkpoint_of_a_holder_who_lost_the_lease_is_not_stored(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     (late,) = execution.claim(store, "me", 1)
     execution.release(store, late, "killed")
     execution.claim(store, "you", 1)
@@ -174,7 +174,7 @@ def test_a_late_checkpoint_of_a_holder_who_lost_the_lease_is_not_stored(store: S
 
 
 def test_one_that_gets_on_within_a_step_may_be_lost_any_number_of_times(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=1))
+    submitted = submit_one(store, toy(repetitions=1))
 
     for number in range(2 * MAX_LOSSES):
         (claim,) = execution.claim(store, "me", 1)
@@ -185,7 +185,7 @@ def test_one_that_gets_on_within_a_step_may_be_lost_any_number_of_times(store: S
 
 
 def test_cancelling_forgets_checkpoints(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy())
+    submitted = submit_one(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     execution.record_all(store, [(claim, [part(0, 0)])])
 
@@ -196,7 +196,7 @@ def test_cancelling_forgets_checkpoints(store: Store) -> None:
 
 @pytest.mark.parametrize("hopeless", [True, False])
 def test_a_repetition_that_fails_leaves_no_checkpoints(store: Store, hopeless: Any) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     execution.record_all(store, [(claim, [part(0, 0)])])
 
@@ -210,11 +210,11 @@ def test_a_repetition_that_fails_leaves_no_checkpoints(store: Store, hopeless: A
 
 
 def test_a_repetition_that_is_retried_stores_checkpoints_again(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=1))
+    submitted = submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     execution.record_all(store, [(claim, [part(0, 0), part(0, 1)])])
     execution.fail(store, claim, Failure("no"))
-    ask_experiment(store, submitted.id, Verb.RETRY)
+    ask(store, submitted.id, Verb.RETRY)
     (claim,) = execution.claim(store, "me", 1)
     assert claim.checkpoints == ()
 
@@ -226,7 +226,7 @@ def test_a_repetition_that_is_retried_stores_checkpoints_again(store: Store) -> 
 
 
 def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy())
+    submitted = submit_one(store, toy())
     (known,) = execution.claim(store, "me", 1)
     execution.claim(store, "me", 1)
     (others,) = execution.claim(store, "you", 1)
@@ -241,7 +241,7 @@ def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(sto
 @pytest.mark.dialects
 def test_progress_tells_how_far_a_tuning_has_come(store: Store) -> None:
     spec = toy(repetitions=1, iterations=1)
-    submitted = submission.submit_experiment(store, spec)
+    submitted = submit_one(store, spec)
     (claim,) = execution.claim(store, "me", 1)
     seen: list[Progress] = []
 

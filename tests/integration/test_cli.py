@@ -17,13 +17,12 @@ from gaplab.api.commands import demo
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
-from gaplab.services.experiments import listing
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import subject
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab, served
-from tests.experiments import finish
+from tests.experiments import finish, listed
 from tests.waiting import wait_until
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -32,7 +31,7 @@ SMOKE = str(EXAMPLES / "smoke.json")
 
 def wait_for_submission(store: Store) -> None:
     """Wait until an experiment is queued, and its watcher has printed a line."""
-    wait_until(lambda: listing.list_experiments(store).items)
+    wait_until(lambda: listed(store))
     time.sleep(0.5)
 
 
@@ -71,19 +70,6 @@ def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab) -> No
 
     assert "toy function (7)" in listed
     assert "information? (5)" in listed
-
-
-def test_an_experiment_of_no_study_is_listed_whatever_many_of_studies_are_newer(gaplab: Gaplab) -> None:
-    older, alone = submitted(gaplab), submitted(gaplab)
-    studies = [submitted(gaplab, str(EXAMPLES / "toy.json")) for _ in range(2)]
-
-    three = json.loads(gaplab("list", "--limit", "3", "--json").out)
-    one = json.loads(gaplab("list", "--limit", "1", "--json").out)
-    all_ = json.loads(gaplab("list", "--json").out)
-
-    assert [each["id"] for each in three] == [*reversed(studies), alone]
-    assert [each["id"] for each in one] == studies[1:]
-    assert [each["id"] for each in all_] == [*reversed(studies), alone, older]
 
 
 def test_a_spec_comes_from_standard_input_too(gaplab: Gaplab) -> None:
@@ -335,7 +321,7 @@ def test_a_wrong_argument_is_named_with_what_is_permitted(gaplab: Gaplab) -> Non
         ("list", "--limit", "abc"): 'it must be a whole number, not "abc"',
         ("watch", "e1", "--every", "abc"): 'it must be a finite number, not "abc"',
         ("compare", "e1", "--format", "xml"): "'--format': 'xml' is not one of 'table',",
-        ("views", "save", "mine", "--shows", "xml"): "'--shows': 'xml' is not one of 'all',",
+        ("views", "save", "mine", "--sort", "xml"): "'--sort': 'xml' is not one of",
     }
 
     for arguments, message in wrong.items():
@@ -370,7 +356,6 @@ def test_the_client_knows_when_what_answers_is_no_gaplab() -> None:
 def test_an_option_without_an_effect_is_refused_with_what_to_do(gaplab: Gaplab, tmp_path: Path) -> None:
     study = json.loads(gaplab("submit", str(EXAMPLES / "toy.json"), "--json").out)["id"]
     refused = {
-        ("list", "--view", "slow", "--experiments"): "a saved view says what it lists",
         ("show", study, "--spec"): f"`gaplab spec {study} --resolved`",
         ("curve", study, "--csv", "--json"): "only one of --csv and --json",
         ("rerun", str(tmp_path / "x.zip"), "--repetitions", "1"): "add --verify",

@@ -21,7 +21,6 @@ import gaplab
 from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable
 from gaplab.api.app import create_app
 from gaplab.api.clients import results, tables
-from gaplab.api.clients.records import experiments_of
 from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind, EventRead
 from gaplab.services import access
@@ -91,7 +90,7 @@ def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, 
     points, values = client.curve(study.id), client.curve(study.id, each=True)
 
     (curve, direct) = client.curves([study.id])
-    assert list(points["experiment"].unique()) == [each.id for each in experiments_of(study)]
+    assert list(points["experiment"].unique()) == [each.id for each in study.experiments]
     assert len(points) == len(curve.points) + len(direct.points)
     assert points["mean"].iloc[0] == curve.points[0].mean
     assert points["evaluations"].dtype.kind == "i"
@@ -217,16 +216,15 @@ def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(
     study = client.submit(BOTH)
     finish()
     whole = client.curves_csv([study.id])
-    first, second = (each.id for each in experiments_of(study))
-    many = [first] * 70 + [second] * 70
+    first, second = (each.id for each in study.experiments)
+    monkeypatch.setattr(results, "MOST_CURVES", 1)
     network.asked.clear()
 
-    curves = client.curves_of(many)
+    curves = client.curves([second, study.experiments[0]])
 
     assert network.asked == ["GET /curves"] * 2
-    assert [each.experiment for each in curves] == many
-    monkeypatch.setattr(results, "MOST_CURVES", 1)
-    assert client.curves_csv([study.id]) == whole
+    assert [each.experiment for each in curves] == [second, first]
+    assert client.curves_csv(study.experiments) == whole
 
 
 def predictions(pending: int) -> httpx2.Response:
@@ -294,11 +292,11 @@ def test_waiting_gives_what_it_ended_as(client: Client, finish: Callable[[], Non
 def test_waiting_shows_progress_on_standard_error_if_asked(
     client: Client, finish: Callable[[], None], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    experiment = client.submit(SMALL)
+    study = client.submit(SMALL)
     finish()
 
-    client.wait(experiment.id, progress=True)
-    client.wait(experiment.id)
+    client.wait(study, progress=True)
+    client.wait(study.id)
 
     said = capsys.readouterr()
     assert said.out == ""
@@ -396,7 +394,7 @@ def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Clien
     with pytest.raises(ServiceError) as unknown:
         client.figure(id, of="portrait").content("svg")
     with pytest.raises(ServiceError, match="there is no"):
-        client.figure("nope")
+        client.figure("nope").content("svg")
 
     assert unknown.value.problem.status == 404
     assert list(tmp_path.iterdir()) == []
@@ -422,24 +420,23 @@ def test_what_is_submitted_while_answers_are_lost_exists_once(client: Client, ne
 
     submitted = client.submit(SMALL)
 
-    assert [each.id for each in client.experiments().items] == [submitted.id]
+    assert [each.id for each in client.studies().items] == [submitted.id]
 
 
 def test_a_verb_whose_answer_is_lost_is_not_asked_for_again(client: Client, network: InProcess) -> None:
     id = client.submit(SMALL).id
-    client.find(id)
     network.asked.clear()
-    find = network.handle_request
+    handle = network.handle_request
 
     def lose_the_verb(request: httpx2.Request) -> httpx2.Response:
         network.lost = int(request.method == "POST")
-        return find(request)
+        return handle(request)
 
     network.handle_request = lose_the_verb  # type: ignore[method-assign]
     with pytest.raises(ServiceUnreachable):
         client.cancel(id)
 
-    assert [each for each in network.asked if each.startswith("POST")] == [f"POST /experiments/{id}/cancel"]
+    assert [each for each in network.asked if each.startswith("POST")] == [f"POST /studies/{id}/cancel"]
 
 
 def test_a_spec_with_several_mistakes_raises_with_a_line_for_each(client: Client) -> None:

@@ -43,14 +43,18 @@ def test_a_single_id_is_that_of_its_study(client: Client, finish: Callable[[], N
     assert client.curves_csv(study.id) == client.curves_csv([study.id])
 
 
-def test_a_record_in_place_of_its_id_is_named(client: Client) -> None:
-    experiment: Any = client.submit(SMALL)
+def test_a_study_or_an_experiment_stands_for_its_id(client: Client, finish: Callable[[], None]) -> None:
+    study = client.submit(BOTH)
+    first = client.tag(study, "wet").experiments[0]
+    finish()
 
-    for given in (lambda: next(client.requests(experiment)), lambda: client.experiments(study=experiment)):
-        with pytest.raises(TypeError, match=r"an id is a text, not .*; give its `\.id`"):
-            given()
-    with pytest.raises(TypeError, match=r"; give its `\.id`"):
-        client.experiment(experiment)
+    assert client.study(study).tags == client.study(first).tags == ("wet",)
+    assert client.study(first).experiments == (client.study(study).experiments[0],)
+    assert client.experiment(first).id == client.curves(first)[0].experiment == first.id
+    assert [each.experiment for each in client.curves([first, study])] == [each.id for each in study.experiments]
+    assert client.samples(first).equals(client.samples(first.id))
+    with pytest.raises(TypeError, match="an id or a name is a text, not 5"):
+        client.study(5)  # type: ignore[arg-type]
 
 
 def test_an_option_of_a_figure_changes_neither_its_format_nor_its_experiments(client: Client) -> None:

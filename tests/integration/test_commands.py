@@ -172,7 +172,7 @@ def live_and_die(ask: Callable[..., Any], finish: Callable[[], None]) -> None:
 def look(ask: Callable[..., Any], id: str, other: str) -> None:
     assert set(ask("show", id)) == {"study"}
     experiments = [each["id"] for each in ask("show", id)["study"]["experiments"]]
-    assert set(ask("show", experiments[0])) == {"experiment", "repetitions", "provenance", "misfit"}
+    assert set(ask("show", experiments[0])) == {"study", "repetitions", "provenance", "misfit"}
     assert [each["experiment"] for each in ask("curve", id)] == experiments
     assert [column["id"] for column in ask("diff", id, other)["columns"]] == [id, other]
     assert ask("report", id)["headline"]

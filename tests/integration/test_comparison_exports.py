@@ -14,15 +14,13 @@ from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.comparisons import Comparison, Equivalence, Estimate, Summary, Test, Trusted
-from gaplab.services.experiments import submission
-from gaplab.services.experiments.listing import list_experiments
 from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex, escaped
 from gaplab.services.results.comparisons import compare
 from gaplab.services.store.session import Store
 from tests import experiments
 from tests.commands import Gaplab
 from tests.conftest import filled
-from tests.experiments import toy
+from tests.experiments import listed, submit_one, toy
 
 NAMES = ("half & half_100%", "=1+1", "plain")
 """Of three experiments; two have signs that tables treat as their own."""
@@ -30,7 +28,7 @@ NAMES = ("half & half_100%", "=1+1", "plain")
 
 def fill(store: Store) -> None:
     for name in NAMES:
-        submission.submit_experiment(store, toy(name=name, repetitions=4))
+        submit_one(store, toy(name=name, repetitions=4))
     experiments.finish(store)
 
 
@@ -42,14 +40,14 @@ def sqlite_template(sqlite_template: Path) -> Path:
 
 @pytest.fixture
 def ids(sqlite_store: Store) -> list[str]:
-    found = {each.name: each.id for each in list_experiments(sqlite_store).items}
+    found = {each.name: each.id for each in listed(sqlite_store)}
     return [found[name] for name in NAMES]
 
 
 def test_csv_has_every_number_of_the_json(ids: list[str], sqlite_store: Store) -> None:
     with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
-        plain = api.get("/comparisons", params={"experiment": ids, "from": 2, "to": 2}).json()
-        answer = api.get("/comparisons", params={"experiment": ids, "from": 2, "to": 2, "format": "csv"})
+        plain = api.get("/comparisons", params={"study": ids, "from": 2, "to": 2}).json()
+        answer = api.get("/comparisons", params={"study": ids, "from": 2, "to": 2, "format": "csv"})
 
     rows = list(csv.DictReader(io.StringIO(answer.text)))
     assert answer.headers["content-type"].startswith("text/csv")
@@ -69,9 +67,9 @@ def test_transferred_controllers_alone_and_the_best_of_them_stand_beside_the_rec
     with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
         probes = api.get(f"/experiments/{ids[0]}/samples", params={"kind": "probe", "limit": 1000}).json()["items"]
         kinds = ("recorded", "transferred", "equal_chances")
-        curves = {kind: api.get("/curves", params={"experiment": ids, "fitness": kind}).json() for kind in kinds}
-        pairs = {kind: api.get("/comparisons", params={"experiment": ids, "fitness": kind}).json() for kind in kinds}
-        figure = api.get("/figures/curves", params={"experiment": ids, "format": "json"}).json()
+        curves = {kind: api.get("/curves", params={"study": ids, "fitness": kind}).json() for kind in kinds}
+        pairs = {kind: api.get("/comparisons", params={"study": ids, "fitness": kind}).json() for kind in kinds}
+        figure = api.get("/figures/curves", params={"study": ids, "format": "json"}).json()
 
     alone = {(each["repetition"], each["iteration"]): each["fitness"] for each in probes}
     values = {kind: [point["values"] for point in found[0]["points"]] for kind, found in curves.items()}
@@ -174,8 +172,8 @@ def test_what_differs_besides_the_strategy_is_said(
         toy(repetitions=2, robot="slippery"),
         toy(repetitions=2, reality={"parameters": {"static_friction": 0.4}}),
     )
-    plain, random, slippery, icy = (submission.submit_experiment(sqlite_store, spec).id for spec in specs)
-    open_ = submission.submit_experiment(sqlite_store, toy(repetitions=2)).id
+    plain, random, slippery, icy = (submit_one(sqlite_store, spec).id for spec in specs)
+    open_ = submit_one(sqlite_store, toy(repetitions=2)).id
 
     def told(*pair: str) -> list[str]:
         (found,) = compare(sqlite_store, pair)
@@ -195,8 +193,8 @@ def test_what_differs_besides_the_strategy_is_said(
 
 def test_all_ways_to_ask_begin_at_the_same_count(ids: list[str], gaplab: Gaplab, url: str, sqlite_store: Store) -> None:
     with TestClient(create_app(sqlite_store), base_url="http://localhost") as api, Client(url) as client:
-        http = api.get("/comparisons", params={"experiment": ids}).json()
-        alone = api.get("/comparisons", params={"experiment": ids, "to": 1}).json()
+        http = api.get("/comparisons", params={"study": ids}).json()
+        alone = api.get("/comparisons", params={"study": ids, "to": 1}).json()
         asked = client.compare(ids)
     command = json.loads(gaplab("compare", *ids, "--json").out)
 
@@ -208,7 +206,7 @@ def test_all_ways_to_ask_begin_at_the_same_count(ids: list[str], gaplab: Gaplab,
 def test_a_margin_is_given_once_and_is_above_0(ids: list[str], gaplab: Gaplab, sqlite_store: Store) -> None:
     with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
         twice, zero, no_direct = (
-            api.get("/comparisons", params={"experiment": ids, **margin})
+            api.get("/comparisons", params={"study": ids, **margin})
             for margin in ({"margin": 1, "margin_of_direct": 1}, {"margin": 0}, {"margin_of_direct": 0.03})
         )
 
@@ -237,4 +235,4 @@ def test_a_range_that_is_none_is_refused_in_words(ids: list[str], gaplab: Gaplab
     assert wrong.code == Exit.USAGE
     assert "'late' is no number of real-world evaluations" in wrong.err.replace("\n│ ", "")
     assert backwards.code == alone.code == Exit.INVALID
-    assert "at least 2 items" in alone.err
+    assert "this names one" in alone.err

@@ -22,13 +22,12 @@ from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.service import migrate, warn_of_readers
 from gaplab.services.core.errors import StoreChanged, StoreDamaged, StoreUnavailable
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import listing, submission
 from gaplab.services.running import execution, supervisors
 from gaplab.services.store import guard
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import url_of
-from tests.experiments import some_log, toy
+from tests.experiments import listed, some_log, submit_one, toy
 
 
 @pytest.fixture
@@ -41,14 +40,14 @@ def other(sqlite_template: Path, file: Path) -> Iterator[Path]:
     """Another database, with one experiment."""
     other = Path(shutil.copy(sqlite_template, file.with_suffix(".other")))
     store = Store(f"sqlite:///{other}")
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     store.dispose()
     yield other
     other.unlink(missing_ok=True)
 
 
 def count(store: Store) -> int:
-    return len(listing.list_experiments(store).items)
+    return len(listed(store))
 
 
 def readyz(store: Store) -> Any:
@@ -73,7 +72,7 @@ def test_a_file_that_replaces_the_database_is_opened_and_it_is_said(
 
     assert (before, count(sqlite_store)) == (0, 1)
     assert "was replaced by another file" in caplog.text
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
     assert count(sqlite_store) == 2
 
 
@@ -84,7 +83,7 @@ def test_a_replacement_that_is_damaged_is_not_written_to(sqlite_store: Store, fi
     other.replace(file)
 
     with pytest.raises(StoreDamaged, match="gaplab restore"):
-        submission.submit_experiment(sqlite_store, toy())
+        submit_one(sqlite_store, toy())
     told = readyz(sqlite_store)
     assert told.status_code == 503
     assert "gaplab restore" in told.json()["detail"]
@@ -110,7 +109,7 @@ def test_a_deleted_database_is_told_and_works_again_once_it_is_back(sqlite_store
 
     gone = readyz(sqlite_store)
     with pytest.raises(StoreUnavailable, match="is gone"):
-        submission.submit_experiment(sqlite_store, toy())
+        submit_one(sqlite_store, toy())
     made = file.exists()
     aside.rename(file)
 
@@ -133,14 +132,14 @@ def test_a_database_that_is_copied_over_in_place_is_read_as_it_is_now(
 def test_damage_is_told_and_nothing_more_is_written_until_the_file_is_whole(
     sqlite_store: Store, file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
     whole = damage(file)
     sqlite_store.dispose()  # pages in memory are still good
 
     with pytest.raises(StoreDamaged):
         count(sqlite_store)
     with pytest.raises(StoreDamaged):
-        submission.submit_experiment(sqlite_store, toy())
+        submit_one(sqlite_store, toy())
     told = readyz(sqlite_store)
     file.write_bytes(whole)
     still = readyz(sqlite_store)
@@ -162,7 +161,7 @@ def test_a_service_does_not_start_on_a_copy_that_lacks_its_journal(file: Path, s
 
 
 def test_a_claim_never_fits_the_work_of_another_database(sqlite_store: Store, file: Path, other: Path) -> None:
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
     (ours, *_) = execution.claim(sqlite_store, "us", 2)
     there = Store(f"sqlite:///{other}")
     (theirs, *_) = execution.claim(there, "them", 2)
@@ -197,7 +196,7 @@ def test_streams_of_events_end_when_the_database_goes_back(
     sqlite_store: Store, file: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     empty = file.read_bytes()
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
 
     async def follow() -> int:
         feed, found = EventFeed(sqlite_store, every_s=0.01), 0
@@ -265,7 +264,7 @@ def test_a_path_that_a_url_or_a_journal_would_change_is_refused(here: Path, path
 
 
 def test_a_write_that_failed_is_told_until_another_succeeds(sqlite_store: Store, file: Path) -> None:
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
     with closing(sqlite3.connect(file)) as connection:
         (pages,) = connection.execute("PRAGMA page_count").fetchone()
 

@@ -22,12 +22,11 @@ from gaplab.services import access
 from gaplab.services.bench import answering, taking
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.models import RequestRow
 from gaplab.services.store.queries.request_states import withdraw
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab, served
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 from tests.integration.test_bench import fall_silent, pending
 from tests.integration.test_bench_safety import ask, requests_of, submit
 from tests.waiting import wait_until
@@ -131,7 +130,7 @@ def test_a_driver_whose_experiment_is_cancelled_stops_its_robot_and_lets_the_ben
 ) -> None:
     id_ = submit(sqlite_store, "warn")
     ask(sqlite_store)
-    RUNS.append(until_stopped(lambda: lifecycle.ask_experiment(sqlite_store, id_, Verb.CANCEL)))
+    RUNS.append(until_stopped(lambda: lifecycle.ask(sqlite_store, id_, Verb.CANCEL)))
 
     driven = gaplab("drive", id_, "--driver", driver, "--limit-s", "60", "--lease-s", "1")
 
@@ -181,7 +180,7 @@ def test_a_driver_goes_on_after_a_request_that_is_not_wanted_any_more(
     sqlite_store: Store, gaplab: Gaplab, driver: str
 ) -> None:
     reality = {"kind": "physical", "probes": "each"}
-    id_ = submit_experiment(sqlite_store, toy(robot="quadruped", engine="mujoco", repetitions=2, reality=reality)).id
+    id_ = submit_one(sqlite_store, toy(robot="quadruped", engine="mujoco", repetitions=2, reality=reality)).id
     ask(sqlite_store)
     ask(sqlite_store)
     first, second = pending(sqlite_store)

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from gaplab.services.experiments.reading import read_experiment
-from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.experiments.reading import read, read_experiment
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.reports.content import verdict_on
@@ -13,6 +12,7 @@ from gaplab.services.results.misfit import misfit
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
+from tests.experiments import submit_one
 from tests.integration.test_bench import bench, finish, truth
 
 GENES = (0.2, 0.7, 0.4, 0.9)
@@ -22,7 +22,7 @@ def ended(store: Store, genes: tuple[float, ...] = GENES, **changes: Any) -> str
     """The id of an experiment that knows the fitness of these genes from before, and has ended."""
     real = truth(bench())
     known = [{"genome": [gene], "values": [real([gene])]} for gene in genes]
-    experiment = submit_experiment(store, bench(**{"held_out": 0.25, "reality": {"samples": known}} | changes))
+    experiment = submit_one(store, bench(**{"held_out": 0.25, "reality": {"samples": known}} | changes))
     finish(store, real)
     return experiment.id
 
@@ -44,7 +44,7 @@ def test_every_count_of_evaluations_says_how_many_samples_were_there_before(
     assert "at 2 (and 4 from before)" in said["show"]
     assert "at 2 real-world evaluations (and 4 from before) the best simulators err by" in said["show"]
     assert "after (and 4 from before)" in said["curve"]
-    found = verdict_on(sqlite_store, read_experiment(sqlite_store, id_)).sentences
+    found = verdict_on(sqlite_store, read(sqlite_store, id_)).sentences
     assert found[0].startswith("After 2\N{NO-BREAK SPACE}real-world evaluations (and 4 from before), the mean of")
     assert "from before" not in gaplab("show", without).out
 
@@ -53,7 +53,7 @@ def test_an_experiment_on_earlier_samples_alone_has_a_verdict_and_steps_that_sho
     id_ = ended(sqlite_store, iterations=0)
 
     (toy,) = toy_iterations(sqlite_store, id_, 0, ())
-    headline = verdict_on(sqlite_store, read_experiment(sqlite_store, id_)).headline
+    headline = verdict_on(sqlite_store, read(sqlite_store, id_)).headline
 
     assert [(each.iteration, each.gene) for each in toy.samples] == [(0, gene) for gene in GENES]
     assert toy.error is not None

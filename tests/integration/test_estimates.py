@@ -19,7 +19,7 @@ from gaplab.services.running.execution import claim
 from gaplab.services.settings import Limits, Settings
 from gaplab.services.store.models import RepetitionRow, SupervisorRow
 from gaplab.services.store.session import Store
-from tests.experiments import run, some_log, toy
+from tests.experiments import listed, run, some_log, submit_one, toy
 
 STUDY = {
     "robot": "toy_function",
@@ -37,7 +37,7 @@ def test_the_rollouts_are_those_that_the_submitted_study_has(store: Store) -> No
     found = estimate(store, spec)
 
     assert listing.list_studies(store).items == ()
-    study = submission.submit_study(store, spec)
+    study = submission.submit(store, spec)
     assert found.rollouts == study.progress.rollouts
     assert [each.rollouts for each in found.experiments] == [each.progress.rollouts for each in study.experiments]
     assert [each.repetitions for each in found.experiments] == [4, 4, 9]
@@ -47,7 +47,7 @@ def test_the_rollouts_are_those_that_the_submitted_study_has(store: Store) -> No
 def test_the_time_is_that_of_rollouts_measured_here_with_the_same_robot_and_engine(store: Store) -> None:
     spec = StudySpec.model_validate(STUDY)
     before = estimate(store, spec, cores=2)
-    made = submission.submit_experiment(store, toy(repetitions=1))
+    made = submit_one(store, toy(repetitions=1))
     (one,) = claim(store, "me", 1)
     run(store, one)
     with store.transaction() as session:
@@ -83,7 +83,7 @@ def test_what_the_direct_baseline_took_is_a_measurement_of_the_engine_of_reality
     spec = StudySpec.model_validate(
         {"strategies": ["direct"], "engine": "mujoco", "reality": {"engine": "pybullet"}, "budget": "smoke"}
     )
-    submission.submit_study(sqlite_store, spec)
+    submission.submit(sqlite_store, spec)
     claim(sqlite_store, "me", 1)
     with sqlite_store.transaction() as session:
         session.execute(update(RepetitionRow).values(seconds=30.0, rollouts_done=600))
@@ -136,21 +136,21 @@ def test_cores_are_the_workers_that_the_service_was_given(sqlite_store: Store) -
 
 
 def test_the_best_fitness_of_an_experiment_is_the_mean_of_its_repetitions_best(store: Store) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=2))
+    made = submit_one(store, toy(repetitions=2))
     assert reading.read_experiment(store, made.id).best_fitness is None
 
     for recorded in (1.0, 2.0):
         (one,) = claim(store, "me", 1)
         run(store, one, some_log(recorded=recorded))
 
-    (listed,) = listing.list_experiments(store).items
-    assert listed.best_fitness == reading.read_experiment(store, made.id).best_fitness
-    assert listed.best_fitness == pytest.approx((3.0 + 4.0) / 2)
+    (shown,) = listed(store)
+    assert shown.best_fitness == reading.read_experiment(store, made.id).best_fitness
+    assert shown.best_fitness == pytest.approx((3.0 + 4.0) / 2)
 
 
 @pytest.mark.dialects
 def test_a_best_fitness_of_nothing_has_no_sign_whichever_zero_a_database_takes_for_the_greater(store: Store) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=1))
+    made = submit_one(store, toy(repetitions=1))
     (one,) = claim(store, "me", 1)
 
     run(store, one, (replace(step, recorded=-0.0) if isinstance(step, Probed) else step for step in some_log()))

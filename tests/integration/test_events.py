@@ -50,9 +50,9 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import EventCounterRow, EventRow
 from gaplab.services.store.queries.events import note, write
-from gaplab.services.store.queries.experiments import insert_experiment
+from gaplab.services.store.queries.experiments import insert_study
 from gaplab.services.store.session import Store
-from tests.experiments import cancel, run, some_log, toy
+from tests.experiments import cancel, run, some_log, submit_one, toy
 from tests.integration import test_bench_safety
 from tests.integration.test_bench import bench, compute, fall_silent, measure
 from tests.waiting import wait_until
@@ -71,7 +71,7 @@ def kinds(store: Store, which: WantedEvents | None = None) -> list[str]:
 
 @pytest.mark.dialects
 def test_the_life_of_an_experiment_is_told_step_by_step(store: Store) -> None:
-    id_ = submission.submit_experiment(store, toy(repetitions=1, iterations=1)).id
+    id_ = submit_one(store, toy(repetitions=1, iterations=1)).id
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(1))
 
@@ -95,10 +95,10 @@ def test_the_life_of_an_experiment_is_told_step_by_step(store: Store) -> None:
 
 
 def everything_that_can_happen(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim)
-    submission.submit_experiment(store, toy(repetitions=2))
+    submit_one(store, toy(repetitions=2))
     fails, waits = execution.claim(store, "me", 2)
     execution.record(store, waits, next(some_log()))
     execution.fail(store, fails, Failure("it is broken"))
@@ -108,14 +108,14 @@ def everything_that_can_happen(store: Store) -> None:
     for _ in range(MAX_LOSSES):
         (waits,) = execution.claim(store, "me", 1)
         execution.release(store, waits, "killed")
-    cancelled = submission.submit_experiment(store, toy())
+    cancelled = submit_one(store, toy())
     execution.claim(store, "me", 1)
     cancel(store, cancelled.id)
     all_verbs(store)
     check = sensitivity.claim(store, "me")
     assert check is not None
     sensitivity.fail(store, check, "no legs")
-    lifecycle.ask_experiment(store, waits.experiment_id, Verb.RETRY)
+    lifecycle.ask(store, waits.experiment_id, Verb.RETRY)
     kept_and_told_of(store)
     on_a_bench(store)
 
@@ -123,7 +123,7 @@ def everything_that_can_happen(store: Store) -> None:
 def on_a_bench(store: Store) -> None:
     """Takes that end without an answer, answers in conflict, a correction, a void, and a refusal."""
     reality = {"kind": "physical", "probes": "never"}
-    submission.submit_experiment(store, toy(strategy="random", repetitions=1, priority=10, reality=reality))
+    submit_one(store, toy(strategy="random", repetitions=1, priority=10, reality=reality))
     compute(store, most=1)
     (request,) = taking.list_requests(store, RequestFilter()).items
     for _ in range(2):
@@ -145,33 +145,33 @@ def on_a_bench(store: Store) -> None:
 
 def kept_and_told_of(store: Store) -> None:
     outbox.collect(store, "me", [Channel.COMMAND])
-    ended = cancel(store, submission.submit_experiment(store, toy()).id).id
+    ended = cancel(store, submit_one(store, toy()).id).id
     outbox.collect(store, "me", [Channel.COMMAND])
     letter = outbox.next_letter(store)
     assert letter is not None
     outbox.settle(store, letter, "no answer")
     outbox.settle(store, replace(letter, attempt=2), None)
-    editing.edit_experiment(store, ended, Edit(tags=("gait",)), starting_from=None)
-    archiving.archive_experiment(store, ended)
-    archiving.archive_experiment(store, ended, archived=False)
-    deletion.delete_experiment(store, ended, Deleter(None))
+    editing.edit(store, ended, Edit(tags=("gait",)), starting_from=None)
+    archiving.archive(store, ended)
+    archiving.archive(store, ended, archived=False)
+    deletion.delete(store, ended, Deleter(None))
 
 
 def all_verbs(store: Store) -> None:
     """An experiment paused, resumed, stopped, extended; and another, imported."""
-    asked = submission.submit_experiment(store, toy(repetitions=1)).id
+    asked = submit_one(store, toy(repetitions=1)).id
     steps = some_log()
     for verb in (Verb.PAUSE, Verb.STOP):
         (claim,) = execution.claim(store, "me", 1)
-        lifecycle.ask_experiment(store, asked, verb)
+        lifecycle.ask(store, asked, verb)
         while execution.record(store, claim, next(steps)):
             continue
         if verb is Verb.PAUSE:
-            lifecycle.ask_experiment(store, asked, Verb.RESUME)
-    whole = submission.submit_experiment(store, toy(repetitions=1)).id
+            lifecycle.ask(store, asked, Verb.RESUME)
+    whole = submit_one(store, toy(repetitions=1)).id
     run(store, *execution.claim(store, "me", 1))  # type: ignore[arg-type]
-    extension.extend_experiment(store, whole, ExtensionSpec(repetitions=2))
-    with archives.export_experiment(store, asked).file as file:
+    extension.extend(store, whole, ExtensionSpec(repetitions=2))
+    with archives.export(store, asked).file as file:
         archives.import_archive(store, file)
 
 
@@ -191,34 +191,34 @@ def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store: Stor
 
 
 def test_an_experiment_submitted_after_its_check_is_told_of_it_at_once(store: Store) -> None:
-    before = submission.submit_experiment(store, toy()).id
+    before = submit_one(store, toy()).id
     check = sensitivity.claim(store, "me")
     sensitivity.complete(store, check, [])
 
-    later = submission.submit_experiment(store, toy()).id
+    later = submit_one(store, toy()).id
 
     for each in (before, later):
-        assert kinds(store, WantedEvents(experiment=each)) == ["submitted", "sensitivity_ended"]
+        assert kinds(store, WantedEvents(study=each)) == ["submitted", "sensitivity_ended"]
 
 
 @pytest.mark.dialects
 def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     check, spec = sensitivity.claim(store, "me"), resolve_experiment(toy())
 
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
-            row = insert_experiment(session, spec, submission.extent_of(spec))
+            (row,) = insert_study(session, "late", [(spec, submission.extent_of(spec))]).experiments
             queue_for(session, [row])
             ending = pool.submit(sensitivity.complete, store, check, [])
             time.sleep(0.3)  # it waits for what is locked here
         assert ending.result(timeout=30)
 
-    assert kinds(store, WantedEvents(experiment=row.id)) == ["submitted", "sensitivity_ended"]
+    assert kinds(store, WantedEvents(study=row.id)) == ["submitted", "sensitivity_ended"]
 
 
 def test_a_step_that_is_delivered_twice_is_told_once(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
 
     for step in some_log():
@@ -230,7 +230,7 @@ def test_a_step_that_is_delivered_twice_is_told_once(store: Store) -> None:
 
 @pytest.mark.dialects
 def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
 
     def fail(session: Any) -> None:
         note(session, EventKind.CANCELLED, "nobody")
@@ -239,7 +239,7 @@ def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store: Store) -> 
 
     with pytest.raises(ZeroDivisionError):
         store.write(fail)
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
 
     assert [(each.number, each.kind.value) for each in told(store)] == [(1, "submitted"), (2, "submitted")]
 
@@ -321,7 +321,7 @@ def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_othe
 ) -> None:
     store = postgres_store
     for _ in range(3):
-        submission.submit_experiment(store, toy(repetitions=5))
+        submit_one(store, toy(repetitions=5))
 
     def work(owner: str) -> int:
         done = 0
@@ -366,7 +366,7 @@ def take(stream: Iterator[EventRead], many: int) -> list[EventRead]:
 
 
 def test_a_stream_has_what_was_and_what_comes(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submit_one(store, toy(repetitions=1))
     with served(store) as (url, feed), Client(url) as client:
         stream = client.events()
         first = take(stream, 1)
@@ -383,13 +383,13 @@ def test_a_stream_has_what_was_and_what_comes(store: Store) -> None:
 
 
 def test_streams_are_filtered(sqlite_store: Store) -> None:
-    wanted, other = (submission.submit_experiment(sqlite_store, toy(repetitions=1)).id for _ in range(2))
+    wanted, other = (submit_one(sqlite_store, toy(repetitions=1)).id for _ in range(2))
     for claim in execution.claim(sqlite_store, "me", 2):
         run(sqlite_store, claim)
     with served(sqlite_store) as (url, _), Client(url) as client:
-        of_one = take(client.events(experiment=wanted, kind=["probed", "completed"]), 4)
-        with pytest.raises(ServiceError, match="there is no experiment 'nobody'"):
-            next(client.events(experiment="nobody"))
+        of_one = take(client.events(study=wanted, kind=["probed", "completed"]), 4)
+        with pytest.raises(ServiceError, match="there is no study or experiment 'nobody'"):
+            next(client.events(study="nobody"))
         with pytest.raises(ServiceError, match="kind"):
             next(client.events(kind=["nonsense"]))
 
@@ -399,7 +399,7 @@ def test_streams_are_filtered(sqlite_store: Store) -> None:
 
 def test_a_stream_resumes_after_the_last_event_that_the_header_names(sqlite_store: Store) -> None:
     for _ in range(5):
-        submission.submit_experiment(sqlite_store, toy())
+        submit_one(sqlite_store, toy())
     with served(sqlite_store) as (url, _), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
         with http.stream("GET", "/events?after=1", headers={"Last-Event-ID": "3"}) as answer:
             lines = answer.iter_lines()
@@ -417,7 +417,7 @@ def test_a_stream_that_fell_behind_catches_up_from_the_database(sqlite_store: St
     many = 2 * feeding.PAGE
     with served(sqlite_store) as (url, feed), Client(url) as client:
         feed._recent = type(feed._recent)(maxlen=2)
-        id = submission.submit_experiment(sqlite_store, toy()).id
+        id = submit_one(sqlite_store, toy()).id
         stream = client.events()
         first = take(stream, 1)
         with sqlite_store.transaction() as session:
@@ -440,7 +440,7 @@ def test_all_streams_together_ask_the_database_once_a_look(
 
     monkeypatch.setattr(events, "page", counted)
     with served(sqlite_store) as (url, feed), Client(url) as client:
-        submission.submit_experiment(sqlite_store, toy())
+        submit_one(sqlite_store, toy())
         streams = [client.events() for _ in range(8)]
         for each in streams:
             take(each, 1)
@@ -448,7 +448,7 @@ def test_all_streams_together_ask_the_database_once_a_look(
         before, began = next(asked), time.monotonic()
         time.sleep(1.0)
         looks, seconds = next(asked) - before, time.monotonic() - began
-        submission.submit_experiment(sqlite_store, toy())
+        submit_one(sqlite_store, toy())
         second = [take(each, 1)[0].number for each in streams]
 
     assert looks <= seconds / feeding.POLL_S + 2  # eight streams that each ask would be eight times as many
@@ -458,7 +458,7 @@ def test_all_streams_together_ask_the_database_once_a_look(
 def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
     page, failing = events.page, [False]
 
     def fail_once(*asked: object, **named: object) -> EventPage:
@@ -488,7 +488,7 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(
 def test_a_stream_whose_reader_failed_is_resumed_by_the_client(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
     latest, failing = events.latest, iter([True])
 
     def fail_once(store: Store) -> int:
@@ -536,12 +536,12 @@ def test_a_service_that_stops_ends_its_streams(sqlite_store: Store) -> None:
 
 
 def test_a_client_goes_on_where_it_was_when_the_service_comes_back(sqlite_store: Store) -> None:
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
     with served(sqlite_store) as (url, _):
         client = Client(url)
         stream = client.events(retry_s=0.05)
         found = take(stream, 1)
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
 
     with ThreadPoolExecutor(1) as pool:
         second = pool.submit(take, stream, 1)  # nothing answers yet
@@ -554,7 +554,7 @@ def test_a_client_goes_on_where_it_was_when_the_service_comes_back(sqlite_store:
 
 
 def test_events_can_be_polled_page_by_page(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submit_one(store, toy(repetitions=1))
     run(store, *execution.claim(store, "me", 1))  # type: ignore[arg-type]
     with TestClient(create_app(store)) as api:
         pages, after = [], 0
@@ -567,7 +567,7 @@ def test_events_can_be_polled_page_by_page(store: Store) -> None:
 
 
 def test_a_poll_may_wait_for_what_comes(sqlite_store: Store) -> None:
-    id_ = submission.submit_experiment(sqlite_store, toy()).id
+    id_ = submit_one(sqlite_store, toy()).id
     with served(sqlite_store) as (url, feed), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
         asked = {"after": 1, "kind": "cancelled", "wait_s": 60}
         with ThreadPoolExecutor(1) as pool:
@@ -583,7 +583,7 @@ def test_a_poll_may_wait_for_what_comes(sqlite_store: Store) -> None:
 
 
 def test_who_waits_for_a_request_looks_at_the_database_when_something_happened(sqlite_store: Store) -> None:
-    id_ = submission.submit_experiment(sqlite_store, bench()).id
+    id_ = submit_one(sqlite_store, bench()).id
     with (
         served(sqlite_store) as (url, feed),
         httpx2.Client(base_url=url, timeout=DEADLINE_S) as http,
@@ -606,10 +606,10 @@ def test_who_waits_for_a_request_looks_at_the_database_when_something_happened(s
 def test_events_of_a_study_are_those_of_its_experiments(sqlite_store: Store) -> None:
     from gaplab.schemas.spec import StudySpec
 
-    study = submission.submit_study(
+    study = submission.submit(
         sqlite_store, StudySpec.model_validate({"robot": "toy_function", "budget": "smoke", "strategies": ["random"]})
     )
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
 
     found = told(sqlite_store, WantedEvents(study=study.id))
 
@@ -628,7 +628,7 @@ def rechecked(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("rechecked")
 def test_a_stream_ends_when_its_token_is_revoked_and_those_of_others_go_on(store: Store) -> None:
     revoked, valid = (access.create_token(store, Role.READER) for _ in range(2))
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     with served(store) as (url, feed), Client(url, token=valid.secret) as other:
         kept = other.events()
         take(kept, 1)
@@ -641,7 +641,7 @@ def test_a_stream_ends_when_its_token_is_revoked_and_those_of_others_go_on(store
             with pytest.raises(ServiceError, match="this token is not valid"):
                 next(client.events())
         wait_until(lambda: feed.open == 1)
-        submission.submit_experiment(store, toy())
+        submit_one(store, toy())
         assert take(kept, 1)[0].number == 2
 
 
@@ -719,7 +719,7 @@ def test_a_write_under_way_is_answered_by_its_result_also_when_its_token_is_revo
 
 
 def test_a_number_beyond_the_latest_event_is_refused_with_both(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     with TestClient(create_app(store)) as api:
         answers = [
             api.get("/events", headers={"Last-Event-ID": "2"}),
@@ -734,7 +734,7 @@ def test_a_number_beyond_the_latest_event_is_refused_with_both(store: Store) -> 
 @pytest.mark.dialects
 def test_streams_end_when_the_database_is_replaced_by_an_earlier_one(store: Store) -> None:
     for _ in range(3):
-        submission.submit_experiment(store, toy())
+        submit_one(store, toy())
     with served(store) as (url, _), Client(url) as client:
         stream = client.events()
         take(stream, 3)

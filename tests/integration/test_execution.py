@@ -12,19 +12,19 @@ from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Cost
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import checks, listing, reading, submission
+from gaplab.services.experiments import checks, reading
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from gaplab.services.store.texts import LONGEST_REASON
-from tests.experiments import cancel, run, same, some_log, toy
+from tests.experiments import cancel, listed, run, same, some_log, submit_one, toy
 
 
 @pytest.mark.dialects
 def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(reality={"parameters": {"static_friction": 0.9}}))
+    submitted = submit_one(store, toy(reality={"parameters": {"static_friction": 0.9}}))
 
     (claim,) = execution.claim(store, "me", 1)
 
@@ -34,8 +34,8 @@ def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store: Store) -> None
 
 
 def test_the_first_claim_starts_the_experiment(store: Store) -> None:
-    started = submission.submit_experiment(store, toy())
-    waiting = submission.submit_experiment(store, toy())
+    started = submit_one(store, toy())
+    waiting = submit_one(store, toy())
 
     execution.claim(store, "me", 1)
 
@@ -47,7 +47,7 @@ def test_the_first_claim_starts_the_experiment(store: Store) -> None:
 @pytest.mark.dialects
 def test_claims_of_many_owners_never_overlap(store: Store) -> None:
     for _ in range(3):
-        submission.submit_experiment(store, toy(repetitions=20))
+        submit_one(store, toy(repetitions=20))
 
     def claim_all(owner: Any) -> Any:
         claimed = []
@@ -63,7 +63,7 @@ def test_claims_of_many_owners_never_overlap(store: Store) -> None:
 
 @pytest.mark.dialects
 def test_the_log_that_is_read_is_the_log_that_was_written(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     for count, step in enumerate(some_log()):
         assert execution.record(store, claim, step)
@@ -75,7 +75,7 @@ def test_the_log_that_is_read_is_the_log_that_was_written(store: Store) -> None:
 
 
 def test_a_step_that_is_delivered_twice_is_stored_once(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy())
+    submitted = submit_one(store, toy())
     (claim,) = execution.claim(store, "me", 1)
 
     for step in some_log():
@@ -90,7 +90,7 @@ def test_a_step_that_is_delivered_twice_is_stored_once(store: Store) -> None:
 
 
 def test_a_step_that_would_leave_a_hole_is_refused(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     first, _, third, *_ = some_log()
     execution.record(store, claim, first)
@@ -112,7 +112,7 @@ def by_experiment(claims: Any, *ids: Any) -> Any:
 
 @pytest.mark.dialects
 def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_be(store: Store) -> None:
-    one_by_one, together = (submission.submit_experiment(store, toy()).id for _ in range(2))
+    one_by_one, together = (submit_one(store, toy()).id for _ in range(2))
     claims = by_experiment(execution.claim(store, "me", 6), one_by_one, together)
     ends = (13, 7, 2)
 
@@ -135,7 +135,7 @@ def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_b
 
 
 def test_of_many_deliveries_only_those_whose_claim_holds_are_written(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     lost, *held = execution.claim(store, "me", 3)
     execution.release(store, lost, "killed")
 
@@ -147,7 +147,7 @@ def test_of_many_deliveries_only_those_whose_claim_holds_are_written(store: Stor
 
 
 def test_a_hole_in_one_of_many_deliveries_refuses_them_all(store: Store) -> None:
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     whole, holed, _ = execution.claim(store, "me", 3)
     first, _, third = tuple(some_log())[:3]
 
@@ -159,7 +159,7 @@ def test_a_hole_in_one_of_many_deliveries_refuses_them_all(store: Store) -> None
 
 
 def test_a_holder_who_wakes_up_late_cannot_write(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=1))
+    submitted = submit_one(store, toy(repetitions=1))
     (late,) = execution.claim(store, "late", 1)
     assert execution.requeue_lost(store, stale_after_s=-1) == 1
     (present,) = execution.claim(store, "present", 1)
@@ -181,7 +181,7 @@ def test_a_holder_who_wakes_up_late_cannot_write(store: Store) -> None:
 
 
 def test_a_heartbeat_keeps_a_claim(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=2))
+    submit_one(store, toy(repetitions=2))
     claims = execution.claim(store, "me", 2)
 
     held = execution.heartbeat(store, claims)
@@ -193,7 +193,7 @@ def test_a_heartbeat_keeps_a_claim(store: Store) -> None:
 
 @pytest.mark.dialects
 def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=1))
+    submitted = submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "killed", 1)
     first, *_ = some_log()
     execution.record(store, claim, first)
@@ -209,7 +209,7 @@ def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(sto
 
 
 def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=1))
+    submitted = submit_one(store, toy(repetitions=1))
 
     for _ in range(MAX_LOSSES):
         (claim,) = execution.claim(store, "me", 1)
@@ -225,7 +225,7 @@ def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store: Store) 
 
 
 def test_a_repetition_that_gets_on_may_be_lost_any_number_of_times(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submit_one(store, toy(repetitions=1))
 
     for step in some_log():
         (claim,) = execution.claim(store, "me", 1)
@@ -237,7 +237,7 @@ def test_a_repetition_that_gets_on_may_be_lost_any_number_of_times(store: Store)
 
 
 def test_a_repetition_may_be_handed_back_any_number_of_times(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(repetitions=1)).id
+    experiment = submit_one(store, toy(repetitions=1)).id
 
     for _ in range(MAX_LOSSES + 1):
         (claim,) = execution.claim(store, "me", 1)
@@ -251,7 +251,7 @@ def test_a_repetition_may_be_handed_back_any_number_of_times(store: Store) -> No
 
 
 def test_the_experiment_is_completed_with_its_last_repetition(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=3))
+    submitted = submit_one(store, toy(repetitions=3))
     claims = execution.claim(store, "me", 3)
     states = []
 
@@ -268,7 +268,7 @@ def test_the_experiment_is_completed_with_its_last_repetition(store: Store) -> N
 
 
 def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason_once(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=3))
+    submitted = submit_one(store, toy(repetitions=3))
 
     for claim, reason in zip(execution.claim(store, "me", 3), ("zero division", "a key", "zero division"), strict=True):
         assert execution.fail(store, claim, Failure(reason))
@@ -280,7 +280,7 @@ def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason
 
 def test_a_long_reason_is_stored_and_shown_as_its_beginning(store: Store) -> None:
     long = "unstable: " + "x" * 5_000_000
-    id_ = submission.submit_experiment(store, toy(repetitions=3)).id
+    id_ = submit_one(store, toy(repetitions=3)).id
     fails, lost, short = execution.claim(store, "me", 3)
     check = sensitivity.claim(store, "me")
     assert check is not None
@@ -307,7 +307,7 @@ def test_a_long_reason_is_stored_and_shown_as_its_beginning(store: Store) -> Non
 
 @pytest.mark.dialects
 def test_repetitions_that_end_at_once_end_their_experiment(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=8))
+    submitted = submit_one(store, toy(repetitions=8))
     claims = execution.claim(store, "me", 8)
     for claim in claims:
         for step in some_log():
@@ -321,7 +321,7 @@ def test_repetitions_that_end_at_once_end_their_experiment(store: Store) -> None
 
 
 def test_a_repetition_with_iterations_missing_is_not_completed(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=1))
+    submitted = submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     for step in some_log(iterations=1):
         execution.record(store, claim, step)
@@ -333,7 +333,7 @@ def test_a_repetition_with_iterations_missing_is_not_completed(store: Store) -> 
 
 
 def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_is_stored(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy())
+    submitted = submit_one(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     first, second, *_ = some_log()
     execution.record(store, claim, first)
@@ -351,7 +351,7 @@ def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_i
 
 @pytest.mark.dialects
 def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(store: Store) -> None:
-    ids = [submission.submit_experiment(store, toy(repetitions=1)).id for _ in range(10)]
+    ids = [submit_one(store, toy(repetitions=1)).id for _ in range(10)]
     claims = execution.claim(store, "me", 10)
 
     def called_off(experiment: str) -> str:
@@ -371,7 +371,7 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
 
 @pytest.mark.dialects
 def test_progress_counts_what_the_steps_took(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy())
+    submitted = submit_one(store, toy())
     waiting = submitted.progress
     first, second, _ = execution.claim(store, "me", 3)
     run(store, first)
@@ -390,7 +390,7 @@ def test_progress_counts_what_the_steps_took(store: Store) -> None:
 
 
 def test_nothing_is_left_to_do_at_the_end(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(repetitions=1))
+    submitted = submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
 
     run(store, claim)
@@ -400,10 +400,10 @@ def test_nothing_is_left_to_do_at_the_end(store: Store) -> None:
 
 def test_the_budgeted_rollouts_are_those_that_a_repetition_takes_or_saves(store: Store) -> None:
     for strategy in ("simulated_fit_and_informative", "known_fit", "direct"):
-        submission.submit_experiment(store, toy(strategy=strategy, repetitions=1))
+        submit_one(store, toy(strategy=strategy, repetitions=1))
     for claim in execution.claim(store, "me", 3):
         run(store, claim, repetition(setting(claim.spec, claim.number)))
 
-    found = [each.progress for each in listing.list_experiments(store).items]
+    found = [each.progress for each in listed(store)]
 
     assert [each.rollouts_done + each.rollouts_saved for each in found] == [each.rollouts for each in found]

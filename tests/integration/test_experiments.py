@@ -18,7 +18,7 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
-from tests.experiments import AWKWARD, cancel, run, some_log, toy
+from tests.experiments import AWKWARD, cancel, listed, run, some_log, submit_one, toy
 
 SECRET = 0.987654321
 
@@ -42,46 +42,61 @@ def every_page(list_page: Any, **filters: Any) -> Any:
 
 
 def test_a_submitted_experiment_is_stored_resolved_and_queued(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy(name="mine"))
+    submitted = submit_one(store, toy(name="mine"))
 
     found = reading.read_experiment(store, submitted.id)
 
     resolved = resolve_experiment(toy(name="mine"))
     assert found == submitted
-    assert (found.name, found.strategy, found.state, found.study) == ("mine", "simulated_fit", State.QUEUED, None)
+    assert (found.name, found.strategy, found.state, found.study) == ("mine", "simulated_fit", State.QUEUED, found.id)
     assert found.spec["budget"] == resolved.budget.model_dump(mode="json")
     assert found.created_at.tzinfo is UTC
     assert (found.progress.repetitions, found.progress.iterations) == (3, 9)
     assert found.progress.rollouts == 3 * expected_rollouts(resolved)
 
 
-def test_an_experiment_without_a_name_has_that_of_its_strategy(store: Store) -> None:
-    submitted = submission.submit_experiment(store, toy())
+def test_an_experiment_without_a_name_has_that_of_its_strategy_and_so_has_its_study(store: Store) -> None:
+    study = submission.submit(store, toy())
 
-    assert submitted.name == "simulated_fit"
+    (alone,) = study.experiments
+    assert (study.id, study.name) == (alone.id, alone.name) == (alone.study, "simulated_fit")
+
+
+def test_an_id_is_that_of_a_study_or_of_one_of_its_experiments_which_alone_is_then_meant(store: Store) -> None:
+    study = submission.submit(store, small_study(strategies=["random", "simulated_fit"], name="both"))
+    first, second = study.experiments
+
+    cancelled = cancel(store, first.id)
+    one, both = reading.read(store, first.id), reading.read(store, study.id)
+
+    assert (one.id, one.name, one.state, one.experiments) == (first.id, "random", State.CANCELLED, (cancelled,))
+    assert one.progress == cancelled.progress
+    assert (both.id, both.name, both.experiments) == (study.id, "both", (cancelled, second))
+    with pytest.raises(NotFound, match=rf"this needs an experiment: {first.id} \(random\), {second.id}"):
+        reading.read_experiment(store, study.id)
 
 
 @pytest.mark.dialects
 def test_a_name_may_have_any_character(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(name="nul\0 ü 漢 🤖"))
-    study = submission.submit_study(store, small_study(name="'\0'"))
+    experiment = submit_one(store, toy(name="nul\0 ü 漢 🤖"))
+    study = submission.submit(store, small_study(name="'\0'"))
 
     assert reading.read_experiment(store, experiment.id).name == "nul\ufffd ü 漢 🤖"
-    assert reading.read_study(store, study.id).name == "'\ufffd'"
+    assert reading.read(store, study.id).name == "'\ufffd'"
 
 
 def test_an_invalid_spec_stores_nothing(store: Store) -> None:
     with pytest.raises(InvalidSpec):
-        submission.submit_study(store, small_study(strategies=["random", "no_such"]))
+        submission.submit(store, small_study(strategies=["random", "no_such"]))
 
     assert listing.list_studies(store).items == ()
-    assert listing.list_experiments(store).items == ()
+    assert listed(store) == []
 
 
 def test_a_study_has_an_experiment_for_each_strategy_in_its_order(store: Store) -> None:
-    submitted = submission.submit_study(store, small_study(name="all", direct_repetitions=4))
+    submitted = submission.submit(store, small_study(name="all", direct_repetitions=4))
 
-    found = reading.read_study(store, submitted.id)
+    found = reading.read(store, submitted.id)
 
     assert found == submitted
     assert (found.name, found.state) == ("all", State.QUEUED)
@@ -93,15 +108,15 @@ def test_a_study_has_an_experiment_for_each_strategy_in_its_order(store: Store) 
 
 
 def test_the_state_of_a_study_is_that_of_its_experiments_together(store: Store) -> None:
-    study = submission.submit_study(store, small_study(strategies=["simulated_fit", "direct"])).id
+    study = submission.submit(store, small_study(strategies=["simulated_fit", "direct"])).id
     states = []
 
     (first,) = execution.claim(store, "me", 1)
-    states.append(reading.read_study(store, study).state)
+    states.append(reading.read(store, study).state)
     execution.fail(store, first, Failure("x"))
-    states.append(reading.read_study(store, study).state)
+    states.append(reading.read(store, study).state)
     finish_all(store)
-    states.append(reading.read_study(store, study).state)
+    states.append(reading.read(store, study).state)
 
     assert states == [State.RUNNING, State.RUNNING, State.COMPLETED]
 
@@ -110,7 +125,7 @@ def test_the_state_of_a_study_is_that_of_its_experiments_together(store: Store) 
 def test_an_unknown_id_is_not_found_and_the_message_names_it(store: Store) -> None:
     results: tuple[Any, ...] = (reading.list_repetitions, reading.list_samples, reading.list_simulators)
     for name in ("no-such", "", "nul\0", "ü" * 1000, "'; DROP TABLE study; --"):
-        for look in (reading.read_experiment, cancel, reading.read_study, *results):
+        for look in (reading.read_experiment, cancel, reading.read, *results):
             with pytest.raises(NotFound) as caught:
                 look(store, name)
 
@@ -118,22 +133,19 @@ def test_an_unknown_id_is_not_found_and_the_message_names_it(store: Store) -> No
 
 
 @pytest.mark.dialects
-def test_pages_have_every_experiment_once_newest_first_whatever_is_submitted_meanwhile(store: Store) -> None:
-    study = submission.submit_study(store, small_study())
-    alone = submission.submit_experiment(store, toy())
+def test_pages_have_every_study_once_newest_first_whatever_is_submitted_meanwhile(store: Store) -> None:
+    made = [submission.submit(store, small_study(strategies=["random"])).id for _ in range(4)]
 
-    first = listing.list_experiments(store, limit=3)
-    submission.submit_experiment(store, toy())
-    second = listing.list_experiments(store, limit=3, cursor=first.next)
-    third = listing.list_experiments(store, limit=3, cursor=second.next)
+    first = listing.list_studies(store, limit=2)
+    submit_one(store, toy())
+    second = listing.list_studies(store, limit=2, cursor=first.next)
 
-    listed = [each.id for page in (first, second, third) for each in page.items]
-    assert listed == [alone.id, *(each.id for each in reversed(study.experiments))]
-    assert third.next is None
+    assert [each.id for page in (first, second) for each in page.items] == made[::-1]
+    assert second.next is None
 
 
 def test_pages_of_studies_have_every_study_once_newest_first(store: Store) -> None:
-    submitted = [submission.submit_study(store, small_study(name=str(number))) for number in range(5)]
+    submitted = [submission.submit(store, small_study(name=str(number))) for number in range(5)]
 
     found, pages = every_page(lambda **page: listing.list_studies(store, limit=2, **page))
 
@@ -141,19 +153,18 @@ def test_pages_of_studies_have_every_study_once_newest_first(store: Store) -> No
     assert pages == 3
 
 
-def test_a_list_is_filtered_by_study_state_and_strategy(store: Store) -> None:
-    study = submission.submit_study(store, small_study())
-    alone = submission.submit_experiment(store, toy())
+def test_a_list_is_filtered_by_state_and_strategy(store: Store) -> None:
+    study = submission.submit(store, small_study())
+    alone = submit_one(store, toy())
     cancel(store, alone.id)
 
     def found(**filters: Any) -> Any:
-        return {each.id for each in listing.list_experiments(store, ListFilter(**filters)).items}
+        return {each.id for each in listing.list_studies(store, ListFilter(**filters)).items}
 
-    assert found(study=study.id) == {each.id for each in study.experiments}
     assert found(state=State.CANCELLED) == {alone.id}
-    assert found(strategy="simulated_fit") == {alone.id, study.experiments[0].id}
-    assert found(strategy="simulated_fit", study=study.id) == {study.experiments[0].id}
-    assert found(strategy="no\0such") == found(study="no-such") == set()
+    assert found(strategy="simulated_fit") == {alone.id, study.id}
+    assert found(strategy="simulated_fit", state=State.QUEUED) == {study.id}
+    assert found(strategy="no\0such") == set()
 
 
 CURSORS = ("", "x", "ü", "W10", "WzEsMiwzXQ", "WyIyMDI2LTAxLTAxIiwgMSwgMV0", "W" * 100_000, "W1tb" * 497)
@@ -161,9 +172,8 @@ CURSORS = ("", "x", "ü", "W10", "WzEsMiwzXQ", "WyIyMDI2LTAxLTAxIiwgMSwgMV0", "W
 
 
 def test_a_cursor_that_no_page_gave_is_refused(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+    experiment = submit_one(store, toy()).id
     pages: tuple[Callable[[str], Any], ...] = (
-        lambda cursor: listing.list_experiments(store, cursor=cursor),
         lambda cursor: listing.list_studies(store, cursor=cursor),
         lambda cursor: reading.list_samples(store, experiment, cursor=cursor + "a"),
         lambda cursor: reading.list_simulators(store, experiment, cursor=cursor + "a"),
@@ -183,19 +193,18 @@ def test_a_list_takes_as_many_queries_for_many_as_for_one(store: Store) -> None:
     def queries() -> Any:
         counted.clear()
         listing.list_studies(store)
-        listing.list_experiments(store)
         return len(counted)
 
-    submission.submit_study(store, small_study(strategies=["simulated_fit"]))
+    submission.submit(store, small_study(strategies=["simulated_fit"]))
     one = queries()
     for _ in range(5):
-        submission.submit_study(store, small_study())
+        submission.submit(store, small_study())
 
     assert queries() == one
 
 
 def test_samples_and_probes_are_rows_in_the_order_of_the_log(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+    experiment = submit_one(store, toy()).id
     for claim in execution.claim(store, "me", 2):
         run(store, claim)
 
@@ -215,7 +224,7 @@ def test_samples_and_probes_are_rows_in_the_order_of_the_log(store: Store) -> No
 
 @pytest.mark.dialects
 def test_samples_and_simulators_are_filtered_and_paged(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+    experiment = submit_one(store, toy()).id
     for claim in execution.claim(store, "me", 3):
         run(store, claim)
 
@@ -239,10 +248,10 @@ def test_samples_and_simulators_are_filtered_and_paged(store: Store) -> None:
 
 def test_realitys_parameters_are_shown_only_after_the_end(store: Store) -> None:
     spec = toy(repetitions=1, reality={"parameters": {"static_friction": SECRET}})
-    experiment = submission.submit_experiment(store, spec).id
+    experiment = submit_one(store, spec).id
     before = reading.read_experiment(store, experiment)
     (claim,) = execution.claim(store, "me", 1)
-    while_running = listing.list_experiments(store).items[0]
+    while_running = listed(store)[0]
 
     run(store, claim)
 
@@ -255,20 +264,20 @@ def test_realitys_parameters_are_shown_only_after_the_end(store: Store) -> None:
 
 def test_realitys_parameters_are_hidden_while_any_experiment_of_the_study_can_learn_them(store: Store) -> None:
     spec = small_study(strategies=["random", "simulated_fit"], reality={"parameters": {"static_friction": SECRET}})
-    study = submission.submit_study(store, spec)
+    study = submission.submit(store, spec)
     first, second = study.experiments
 
     cancel(store, first.id)
-    meanwhile = reading.read_study(store, study.id)
+    meanwhile = reading.read(store, study.id)
     cancel(store, second.id)
 
     assert str(SECRET) not in study.model_dump_json() + meanwhile.model_dump_json()
-    assert str(SECRET) not in listing.list_experiments(store, ListFilter(state=State.QUEUED)).model_dump_json()
+    assert str(SECRET) not in listing.list_studies(store, ListFilter(state=State.RUNNING)).model_dump_json()
     assert reading.read_experiment(store, first.id).spec["reality"]["parameters"]["static_friction"] == SECRET
 
 
 def test_a_queued_experiment_can_be_cancelled_once(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+    experiment = submit_one(store, toy()).id
 
     cancelled = cancel(store, experiment)
 
@@ -281,7 +290,7 @@ def test_a_queued_experiment_can_be_cancelled_once(store: Store) -> None:
 
 
 def test_what_has_ended_cannot_be_cancelled(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+    experiment = submit_one(store, toy()).id
     finish_all(store)
 
     with pytest.raises(Conflict, match="COMPLETED"):
@@ -289,7 +298,7 @@ def test_what_has_ended_cannot_be_cancelled(store: Store) -> None:
 
 
 def test_repetitions_tell_how_far_they_are(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+    experiment = submit_one(store, toy()).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
     execution.fail(store, second, Failure("the code raised"))

@@ -40,6 +40,7 @@ from gaplab.workers import checkpoints, permits
 from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
 from gaplab.workers.run import Run, stuck
+from tests.experiments import submit_one
 from tests.fakes import flat, install
 from tests.without_ray import Here, HereRepetitions, HereRun
 
@@ -148,8 +149,8 @@ def computed(spec: ExperimentSpec) -> dict[int, Any]:
 )
 def test_a_strategy_that_lies_fails_alone_and_is_named(store: Store, answer: Any, reason: str) -> None:
     Liar.answer = answer
-    lying = submission.submit_experiment(store, small(strategy="liar")).id
-    honest = submission.submit_experiment(store, small()).id
+    lying = submit_one(store, small(strategy="liar")).id
+    honest = submit_one(store, small()).id
 
     work(store)
 
@@ -191,7 +192,7 @@ def with_repetitions(kind: type[HereRepetitions], store: Store) -> Here:
 
 
 def test_what_cannot_be_stored_fails_its_repetition_alone(sqlite_store: Store) -> None:
-    experiment = submission.submit_experiment(sqlite_store, small()).id
+    experiment = submit_one(sqlite_store, small()).id
 
     work(sqlite_store, with_repetitions(Nonsense, sqlite_store))
 
@@ -209,7 +210,7 @@ def test_what_cannot_be_stored_fails_its_repetition_alone(sqlite_store: Store) -
 )
 def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store: Store, part: Any, reason: str) -> None:
     LeftOut.part, LeftOut.attempts = part, 1
-    experiment = submission.submit_experiment(sqlite_store, small()).id
+    experiment = submit_one(sqlite_store, small()).id
 
     work(sqlite_store, with_repetitions(LeftOut, sqlite_store))
 
@@ -222,7 +223,7 @@ def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store: S
 
 def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlite_store: Store) -> None:
     LeftOut.part, LeftOut.attempts = slice(0, 1), 99
-    experiment = submission.submit_experiment(sqlite_store, small()).id
+    experiment = submit_one(sqlite_store, small()).id
 
     work(sqlite_store, with_repetitions(LeftOut, sqlite_store))
 
@@ -234,7 +235,7 @@ def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlit
 def test_an_error_of_reality_pauses_says_so_hides_what_it_names_and_costs_no_sample(store: Store) -> None:
     spec = on_the_bench(repetitions=1)
     Bench.errors[:] = [None, None, ValueError("unstable in static_friction=0.987")]  # type: ignore[list-item]
-    experiment = submission.submit_experiment(store, spec).id
+    experiment = submit_one(store, spec).id
 
     work(store)
 
@@ -247,7 +248,7 @@ def test_an_error_of_reality_pauses_says_so_hides_what_it_names_and_costs_no_sam
         events = [event.body for event in session.query(EventRow)]
     assert "0.987" not in f"{read} {paused} {attempt} {events}"
 
-    lifecycle.ask_experiment(store, experiment, Verb.RESUME)
+    lifecycle.ask(store, experiment, Verb.RESUME)
     work(store)
 
     ended = reading.read_experiment(store, experiment)
@@ -261,7 +262,7 @@ def test_an_error_that_may_pass_is_tried_again_by_itself(sqlite_store: Store) ->
     error = TryAgain("dropped")
     assert all(map(checkpoints.may_pass, (error, ConnectionError("wireless"), TimeoutError(), MemoryError())))
     Bench.errors[:] = [None, error, error, error]  # type: ignore[list-item]
-    experiment = submission.submit_experiment(sqlite_store, on_the_bench(repetitions=1)).id
+    experiment = submit_one(sqlite_store, on_the_bench(repetitions=1)).id
 
     work(sqlite_store)
 
@@ -272,7 +273,7 @@ def test_an_error_that_may_pass_is_tried_again_by_itself(sqlite_store: Store) ->
 
 def test_an_error_that_does_not_pass_pauses_after_three_tries(sqlite_store: Store) -> None:
     Bench.errors[:] = [TryAgain("dropped")] * 9
-    experiment = submission.submit_experiment(sqlite_store, on_the_bench(repetitions=1)).id
+    experiment = submit_one(sqlite_store, on_the_bench(repetitions=1)).id
 
     work(sqlite_store)
 
@@ -283,12 +284,12 @@ def test_what_failed_is_retried_from_its_stored_steps(store: Store) -> None:
     spec = small(strategy="liar")
     answers = iter([np.array([0.25]), None])
     Liar.answer = lambda _: next(answers, None)
-    experiment = submission.submit_experiment(store, spec).id
+    experiment = submit_one(store, spec).id
     work(store)
     failed = stored(store, experiment)
 
     Liar.answer = lambda _: np.array([0.75])
-    retried = lifecycle.ask_experiment(store, experiment, Verb.RETRY)
+    retried = lifecycle.ask(store, experiment, Verb.RETRY)
     work(store)
 
     read = reading.read_experiment(store, experiment)
@@ -297,25 +298,25 @@ def test_what_failed_is_retried_from_its_stored_steps(store: Store) -> None:
     again = stored(store, experiment)
     assert all(again[number][: len(steps)] == steps for number, steps in failed.items())
     assert max(len(steps) for steps in failed.values()) > 3
-    with pytest.raises(Conflict, match=r"no repetition of experiment .* has FAILED"):
-        lifecycle.ask_experiment(store, experiment, Verb.RETRY)
+    with pytest.raises(Conflict, match=r"no repetition of study .* has FAILED"):
+        lifecycle.ask(store, experiment, Verb.RETRY)
 
 
 def test_a_failed_repetition_of_a_study_is_retried_while_others_go_on(store: Store) -> None:
-    study = submission.submit_study(store, study_spec())
+    study = submission.submit(store, study_spec())
     first, second = (each.id for each in study.experiments)
     for claim in execution.claim(store, "me", 9):
         if claim.experiment_id == first and claim.number == 0:
             execution.fail(store, claim, Failure("a foot fell off"))
     running = reading.read_experiment(store, first).state
 
-    lifecycle.ask_study(store, study.id, Verb.RETRY)
+    lifecycle.ask(store, study.id, Verb.RETRY)
 
     states = [each.state for each in reading.list_repetitions(store, first)]
     assert (running, states) == (State.RUNNING, [State.QUEUED, State.RUNNING])
     assert reading.read_experiment(store, second).state is State.RUNNING
     with pytest.raises(Conflict, match="no repetition of study"):
-        lifecycle.ask_study(store, study.id, Verb.RETRY)
+        lifecycle.ask(store, study.id, Verb.RETRY)
 
 
 def study_spec() -> StudySpec:
@@ -325,7 +326,7 @@ def study_spec() -> StudySpec:
 
 
 def test_a_measurement_that_is_cut_off_is_no_fault_of_a_plugin(store: Store) -> None:
-    experiment = submission.submit_experiment(store, on_the_bench(repetitions=1)).id
+    experiment = submit_one(store, on_the_bench(repetitions=1)).id
     for loss in range(MAX_LOSSES):
         (claim,) = execution.claim(store, "me", 9)
         assert execution.note_measuring(store, [claim]) == (claim,)
@@ -335,7 +336,7 @@ def test_a_measurement_that_is_cut_off_is_no_fault_of_a_plugin(store: Store) -> 
         assert reading.read_experiment(store, experiment).state is state
 
     assert "a measurement was cut off 5 times" in reading.read_experiment(store, experiment).reasons[0]
-    lifecycle.ask_experiment(store, experiment, Verb.RESUME)
+    lifecycle.ask(store, experiment, Verb.RESUME)
     (claim,) = execution.claim(store, "me", 9)
     assert execution.release(store, claim, "the worker was lost")
     assert reading.list_repetitions(store, experiment)[0].state is State.QUEUED
@@ -343,14 +344,14 @@ def test_a_measurement_that_is_cut_off_is_no_fault_of_a_plugin(store: Store) -> 
 
 @pytest.mark.dialects
 def test_hardware_has_one_holder_at_a_time(store: Store) -> None:
-    first, second = (submission.submit_experiment(store, on_the_bench(repetitions=3)).id for _ in range(2))
-    other = submission.submit_experiment(store, small()).id
+    first, second = (submit_one(store, on_the_bench(repetitions=3)).id for _ in range(2))
+    other = submit_one(store, small()).id
 
     (held,) = (each for each in execution.claim(store, "me", 9) if each.experiment_id != other)
 
     assert held.experiment_id == first
     assert execution.claim(store, "you", 9) == ()
-    lifecycle.ask_experiment(store, first, Verb.CANCEL)
+    lifecycle.ask(store, first, Verb.CANCEL)
     assert execution.claim(store, "you", 9) == ()  # its worker may still move the hardware
     execution.free_hardware(store, [held])
     (following,) = execution.claim(store, "you", 9)
@@ -368,7 +369,7 @@ def test_a_heartbeat_that_comes_while_others_are_given_up_keeps_its_lease(
     store: Store, monkeypatch: pytest.MonkeyPatch, measuring: Any
 ) -> None:
     """As on Postgres, where another transaction may be committed between two statements of one."""
-    submission.submit_experiment(store, on_the_bench(repetitions=1))
+    submit_one(store, on_the_bench(repetitions=1))
     (held,) = execution.claim(store, "me", 9)
     if measuring:
         execution.note_measuring(store, [held])
@@ -389,7 +390,7 @@ def test_a_heartbeat_that_comes_while_others_are_given_up_keeps_its_lease(
 @pytest.mark.dialects
 @pytest.mark.parametrize("by_s", [3600.0, -3600.0])
 def test_a_clock_that_was_set_does_not_give_hardware_to_a_second_holder(store: Store, by_s: float) -> None:
-    submission.submit_experiment(store, on_the_bench(repetitions=2))
+    submit_one(store, on_the_bench(repetitions=2))
     (held,) = execution.claim(store, "me", 9)
     time = [0.0]
     silences = Silences[int](lambda: time[0])
@@ -412,9 +413,9 @@ def test_a_clock_that_was_set_does_not_give_hardware_to_a_second_holder(store: S
 
 
 def test_an_ended_lease_frees_its_hardware_once_its_holder_is_silent(store: Store) -> None:
-    first, _ = (submission.submit_experiment(store, on_the_bench()).id for _ in range(2))
+    first, _ = (submit_one(store, on_the_bench()).id for _ in range(2))
     execution.claim(store, "me", 9)
-    lifecycle.ask_experiment(store, first, Verb.CANCEL)
+    lifecycle.ask(store, first, Verb.CANCEL)
     time = [0.0]
     silences = Silences[int](lambda: time[0])
 
@@ -425,7 +426,7 @@ def test_an_ended_lease_frees_its_hardware_once_its_holder_is_silent(store: Stor
 
 @pytest.mark.dialects
 def test_the_database_itself_refuses_a_second_holder(store: Store) -> None:
-    submission.submit_experiment(store, on_the_bench())
+    submit_one(store, on_the_bench())
     execution.claim(store, "me", 9)
 
     with pytest.raises(Exception, match=r"(?i)unique"), store.transaction() as session:
@@ -608,7 +609,7 @@ def test_only_a_run_that_may_move_hardware_is_waited_for(
 
 
 def test_an_answer_of_reality_that_arrives_during_the_hand_back_is_stored(store: Store) -> None:
-    experiment = submission.submit_experiment(store, on_the_bench(repetitions=1)).id
+    experiment = submit_one(store, on_the_bench(repetitions=1)).id
     (claim,) = execution.claim(store, "me", 1)
     steps = steps_to_the_first_answer(claim)
     execution.record_all(store, [(claim, [TimedStep(step, 0.0) for step in steps[:-1]])])
@@ -711,15 +712,15 @@ def test_a_measurement_waits_for_permits_whose_process_has_died() -> None:
 
 def test_a_check_that_no_experiment_needs_any_more_ends(store: Store) -> None:
     spec = small()
-    first, second = (submission.submit_experiment(store, spec) for _ in range(2))
+    first, second = (submit_one(store, spec) for _ in range(2))
     claim = sensitivity.claim(store, "me")
     assert claim is not None
 
-    lifecycle.ask_experiment(store, first.id, Verb.CANCEL)
+    lifecycle.ask(store, first.id, Verb.CANCEL)
     still = sensitivity.heartbeat(store, [claim])
-    lifecycle.ask_experiment(store, second.id, Verb.CANCEL)
+    lifecycle.ask(store, second.id, Verb.CANCEL)
 
     assert (still, sensitivity.heartbeat(store, [claim])) == ((claim,), ())
     assert checks.read(store, claim.id).state is State.CANCELLED
-    submission.submit_experiment(store, spec)
+    submit_one(store, spec)
     assert checks.read(store, claim.id).state is State.QUEUED

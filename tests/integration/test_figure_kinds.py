@@ -10,7 +10,6 @@ import pytest
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
 from gaplab.services.core.types import Tuned as TunedStep
-from gaplab.services.experiments import submission
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import AFTER, BEFORE, predictions_figure
 from gaplab.services.figures.kinds.simulators import MOST, REALITY, simulators_figure
@@ -19,13 +18,13 @@ from gaplab.services.figures.marks import Diagonal, FigureDefinition, Label, Lev
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.results import curves
-from gaplab.services.results.coordinates import experiment_coordinates
+from gaplab.services.results.coordinates import setting_coordinates
 from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
-from tests.experiments import cancel, run, toy
+from tests.experiments import cancel, run, submit_one, toy
 from tests.figures import DIMENSIONS, DIRECT, ERRORS, PREDICTIONS, TRUTH, coordinates, curve, point, prediction, tuned
 
 
@@ -76,7 +75,7 @@ def test_reality_is_a_point_where_both_are_known_a_level_where_one_is_and_within
 
 
 def test_a_reality_of_another_engine_has_no_place_among_the_simulators(store: Store) -> None:
-    elsewhere = submission.submit_experiment(store, toy(repetitions=1)).id
+    elsewhere = submit_one(store, toy(repetitions=1)).id
     (claim,) = execution.claim(store, "test", limit=1)
     run(store, claim)
     with store.transaction() as session:
@@ -125,11 +124,11 @@ def test_parallel_coordinates_have_one_line_for_each_and_axes_with_their_ends() 
 
 
 def test_the_coordinates_of_experiments_are_the_settings_that_differ_and_their_fitness(sqlite_store: Store) -> None:
-    ids = [submission.submit_experiment(sqlite_store, toy(seed=seed)).id for seed in (1, 2)]
+    ids = [submit_one(sqlite_store, toy(seed=seed)).id for seed in (1, 2)]
     for claim in execution.claim(sqlite_store, "test", limit=10):
         run(sqlite_store, claim)
 
-    figure = experiment_coordinates(sqlite_store, [], ids)
+    figure = setting_coordinates(sqlite_store, ids)
 
     assert figure.table is not None
     assert figure.table.head == ("Seed", "Rollouts", "Final fitness (m/s)")
@@ -288,7 +287,7 @@ def log(first: int, *, iterations: int, fitness: float | None = 1.0) -> Iterator
 @pytest.fixture
 def experiment(store: Store) -> str:
     """Two repetitions of three that have ended, of 20 and 40 rollouts at first, and 30 and 60 with each iteration."""
-    made = submission.submit_experiment(store, toy(repetitions=3)).id
+    made = submit_one(store, toy(repetitions=3)).id
     for claim in execution.claim(store, "test", limit=2):
         run(store, claim, log(claim.number + 1, iterations=2))
     return made
@@ -304,7 +303,7 @@ def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: St
 
 
 def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(store: Store, experiment: str) -> None:
-    direct = submission.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
+    direct = submit_one(store, toy(strategy="direct", repetitions=1)).id
     (claim,) = (each for each in execution.claim(store, "test", limit=2) if each.experiment_id == direct)
     genome = frozen([0.5])
     steps = TunedStep(0, ()), Transferred(0, genome, 1.0, Cost(10_000_000)), Probed(0, 1.0, 1.0)

@@ -14,20 +14,20 @@ from fastapi.testclient import TestClient
 from plotly.graph_objects import Figure
 
 from gaplab.api.app import create_app
+from gaplab.api.clients.figures import OF_SEVERAL
 from gaplab.api.http import figures
 from gaplab.api.http.figures import MEDIA_TYPES
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import submission
-from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.figures.matplotlib import files
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.session import Store
 from gaplab.services.waiting_line import LENGTH, WaitingLine
 from tests.conftest import filled
-from tests.experiments import run
+from tests.experiments import listed, run
 
 STUDY = {
     "name": "Two <b>ways</b>",
@@ -53,7 +53,7 @@ def api(sqlite_store: Store) -> Iterator[TestClient]:
 def fill(store: Store) -> None:
     """A study of which only the first experiment has ended."""
     spec = STUDY | {"reality": {"parameters": {"static_friction": HIDDEN, "dynamic_friction": 0.3}}}
-    first = submission.submit_study(store, StudySpec.model_validate(spec)).experiments[0].id
+    first = submission.submit(store, StudySpec.model_validate(spec)).experiments[0].id
     for claim in execution.claim(store, "test", limit=20):
         if claim.experiment_id == first:
             run(store, claim)
@@ -68,17 +68,20 @@ def sqlite_template(sqlite_template: Path) -> Path:
 @pytest.fixture
 def experiment(sqlite_store: Store) -> str:
     """The one that has ended."""
-    (found,) = list_experiments(sqlite_store, ListFilter(state=State.COMPLETED)).items
-    return found.id
+    (found,) = [each.id for each in listed(sqlite_store) if each.state is State.COMPLETED]
+    return found
+
+
+def about(kind: str, id_: str, form: str = "json") -> dict[str, str]:
+    """The parameters of a figure of this kind."""
+    return {"study" if kind in OF_SEVERAL else "experiment": id_, "format": form}
 
 
 @pytest.mark.parametrize(
     "kind", ["curves", *(pytest.param(each, marks=pytest.mark.release) for each in KINDS if each != "curves")]
 )
 def test_every_kind_is_served_in_every_format(api: TestClient, experiment: str, kind: str) -> None:
-    answers = {
-        name: api.get(f"/figures/{kind}", params={"experiment": experiment, "format": name}) for name in MEDIA_TYPES
-    }
+    answers = {name: api.get(f"/figures/{kind}", params=about(kind, experiment, name)) for name in MEDIA_TYPES}
 
     for name, answer in answers.items():
         assert answer.status_code == 200, answer.text
@@ -105,12 +108,12 @@ def test_while_many_files_are_drawn_others_are_served(
 ) -> None:
     """Sixty readers want a PDF, and the first takes long to draw: most are refused, and no thread is missing."""
     monkeypatch.setattr(figures, "_DRAWING", WaitingLine("figures", longest_s=DEADLINE_S))
-    asked = {"experiment": experiment, "format": "pdf"}
+    asked = {"study": experiment, "format": "pdf"}
     with httpx2.Client(base_url=url, timeout=DEADLINE_S) as http, ThreadPoolExecutor(60) as readers:
         with files._matplotlib:
             answers = [readers.submit(http.get, "/figures/curves", params=asked) for _ in range(60)]
             refused = [each.result() for each in islice(as_completed(answers), 60 - 1 - LENGTH)]
-            others = [http.get(path).status_code for path in ("/livez", "/readyz", "/experiments")]
+            others = [http.get(path).status_code for path in ("/livez", "/readyz", "/studies")]
         drawn = [each.result() for each in answers if each.result() not in refused]
 
     assert {each.status_code for each in refused} == {429}
@@ -121,7 +124,7 @@ def test_while_many_files_are_drawn_others_are_served(
 
 
 def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api: TestClient, experiment: str) -> None:
-    asked = {"experiment": experiment, "format": "json"}
+    asked = {"study": experiment, "format": "json"}
 
     plain, rollouts, time, each = (
         api.get("/figures/curves", params=asked | how).json()  # type: ignore[arg-type, operator]
@@ -136,7 +139,7 @@ def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api
 
 
 def test_an_experiment_that_is_asked_for_twice_is_drawn_once(api: TestClient, experiment: str) -> None:
-    drawn = api.get("/figures/curves", params={"experiment": [experiment, experiment], "format": "json"}).json()
+    drawn = api.get("/figures/curves", params={"study": [experiment, experiment], "format": "json"}).json()
 
     assert len(drawn["table"]["rows"]) == 1
 
@@ -192,7 +195,7 @@ def test_an_experiment_that_has_not_begun_is_an_empty_figure(api: TestClient) ->
     ]
 
     for kind in (*KINDS, "predictions"):
-        found = api.get(f"/figures/{kind}", params={"experiment": made, "format": "json"}).json()
+        found = api.get(f"/figures/{kind}", params=about(kind, made)).json()
         assert found["empty"] is True
         assert "no results yet" in found["alt"]
 
@@ -209,7 +212,7 @@ def test_the_direct_baseline_says_that_it_tunes_nothing(api: TestClient, experim
 
 def test_files_are_drawn_alike_by_many_threads_at_once(api: TestClient, experiment: str) -> None:
     def draw(kind: str) -> bytes:
-        return api.get(f"/figures/{kind}", params={"experiment": experiment, "format": "svg"}).content
+        return api.get(f"/figures/{kind}", params=about(kind, experiment, "svg")).content
 
     with ThreadPoolExecutor(4) as threads:
         together = list(threads.map(draw, KINDS[:2] * 2))
@@ -228,7 +231,9 @@ def test_a_figure_that_is_none_is_not_found_and_the_answer_says_which_there_are(
 
 
 def test_an_unknown_experiment_is_not_found(api: TestClient) -> None:
-    found = {kind: api.get(f"/figures/{kind}?experiment=nope").status_code for kind in (*KINDS, "predictions")}
+    found = {
+        kind: api.get(f"/figures/{kind}", params=about(kind, "nope")).status_code for kind in (*KINDS, "predictions")
+    }
 
     assert set(found.values()) == {404}, found
 

@@ -6,14 +6,13 @@ from pathlib import Path
 from shutil import copyfileobj
 
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.archives import export_experiment
+from gaplab.services.archives import export
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
-from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.commands import module
-from tests.experiments import run, toy
+from tests.experiments import run, submit_one, toy
 
 GENOME = frozen([0.5])
 WORSE = Simulator(frozen([1.9, 1.9]), 9.0)
@@ -33,11 +32,11 @@ def log(best: Simulator, first: float = 0.1) -> Iterator[Step]:
 
 def archive(store: Store, spec: ExperimentSpec, best: tuple[Simulator, ...], folder: Path, first: float = 0.1) -> Path:
     """An experiment whose repetitions have these best simulators, as `made.zip`."""
-    made = submission.submit_experiment(store, spec.model_copy(update={"repetitions": len(best)})).id
+    made = submit_one(store, spec.model_copy(update={"repetitions": len(best)})).id
     for claim in execution.claim(store, "test", limit=len(best)):
         run(store, claim, log(best[claim.number], first))
     path = folder / "made.zip"
-    with export_experiment(store, made).file as source, path.open("wb") as target:
+    with export(store, made).file as source, path.open("wb") as target:
         copyfileobj(source, target)
     return path
 

@@ -70,7 +70,7 @@ def run_halfway(store: Store) -> None:
 @pytest.fixture
 def running(store: Store, log: pytest.LogCaptureFixture) -> dict[str, str]:
     """Ids of a study that runs, by what they are of."""
-    study = submission.submit_study(store, StudySpec.model_validate(STUDY))
+    study = submission.submit(store, StudySpec.model_validate(STUDY))
     run_halfway(store)
     saved_views.save_view(store, "mine", ViewSpec(query="strategy = random"))
     stored_robots.add_robot(store, json.dumps(EXAMPLE))
@@ -162,14 +162,14 @@ def test_neither_submission_nor_its_repetition_nor_an_edit_or_its_end_tells(
     other = api.post("/studies", json=STUDY | {"seed": 1}, headers={"Idempotency-Key": "k"})
     check = api.post("/sensitivity", json={key: STUDY[key] for key in ("robot", "tunables", "reality")})
     one, *rest = (each["id"] for each in first.json()["experiments"])
-    edited = api.patch(f"/experiments/{one}", json={"name": "x"}, headers={"If-Match": "*"})
-    ended = api.post(f"/experiments/{one}/cancel")
+    edited = api.patch(f"/studies/{one}", json={"name": "x"}, headers={"If-Match": "*"})
+    ended = api.post(f"/studies/{one}/cancel")
 
     answers = (first, again, other, check, edited, ended)
     assert [each.status_code for each in answers] == [202, 202, 422, 202, 200, 200]
     assert not any(tells(each.text) for each in answers)
     for each in rest:
-        last = api.post(f"/experiments/{each}/cancel")
+        last = api.post(f"/studies/{each}/cancel")
     assert tells(last.text)
     assert tells(json.dumps(api.get(f"/experiments/{one}").json()))
     assert not tells(log.text)

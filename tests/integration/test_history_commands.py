@@ -3,17 +3,16 @@
 import re
 
 from gaplab.api.commands.exit_codes import Exit
-from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.running.versions import provenance
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
-from tests.experiments import run, some_log, toy
+from tests.experiments import run, some_log, submit_one, toy
 
 
 def test_events_are_printed_a_line_each(sqlite_store: Store, gaplab: Gaplab) -> None:
-    id_ = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
-    submission.submit_experiment(sqlite_store, toy())
+    id_ = submit_one(sqlite_store, toy(repetitions=1)).id
+    submit_one(sqlite_store, toy())
     run(sqlite_store, execution.claim(sqlite_store, "me", 1)[0])
 
     code, out, _ = gaplab("events", id_)
@@ -31,7 +30,7 @@ def test_events_are_printed_a_line_each(sqlite_store: Store, gaplab: Gaplab) -> 
 
 
 def test_a_refusal_is_shown_and_can_be_lifted(sqlite_store: Store, gaplab: Gaplab) -> None:
-    id_ = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    id_ = submit_one(sqlite_store, toy(repetitions=1)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     execution.record(sqlite_store, claim, next(some_log()))
     execution.hand_back(sqlite_store, claim)

@@ -96,7 +96,7 @@ def test_duplicates_at_the_same_moment_create_one(store: Store) -> None:
 
     def submit(_: int) -> tuple[str, bool]:
         barrier.wait()
-        done = submission.admit_experiment(store, spec, Admission(key="k"))
+        done = submission.submit_once(store, spec, Admission(key="k"))
         return done.answer.id, done.replayed
 
     with ThreadPoolExecutor(threads) as pool:
@@ -116,10 +116,10 @@ def test_key_and_work_are_committed_together_or_not_at_all(store: Store, monkeyp
     with monkeypatch.context() as patch:
         patch.setattr("gaplab.services.experiments.idempotency.update", fail)
         with pytest.raises(InvalidSpec):
-            submission.admit_experiment(store, spec, Admission(key="k"))
+            submission.submit_once(store, spec, Admission(key="k"))
 
     assert (count(store, ExperimentRow), count(store, IdempotencyRow)) == (0, 0)
-    assert not submission.admit_experiment(store, spec, Admission(key="k")).replayed
+    assert not submission.submit_once(store, spec, Admission(key="k")).replayed
 
 
 @pytest.mark.dialects
@@ -142,7 +142,7 @@ def test_a_repeated_submission_of_what_was_deleted_is_told_so(
 ) -> None:
     key = {"Idempotency-Key": "k"}
     made = api.post(path, json=body, headers=key)
-    address = made.headers["location"]
+    address = f"/studies/{made.json()['id']}"
     api.post(f"{address}/cancel")
     archive = api.get(f"{address}/export").content
     assert api.delete(address).status_code == 200

@@ -19,20 +19,20 @@ from gaplab.schemas.lifecycle import ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.schemas.views import ViewSpec
 from gaplab.services import access, events
-from gaplab.services.archives import export_experiment, export_study, import_archive
+from gaplab.services.archives import export, import_archive
 from gaplab.services.archives.writing import Archive
 from gaplab.services.core.errors import Conflict, Forbidden, NotFound
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import archiving, deletion, lifecycle, reading, saved_views, submission
 from gaplab.services.experiments.deletion import Deleter
-from gaplab.services.experiments.extension import extend_experiment
+from gaplab.services.experiments.extension import extend
 from gaplab.services.experiments.notes import render
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Failure
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import Base, RepetitionRow, ViewRow
 from gaplab.services.store.session import Store
-from tests.experiments import cancel, run, some_log, toy
+from tests.experiments import cancel, run, some_log, submit_one, toy
 
 ME = Deleter(None)
 STUDY = {
@@ -52,7 +52,7 @@ def api(sqlite_store: Store) -> Iterator[TestClient]:
 
 
 def study(store: Store, **changes: Any) -> Any:
-    return submission.submit_study(store, StudySpec.model_validate(STUDY | changes))
+    return submission.submit(store, StudySpec.model_validate(STUDY | changes))
 
 
 def finish(store: Store, **log: Any) -> None:
@@ -81,12 +81,12 @@ def kinds(store: Store, **which: Any) -> list[EventKind]:
 
 def test_tags_are_added_removed_and_replaced_without_others(api: TestClient) -> None:
     made = api.post("/experiments", json=toy().model_dump(mode="json", exclude_unset=True)).json()
-    path, any_ = f"/experiments/{made['id']}", {"If-Match": "*"}
+    path, any_ = f"/studies/{made['id']}", {"If-Match": "*"}
 
     def tags(**change: Any) -> Any:
         return api.patch(path, json=change, headers=any_).json().get("tags")
 
-    assert made["tags"] == []
+    assert api.get(path).json()["tags"] == []
     assert tags(tags=["Gait", "b", "gait"]) == ["b", "gait"]
     assert tags(add_tags=["paper", "ÄRGER"], remove_tags=["b", "never"]) == ["gait", "paper", "ärger"]
     assert tags(name="other") == ["gait", "paper", "ärger"]
@@ -104,15 +104,14 @@ def test_tags_are_added_removed_and_replaced_without_others(api: TestClient) -> 
 def test_archiving_and_back_changes_nothing_else_and_each_is_one_event(store: Store) -> None:
     made = study(store)
     finish(store)
-    before = reading.read_study(store, made.id)
+    before = reading.read(store, made.id)
 
     for _ in range(2):
-        archived = archiving.archive_study(store, made.id)
+        archived = archiving.archive(store, made.id)
     for _ in range(2):
-        shown = archiving.archive_study(store, made.id, archived=False)
+        shown = archiving.archive(store, made.id, archived=False)
 
     assert archived.archived_at is not None
-    assert all(each.archived_at for each in archived.experiments)
     assert shown == before
     assert kinds(store)[-4:] == [EventKind.ARCHIVED] * 2 + [EventKind.UNARCHIVED] * 2
 
@@ -121,80 +120,80 @@ def test_only_what_has_ended_is_archived_and_what_goes_on_is_shown_again(store: 
     made = study(store)
     first, second = (each.id for each in made.experiments)
     with pytest.raises(Conflict, match="is QUEUED and cannot be archived: wait for its end"):
-        archiving.archive_study(store, made.id)
+        archiving.archive(store, made.id)
     finish(store)
-    archiving.archive_study(store, made.id)
+    archiving.archive(store, made.id)
 
-    extend_experiment(store, first, ExtensionSpec(repetitions=2))
+    extend(store, first, ExtensionSpec(repetitions=2))
 
-    assert reading.read_study(store, made.id).archived_at is None
-    assert reading.read_experiment(store, first).archived_at is None
-    assert reading.read_experiment(store, second).archived_at is not None
+    assert reading.read(store, made.id).archived_at is None
+    with pytest.raises(Conflict, match="this is about all of it: use the id of the study"):
+        archiving.archive(store, second)
 
 
 @pytest.mark.dialects
 def test_a_deleted_study_leaves_nothing_but_its_events_and_what_others_share(store: Store) -> None:
-    kept = submission.submit_experiment(store, toy(name="kept", repetitions=1))
+    kept = submit_one(store, toy(name="kept", repetitions=1))
     finish(store)
     with_one = rows(store)
     made = study(store)
     finish(store)
     lasting = {"event", "event_counter", "deletion", "sensitivity", "provenance"}
 
-    deleted = deletion.delete_study(store, made.id, ME)
+    deleted = deletion.delete(store, made.id, ME)
 
     after = rows(store)
     assert {name: count for name, count in after.items() if name not in lasting} == {
         name: count for name, count in with_one.items() if name not in lasting
     }
     assert (after["deletion"], after["provenance"]) == (3, with_one["provenance"])
-    assert deletion.delete_study(store, made.id, ME) == deleted
+    assert deletion.delete(store, made.id, ME) == deleted
     assert rows(store) == after
     assert reading.read_experiment(store, kept.id).state is State.COMPLETED
     with pytest.raises(NotFound, match=rf"'study' \({made.id}\) was deleted at"):
-        reading.read_study(store, made.id)
+        reading.read(store, made.id)
 
 
 def test_events_of_the_deleted_stay_in_order_and_can_be_asked_for(store: Store) -> None:
     made = study(store)
     finish(store)
     number = events.latest(store)
-    deletion.delete_study(store, made.id, ME)
+    deletion.delete(store, made.id, ME)
     page = events.page(store, 0, WantedEvents(study=made.id), limit=1000)
-    of_one = events.page(store, number, WantedEvents(experiment=made.experiments[0].id), limit=10)
+    of_one = events.page(store, number, WantedEvents(study=made.experiments[0].id), limit=10)
 
     assert [event.number for event in page.items] == list(range(1, number + 3))
     assert [event.kind for event in page.items[-2:]] == [EventKind.DELETED] * 2
     assert {event.study for event in page.items} == {made.id}
     assert [event.body for event in of_one.items] == [{"name": "random"}]
     events.check(store, WantedEvents(study=made.id), number)
-    events.check(store, WantedEvents(experiment=made.experiments[0].id))
+    events.check(store, WantedEvents(study=made.experiments[0].id))
 
 
 def test_nothing_is_deleted_that_is_under_way_or_holds_hardware(store: Store) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=1))
+    made = submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
 
     with pytest.raises(Conflict, match="is RUNNING and cannot be deleted: cancel it first"):
-        deletion.delete_experiment(store, made.id, ME)
+        deletion.delete(store, made.id, ME)
     cancel(store, made.id)
     with store.transaction() as session:
         session.execute(update(RepetitionRow).values(hardware="arm"))
     with pytest.raises(Conflict, match="still holds hardware"):
-        deletion.delete_experiment(store, made.id, ME)
+        deletion.delete(store, made.id, ME)
     execution.free_hardware(store, [claim])
-    deletion.delete_experiment(store, made.id, ME)
+    deletion.delete(store, made.id, ME)
 
     with pytest.raises(NotFound):
-        lifecycle.ask_experiment(store, made.id, Verb.RETRY)
+        lifecycle.ask(store, made.id, Verb.RETRY)
 
 
 def test_a_worker_that_has_not_heard_of_the_deletion_writes_into_no_other_experiment(store: Store) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=1))
+    made = submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     cancel(store, made.id)
-    deletion.delete_experiment(store, made.id, ME)
-    other = submission.submit_experiment(store, toy(repetitions=1))
+    deletion.delete(store, made.id, ME)
+    other = submit_one(store, toy(repetitions=1))
     (theirs,) = execution.claim(store, "you", 1)
 
     assert theirs.id != claim.id
@@ -206,40 +205,42 @@ def test_a_worker_that_has_not_heard_of_the_deletion_writes_into_no_other_experi
     assert reading.list_repetitions(store, other.id)[0].state is State.RUNNING
 
 
-def test_an_experiment_leaves_its_study_unless_it_is_the_only_one(store: Store) -> None:
+def test_the_last_experiment_of_a_study_takes_it_along(store: Store) -> None:
     made = study(store)
     finish(store)
     first, second = (each.id for each in made.experiments)
 
-    deletion.delete_experiment(store, first, ME)
+    one = deletion.delete(store, first, ME)
 
-    assert [each.id for each in reading.read_study(store, made.id).experiments] == [second]
-    with pytest.raises(Conflict, match="is the only one of study"):
-        deletion.delete_experiment(store, second, ME)
+    assert (one.id, one.study) == (first, made.id)
+    assert [each.id for each in reading.read(store, made.id).experiments] == [second]
+    assert deletion.delete(store, second, ME).id == second
+    with pytest.raises(NotFound, match="was deleted at"):
+        reading.read(store, made.id)
+    assert deletion.delete(store, made.id, ME).study is None
 
 
-def deleted_during(store: Store, before: tuple[str, str], after: tuple[str, str]) -> Future[DeletionRead]:
+def deleted_during(store: Store, before: str, after: str) -> Future[DeletionRead]:
     """Delete something in a transaction that has not ended when the other deletion begins; return that."""
-    verbs = {"study": deletion.delete_study, "experiment": deletion.delete_experiment}
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
-            unwrap(verbs[before[0]])(session, before[1], ME)
-            later = pool.submit(verbs[after[0]], store, after[1], ME)
+            unwrap(deletion.delete)(session, before, ME)
+            later = pool.submit(deletion.delete, store, after, ME)
             wait([later], timeout=0.5)
         return later
 
 
 @pytest.mark.dialects
-def test_two_deletions_at_the_same_time_leave_a_study_with_an_experiment(store: Store) -> None:
+def test_two_deletions_at_the_same_time_leave_no_study_without_experiments(store: Store) -> None:
     made = study(store)
     finish(store)
     first, second = (each.id for each in made.experiments)
 
-    later = deleted_during(store, ("experiment", first), ("experiment", second))
+    later = deleted_during(store, first, second)
 
-    with pytest.raises(Conflict, match="is the only one of study"):
-        later.result()
-    assert [each.id for each in reading.read_study(store, made.id).experiments] == [second]
+    assert later.result().id == second
+    with pytest.raises(NotFound):
+        reading.read(store, made.id)
 
 
 @pytest.mark.dialects
@@ -251,7 +252,7 @@ def test_what_is_deleted_twice_at_the_same_time_is_deleted_once(store: Store, be
     finish(store)
     ids = {"study": made.id, "experiment": made.experiments[0].id}
 
-    later = deleted_during(store, (before, ids[before]), (after, ids[after]))
+    later = deleted_during(store, ids[before], ids[after])
 
     assert later.result().id == ids[after]
     assert rows(store)["deletion"] == (1 if before == after else 3)
@@ -260,27 +261,27 @@ def test_what_is_deleted_twice_at_the_same_time_is_deleted_once(store: Store, be
 def test_an_archive_of_the_deleted_brings_it_back_under_its_id(store: Store) -> None:
     made = study(store)
     finish(store)
-    archive = content(export_study(store, made.id))
-    deletion.delete_study(store, made.id, ME)
+    archive = content(export(store, made.id))
+    deletion.delete(store, made.id, ME)
 
     imported = import_archive(store, BytesIO(archive))
 
     assert (imported.study, imported.renamed) == (made.id, {})
-    assert content(export_study(store, made.id)) == archive
-    assert reading.read_study(store, made.id).state is State.COMPLETED
-    deletion.delete_study(store, made.id, ME)
+    assert content(export(store, made.id)) == archive
+    assert reading.read(store, made.id).state is State.COMPLETED
+    deletion.delete(store, made.id, ME)
 
 
 def test_tags_travel_in_archives_and_hiding_does_not(store: Store, api: TestClient) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=1))
+    made = submit_one(store, toy(repetitions=1))
     finish(store)
     client = TestClient(create_app(store))
-    client.patch(f"/experiments/{made.id}", json={"tags": ["gait", "b"]}, headers={"If-Match": "*"})
-    archiving.archive_experiment(store, made.id)
+    client.patch(f"/studies/{made.id}", json={"tags": ["gait", "b"]}, headers={"If-Match": "*"})
+    archiving.archive(store, made.id)
 
-    imported = import_archive(store, BytesIO(content(export_experiment(store, made.id))))
+    imported = import_archive(store, BytesIO(content(export(store, made.id))))
 
-    arrived = reading.read_experiment(store, imported.experiments[0])
+    arrived = reading.read(store, imported.study)
     assert (arrived.tags, arrived.archived_at) == (("b", "gait"), None)
 
 
@@ -313,19 +314,19 @@ def test_a_token_deletes_what_it_submitted_and_an_admin_everything(sqlite_store:
 
 
 def test_what_an_open_service_stored_only_an_admin_deletes_once_there_are_tokens(sqlite_store: Store) -> None:
-    made = submission.submit_experiment(sqlite_store, toy())
+    made = submit_one(sqlite_store, toy())
     cancel(sqlite_store, made.id)
 
     with pytest.raises(Forbidden):
-        deletion.delete_experiment(sqlite_store, made.id, Deleter("a token"))
-    deletion.delete_experiment(sqlite_store, made.id, Deleter("an admin's", may_delete_all=True))
+        deletion.delete(sqlite_store, made.id, Deleter("a token"))
+    deletion.delete(sqlite_store, made.id, Deleter("an admin's", may_delete_all=True))
 
 
 @pytest.mark.dialects
 def test_a_view_that_two_save_at_the_same_time_is_that_of_the_second(store: Store) -> None:
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
-            session.add(ViewRow(name="mine", shows="all", sort="name", created_at=moment(session)))
+            session.add(ViewRow(name="mine", sort="name", created_at=moment(session)))
             session.flush()
             second = pool.submit(saved_views.save_view, store, "mine", ViewSpec(query="strategy = random"))
             sleep(1.0)  # until it waits for this one
@@ -336,7 +337,7 @@ def test_a_view_that_two_save_at_the_same_time_is_that_of_the_second(store: Stor
 
 
 def test_saved_views_are_shared_replaced_and_deleted(api: TestClient) -> None:
-    best = {"shows": "experiments", "query": "strategy = informative and fitness > 0.5", "sort": "name"}
+    best = {"query": "strategy = informative and fitness > 0.5", "sort": "name"}
 
     saved = api.put("/views/slippery gaits", json=best)
     api.put("/views/all", json={})
@@ -353,9 +354,8 @@ def test_saved_views_are_shared_replaced_and_deleted(api: TestClient) -> None:
 def test_a_view_is_checked_when_it_is_saved(api: TestClient) -> None:
     wrong: list[tuple[str, dict[str, str], str]] = [
         ("a", {"query": "strategi = x"}, "/query"),
-        ("a", {"query": "study ="}, "/query"),
-        ("a", {"shows": "tables"}, "/shows"),
-        ("a", {"sort": "state"}, ""),
+        ("a", {"query": "state ="}, "/query"),
+        ("a", {"sort": "state"}, "/sort"),
         ("a<b", {}, "name"),
         ("x" * 61, {}, "name"),
     ]
@@ -368,9 +368,7 @@ def test_a_view_is_checked_when_it_is_saved(api: TestClient) -> None:
 def test_lists_are_queried_over_http_and_a_mistake_is_a_problem(api: TestClient) -> None:
     api.post("/studies", json=STUDY | {"name": "slippery"})
 
-    assert [each["name"] for each in api.get("/experiments", params={"q": "strategy = random"}).json()["items"]] == [
-        "random"
-    ]
+    assert len(api.get("/studies", params={"q": "strategy = random"}).json()["items"]) == 1
     assert len(api.get("/studies", params={"q": "slip"}).json()["items"]) == 1
     problem = api.get("/studies", params={"q": "strategi = random"}).json()
     assert problem["status"] == 422
@@ -404,4 +402,4 @@ def test_notes_are_served_as_html(api: TestClient) -> None:
     api.patch(f"/studies/{made['id']}", json={"notes": "# Wet\n\n- *slippery*"}, headers={"If-Match": "*"})
 
     assert api.get(f"/studies/{made['id']}/notes").json()["html"].startswith("<h1>Wet</h1>\n<ul>")
-    assert api.get(f"/experiments/{made['experiments'][0]['id']}/notes").json() == {"html": ""}
+    assert api.get(f"/studies/{made['experiments'][0]['id']}/notes").status_code == 409

@@ -8,14 +8,13 @@ import pytest
 
 from gaplab import Client, ServiceError
 from gaplab.api.commands.exit_codes import Exit
-from gaplab.services.experiments import listing, submission
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
-from tests.experiments import cancel, toy
+from tests.experiments import cancel, listed, submit_one, toy
 
 
 def test_the_command_queries_tags_archives_and_deletes(gaplab: Gaplab, sqlite_store: Store) -> None:
-    made, other = (submission.submit_experiment(sqlite_store, toy(name=name)).id for name in ("one", "two"))
+    made, other = (submit_one(sqlite_store, toy(name=name)).id for name in ("one", "two"))
 
     assert gaplab("tag", made, "gait", "Paper").out == f"{made}: one [gait, paper]\n"
     assert "[gait]" in gaplab("tag", made, "paper", "--remove").out
@@ -38,7 +37,7 @@ def test_the_command_queries_tags_archives_and_deletes(gaplab: Gaplab, sqlite_st
 
 
 def test_a_tag_that_is_none_is_refused_with_what_is_permitted(gaplab: Gaplab, sqlite_store: Store) -> None:
-    made = submission.submit_experiment(sqlite_store, toy()).id
+    made = submit_one(sqlite_store, toy()).id
     permitted = "must be letters, digits and _ . : / + -, the first a letter or a digit"
 
     for tag, *options in (("Bad Tag",), ("",), ("_x",), ("Bad Tag", "--remove")):
@@ -49,8 +48,8 @@ def test_a_tag_that_is_none_is_refused_with_what_is_permitted(gaplab: Gaplab, sq
 
 
 def test_views_are_saved_listed_and_deleted_by_command(gaplab: Gaplab, sqlite_store: Store) -> None:
-    made = submission.submit_experiment(sqlite_store, toy(name="one")).id
-    submission.submit_experiment(sqlite_store, toy(name="two"))
+    made = submit_one(sqlite_store, toy(name="one")).id
+    submit_one(sqlite_store, toy(name="two"))
 
     assert "No views yet" in gaplab("views").out
     assert gaplab("views", "save", "my ones", "--query", "name = one").code == 0
@@ -63,23 +62,22 @@ def test_views_are_saved_listed_and_deleted_by_command(gaplab: Gaplab, sqlite_st
 
 
 def test_the_client_does_the_same(url: str, sqlite_store: Store) -> None:
-    made = submission.submit_experiment(sqlite_store, toy(name="one")).id
+    made = submit_one(sqlite_store, toy(name="one")).id
     cancel(sqlite_store, made)
     with Client(url) as client:
         assert client.tag(made, "gait").tags == ("gait",)
-        assert [each.id for each in client.experiments(query="tag = gait").items] == [made]
-        assert client.studies(query="tag = gait").items == ()
+        assert [each.id for each in client.studies(query="tag = gait").items] == [made]
         with pytest.raises(ValueError, match="at least one tag"):
             client.untag(made)
         assert client.archive(made).archived_at is not None
-        assert client.experiments().items == ()
+        assert client.studies().items == ()
         client.save_view("gaits", "tag = gait")
         assert [view.name for view in client.views()] == ["gaits"]
         with pytest.raises(ServiceError, match="GAPLAB_NOTIFY_HOSTS"):
             client.notify(made, "https://hooks.example.org/x")
         assert client.notify(made, None).host is None
         assert client.delete(made) == client.delete(made)
-        with pytest.raises(ServiceError, match="there is no experiment"):
+        with pytest.raises(ServiceError, match="there is no study or experiment"):
             client.delete("nobody")
 
 
@@ -87,22 +85,22 @@ def test_the_client_does_the_same(url: str, sqlite_store: Store) -> None:
 def test_deletion_asks_in_a_terminal(
     at_a_terminal: Callable[[str, str, str], pexpect.spawn], sqlite_store: Store, answer: str, code: Exit
 ) -> None:
-    made = submission.submit_experiment(sqlite_store, toy(name="one")).id
+    made = submit_one(sqlite_store, toy(name="one")).id
     cancel(sqlite_store, made)
 
     child = at_a_terminal(f"gaplab delete {made}", "Delete 'one' with 3 repetitions for good? [y/N] ", answer)
 
     assert child.exitstatus == code
-    assert bool(listing.list_experiments(sqlite_store).items) == bool(code)
+    assert bool(listed(sqlite_store)) == bool(code)
 
 
 def test_without_a_terminal_nothing_is_deleted_unless_the_command_says_yes(gaplab: Gaplab, sqlite_store: Store) -> None:
-    made = submission.submit_experiment(sqlite_store, toy(name="one")).id
+    made = submit_one(sqlite_store, toy(name="one")).id
     cancel(sqlite_store, made)
 
     refused = gaplab("delete", made, stdin="y\n")
 
     assert refused.code == Exit.USAGE
     assert refused.err == "gaplab: to delete 'one' with 3 repetitions for good without a terminal, add --yes\n"
-    assert listing.list_experiments(sqlite_store).items
+    assert listed(sqlite_store)
     assert gaplab("delete", made, "--yes").code == Exit.OK

@@ -13,7 +13,7 @@ from gaplab.api.commands import tables
 from gaplab.schemas.lifecycle import ExtensionSpec
 from gaplab.schemas.records import common_count
 from gaplab.schemas.spec import StudySpec
-from gaplab.services.archives import export_study, import_archive
+from gaplab.services.archives import export, import_archive
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import estimates, extension, listing, reading, submission
@@ -25,8 +25,8 @@ from gaplab.services.results.misfit import misfit
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.resolution import resolve_study
-from gaplab.services.specs.shortening import study_spec
+from gaplab.services.specs.resolution import resolve
+from gaplab.services.specs.shortening import shortest
 from gaplab.services.store.lease import TimedStep
 from gaplab.services.store.session import Store
 from tests.conftest import filled
@@ -49,7 +49,7 @@ def compute(store: Store) -> None:
 
 
 def fill(store: Store) -> None:
-    submission.submit_study(store, SPEC)
+    submission.submit(store, SPEC)
     compute(store)
 
 
@@ -62,11 +62,11 @@ def sqlite_template(sqlite_template: Path) -> Path:
 @pytest.fixture
 def study(sqlite_store: Store) -> Any:
     (found,) = listing.list_studies(sqlite_store).items
-    return reading.read_study(sqlite_store, found.id)
+    return reading.read(sqlite_store, found.id)
 
 
 def test_a_level_is_not_direct_and_has_a_single_point(sqlite_store: Store, study: Any) -> None:
-    found = curves.study_curves(sqlite_store, study.id)
+    found = curves.curves(sqlite_store, [study.id])
 
     assert [(each.level, each.direct) for each in study.experiments] == [
         (False, False), (True, False), (True, False), (True, True),
@@ -79,7 +79,7 @@ def test_a_level_is_not_direct_and_has_a_single_point(sqlite_store: Store, study
 
 
 def test_a_level_is_drawn_across_the_figure_with_a_look_of_its_own(sqlite_store: Store, study: Any) -> None:
-    figure = curves_figure(curves.study_curves(sqlite_store, study.id))
+    figure = curves_figure(curves.curves(sqlite_store, [study.id]))
 
     levels = [mark for mark in figure.panels[0].marks if isinstance(mark, Level)]
     assert [(level.style.ink, level.marked) for level in levels] == [(False, True), (False, True), (True, False)]
@@ -104,8 +104,8 @@ def test_a_level_has_no_iterations_to_add_and_no_misfit(sqlite_store: Store, stu
     envelope = study.experiments[2].id
 
     with pytest.raises(InvalidSpec, match="noise_envelope has no iterations"):
-        extension.extend_experiment(sqlite_store, envelope, ExtensionSpec(iterations=5))
-    assert extension.extend_experiment(sqlite_store, envelope, ExtensionSpec(repetitions=3)).progress.repetitions == 3
+        extension.extend(sqlite_store, envelope, ExtensionSpec(iterations=5))
+    assert extension.extend(sqlite_store, envelope, ExtensionSpec(repetitions=3)).progress.repetitions == 3
     assert misfit(sqlite_store, envelope).points == ()
 
 
@@ -129,21 +129,21 @@ def test_figures_of_tuned_simulators_say_why_they_are_empty(sqlite_store: Store,
 @pytest.mark.release
 def test_a_level_is_exported_and_imported_and_its_study_submitted_again(sqlite_store: Store, study: Any) -> None:
     stored = [each.spec for each in study.experiments]
-    again = study_spec(study.name, stored)
-    with export_study(sqlite_store, study.id).file as file:
+    again = shortest(study.name, stored)
+    with export(sqlite_store, study.id).file as file:
         data = file.read()
 
     assert again.spec is not None
-    assert resolve_study(StudySpec.model_validate(again.spec)) == resolve_study(SPEC)
+    assert resolve(StudySpec.model_validate(again.spec)) == resolve(SPEC)
     assert again.spec["direct_repetitions"] == 3
     imported = import_archive(sqlite_store, BytesIO(data))
-    assert [each.level for each in reading.read_study(sqlite_store, imported.study).experiments] == [False] + [True] * 3
+    assert [each.level for each in reading.read(sqlite_store, imported.study).experiments] == [False] + [True] * 3
 
 
 def test_an_extended_study_with_a_level_keeps_one_spec(sqlite_store: Store, study: Any) -> None:
-    extension.extend_experiment(sqlite_store, study.experiments[0].id, ExtensionSpec(iterations=4))
+    extension.extend(sqlite_store, study.experiments[0].id, ExtensionSpec(iterations=4))
 
-    again = study_spec(study.name, [each.spec for each in reading.read_study(sqlite_store, study.id).experiments])
+    again = shortest(study.name, [each.spec for each in reading.read(sqlite_store, study.id).experiments])
 
     assert again.spec is not None
     assert again.spec["iterations"] == 4
@@ -157,7 +157,7 @@ def test_an_estimate_counts_all_rollouts_of_a_level_and_no_iterations(sqlite_sto
 
 
 def test_a_terminal_tells_levels_from_the_baseline(sqlite_store: Store, study: Any) -> None:
-    found = curves.study_curves(sqlite_store, study.id)
+    found = curves.curves(sqlite_store, [study.id])
     console = Console(file=StringIO(), width=120)
     console.print(tables.curves(found))
 

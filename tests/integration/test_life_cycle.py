@@ -17,12 +17,12 @@ from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
-from tests.experiments import run, same, some_log, toy
+from tests.experiments import run, same, some_log, submit_one, toy
 from tests.integration.test_bench import compute as supervise
 
 
 def submitted(store: Store, **changes: Any) -> Any:
-    return submission.submit_experiment(store, toy(**changes)).id
+    return submit_one(store, toy(**changes)).id
 
 
 def state(store: Store, experiment: Any) -> Any:
@@ -34,7 +34,7 @@ def states(store: Store, experiment: Any) -> Any:
 
 
 def ask(store: Store, experiment: Any, verb: Any) -> Any:
-    return lifecycle.ask_experiment(store, experiment, verb).state
+    return lifecycle.ask(store, experiment, verb).state
 
 
 def deliver(store: Store, claim: Any, count: Any, log: Any = some_log) -> Any:
@@ -246,7 +246,7 @@ def compute_with(store: Store, log: Any) -> None:
 
 def obey(store: Store, experiment: Any, verb: Any) -> Any:
     if verb is Verb.EXTEND:
-        return extension.extend_experiment(store, experiment, ExtensionSpec(iterations=9)).state
+        return extension.extend(store, experiment, ExtensionSpec(iterations=9)).state
     return ask(store, experiment, verb)
 
 
@@ -270,22 +270,22 @@ def test_a_forbidden_verb_is_refused_and_changes_nothing(store: Store, here: Any
 @pytest.mark.dialects
 def test_a_verb_of_a_study_goes_to_all_of_its_experiments_that_permit_it(store: Store) -> None:
     small = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "simulated_fit", "direct"]}
-    study = submission.submit_study(store, StudySpec.model_validate(small))
+    study = submission.submit(store, StudySpec.model_validate(small))
     first, second, third = (each.id for each in study.experiments)
     ask(store, first, Verb.CANCEL)
     ask(store, second, Verb.PAUSE)
 
-    paused = lifecycle.ask_study(store, study.id, Verb.PAUSE)
-    with pytest.raises(Conflict, match="they are CANCELLED, PAUSED; permitted: QUEUED, RUNNING"):
-        lifecycle.ask_study(store, study.id, Verb.PAUSE)
-    resumed = lifecycle.ask_study(store, study.id, Verb.RESUME)
-    cancelled = lifecycle.ask_study(store, study.id, Verb.CANCEL)
+    paused = lifecycle.ask(store, study.id, Verb.PAUSE)
+    with pytest.raises(Conflict, match="is CANCELLED and PAUSED and cannot be paused; permitted: resume, stop, cancel"):
+        lifecycle.ask(store, study.id, Verb.PAUSE)
+    resumed = lifecycle.ask(store, study.id, Verb.RESUME)
+    cancelled = lifecycle.ask(store, study.id, Verb.CANCEL)
 
     assert [each.state for each in paused.experiments] == [State.CANCELLED, State.PAUSED, State.PAUSED]
     assert (paused.state, resumed.state, cancelled.state) == (State.PAUSED, State.RUNNING, State.CANCELLED)
     assert [each.id for each in cancelled.experiments] == [first, second, third]
     with pytest.raises(NotFound):
-        lifecycle.ask_study(store, "nope", Verb.STOP)
+        lifecycle.ask(store, "nope", Verb.STOP)
 
 
 @pytest.mark.parametrize("strategy", ["simulated_fit_and_informative", "simulated_fit"])
@@ -297,7 +297,7 @@ def test_an_extended_experiment_equals_one_that_was_submitted_with_the_larger_to
     large = submitted(store, strategy=strategy, iterations=3, repetitions=2)
     expected = compute(store, large)
 
-    extended = extension.extend_experiment(store, small, ExtensionSpec(iterations=3, repetitions=2))
+    extended = extension.extend(store, small, ExtensionSpec(iterations=3, repetitions=2))
     queued = states(store, small)
     found = compute(store, small)
 
@@ -315,35 +315,35 @@ def test_an_extended_study_equals_one_that_was_submitted_with_the_larger_totals(
     small = compared(store, iterations=1, repetitions=1)
     large = compared(store, iterations=2, repetitions=2)
 
-    extended = extension.extend_study(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
+    extended = extension.extend(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
     for experiment in (*small.experiments[:2], *large.experiments):
         compute(store, experiment.id)
 
     assert [each.state for each in extended.experiments] == [State.QUEUED, State.QUEUED, State.COMPLETED]
-    found, expected = (reading.read_study(store, each.id) for each in (small, large))
+    found, expected = (reading.read(store, each.id) for each in (small, large))
     assert [each.spec for each in found.experiments[:2]] == [each.spec for each in expected.experiments[:2]]
     assert found.state is State.COMPLETED
     for one, other in zip(found.experiments, expected.experiments, strict=True):
         assert curves.curve(store, one.id).points == curves.curve(store, other.id).points
-    with pytest.raises(Conflict, match="has anything left to run with these totals: ask for larger totals"):
-        extension.extend_study(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
+    with pytest.raises(Conflict, match="3 repetitions already, and none of these is left to run"):
+        extension.extend(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
     with pytest.raises(InvalidSpec, match="give a total of iterations"):
-        extension.extend_study(store, small.id, ExtensionSpec())
+        extension.extend(store, small.id, ExtensionSpec())
 
 
 def test_a_study_of_which_nothing_has_completed_is_not_extended(store: Store) -> None:
     study = compared(store, compute_it=False, iterations=1, repetitions=1)
 
-    with pytest.raises(Conflict, match="can be extended: they are QUEUED; permitted: COMPLETED"):
-        extension.extend_study(store, study.id, ExtensionSpec(repetitions=9))
+    with pytest.raises(Conflict, match="is QUEUED and cannot be extended; permitted: pause, stop, cancel"):
+        extension.extend(store, study.id, ExtensionSpec(repetitions=9))
     with pytest.raises(NotFound):
-        extension.extend_study(store, "nope", ExtensionSpec(repetitions=9))
+        extension.extend(store, "nope", ExtensionSpec(repetitions=9))
 
 
 def compared(store: Store, *, compute_it: bool = True, **changes: Any) -> Any:
     """A study of two strategies and of the direct baseline, which has three repetitions."""
     spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "simulated_fit", "direct"], **changes}
-    study = submission.submit_study(store, StudySpec.model_validate(spec | {"direct_repetitions": 3}))
+    study = submission.submit(store, StudySpec.model_validate(spec | {"direct_repetitions": 3}))
     for experiment in study.experiments if compute_it else ():
         compute(store, experiment.id)
     return study
@@ -358,13 +358,13 @@ def test_extending_a_stopped_experiment_to_what_it_had_brings_it_to_its_end(stor
     ask(store, experiment, Verb.STOP)
     execution.record(store, second, next(repetition(setting(second.spec, 1))))
 
-    extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=3))
+    extension.extend(store, experiment, ExtensionSpec(repetitions=3))
     found = compute(store, experiment)
 
     assert same(tuple(found), tuple(expected))
     assert states(store, experiment) == [State.COMPLETED] * 3
     with pytest.raises(Conflict, match="2 iterations and 3 repetitions already"):
-        extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=3))
+        extension.extend(store, experiment, ExtensionSpec(repetitions=3))
 
 
 def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterations(store: Store) -> None:
@@ -372,8 +372,8 @@ def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterat
     before = compute(store, experiment)
 
     with pytest.raises(InvalidSpec, match="direct baseline has no iterations"):
-        extension.extend_experiment(store, experiment, ExtensionSpec(iterations=5))
-    extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=2))
+        extension.extend(store, experiment, ExtensionSpec(iterations=5))
+    extension.extend(store, experiment, ExtensionSpec(repetitions=2))
 
     found = compute(store, experiment)
     assert same(found[0], before[0])
@@ -384,8 +384,8 @@ def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterat
 def test_totals_below_what_is_there_are_refused(store: Store, totals: Any) -> None:
     experiment = in_state(store, State.COMPLETED)
 
-    with pytest.raises(InvalidSpec, match=r"that the experiment has; give a total|give a total of"):
-        extension.extend_experiment(store, experiment, ExtensionSpec(**totals))
+    with pytest.raises(InvalidSpec, match=r"that there are; give a total|give a total of"):
+        extension.extend(store, experiment, ExtensionSpec(**totals))
 
     assert state(store, experiment) is State.COMPLETED
 
@@ -396,7 +396,7 @@ def test_a_failed_repetition_is_not_tried_again_by_extending(store: Store) -> No
     run(store, first)
     execution.fail(store, second, Failure("broken"))
 
-    extension.extend_experiment(store, experiment, ExtensionSpec(iterations=3))
+    extension.extend(store, experiment, ExtensionSpec(iterations=3))
 
     assert states(store, experiment) == [State.QUEUED, State.FAILED]
 
@@ -405,9 +405,9 @@ def test_reality_is_hidden_again_while_an_extended_experiment_runs(store: Store)
     experiment = in_state(store, State.COMPLETED)
     shown = reading.read_experiment(store, experiment).spec["reality"]["parameters"]
 
-    extended = extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=9))
+    extended = extension.extend(store, experiment, ExtensionSpec(repetitions=9))
 
-    assert set(extended.spec["reality"]["parameters"].values()) == {None}
+    assert set(extended.experiments[0].spec["reality"]["parameters"].values()) == {None}
     assert None not in shown.values()
 
 

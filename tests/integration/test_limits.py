@@ -73,7 +73,7 @@ def test_what_is_full_is_full_until_something_ends(store: Store, name: str) -> N
     taken = [each.json()["id"] for each in answers if each.status_code == 202]
     refused = [each for each in answers if each.status_code != 202]
 
-    api.post(f"/experiments/{taken[0]}/cancel")
+    api.post(f"/studies/{taken[0]}/cancel")
     room = api.post("/experiments", json=TOY)
 
     assert refused
@@ -90,9 +90,9 @@ def test_what_is_extended_stays_within_the_limits_too(sqlite_store: Store) -> No
     for claim in execution.claim(sqlite_store, "me", 9):
         run(sqlite_store, claim)
 
-    refused = served(sqlite_store, repetitions=4).post(f"/experiments/{made}/extend", json={"repetitions": 5})
-    full = served(sqlite_store, rollouts=1).post(f"/experiments/{made}/extend", json={"repetitions": 4})
-    extended = served(sqlite_store, repetitions=4).post(f"/experiments/{made}/extend", json={"repetitions": 4})
+    refused = served(sqlite_store, repetitions=4).post(f"/studies/{made}/extend", json={"repetitions": 5})
+    full = served(sqlite_store, rollouts=1).post(f"/studies/{made}/extend", json={"repetitions": 4})
+    extended = served(sqlite_store, repetitions=4).post(f"/studies/{made}/extend", json={"repetitions": 4})
 
     assert refused.status_code == 422
     assert variable_of("repetitions") in refused.json()["detail"]
@@ -109,7 +109,7 @@ def test_what_is_extended_counts_with_the_rollouts_that_it_has_left(sqlite_store
     left = 4 * each - done
 
     def extended(rollouts: int) -> int:
-        path = f"/experiments/{made['id']}/extend"
+        path = f"/studies/{made['id']}/extend"
         return served(sqlite_store, rollouts=rollouts).post(path, json={"repetitions": 4}).status_code
 
     assert done > 0
@@ -129,7 +129,7 @@ def test_a_study_is_let_in_whole_or_not_at_all(store: Store) -> None:
     api = served(store, experiments=2)
 
     assert api.post("/studies", json=STUDY).status_code == 429
-    assert api.get("/studies").json()["items"] == api.get("/experiments").json()["items"] == []
+    assert api.get("/studies").json()["items"] == []
 
 
 @pytest.mark.dialects
@@ -193,7 +193,7 @@ def test_an_export_waits_for_its_turn_and_is_refused_if_that_does_not_come(sqlit
     app = create_app(sqlite_store)
     app.state.exports = WaitingLine("exports", longest_s=0.0)
     api = TestClient(app)
-    path = f"/experiments/{api.post('/experiments', json=TOY).json()['id']}/export"
+    path = f"/studies/{api.post('/experiments', json=TOY).json()['id']}/export"
 
     with app.state.exports.turn():
         refused = api.get(path)
@@ -215,7 +215,7 @@ def test_who_waits_for_a_lock_on_the_database_holds_up_no_reader(sqlite_store: S
         other.execute("BEGIN IMMEDIATE")
         writes = [pool.submit(http.post, "/experiments", json=TOY) for _ in range(60)]
         wait_until(lambda: "are writing, and others wait" in http.get("/readyz").text)
-        read = http.get("/experiments")
+        read = http.get("/studies")
         other.execute("ROLLBACK")
         for each in writes:
             each.result()
@@ -332,9 +332,9 @@ def test_what_takes_thousands_of_core_hours_needs_a_confirmation(
     sqlite_store: Store, path: str, body: dict[str, object]
 ) -> None:
     api = served(sqlite_store)
-    hours = api.post(f"{path}/estimate", json=body).json()["core_seconds"] / 3_600
+    hours = api.post("/studies/estimate", json=body).json()["core_seconds"] / 3_600
 
-    refused, stored = api.post(path, json=body, headers={"Idempotency-Key": "k"}), api.get(path).json()["items"]
+    refused, stored = api.post(path, json=body, headers={"Idempotency-Key": "k"}), api.get("/studies").json()["items"]
     let_in = api.post(f"{path}?confirm_cost=true", json=body, headers={"Idempotency-Key": "k"})
 
     assert (refused.status_code, refused.json()["type"], stored) == (422, "urn:gaplab:problem:cost-unconfirmed", [])
@@ -375,7 +375,7 @@ def test_an_extension_is_confirmed_by_what_it_adds(sqlite_store: Store) -> None:
     sqlite_store.write(lambda session: session.execute(minutes))
     progress = reading.read_experiment(sqlite_store, made).progress
     each, done = progress.rollouts // 3, progress.rollouts_done + progress.rollouts_saved
-    api, path = served(sqlite_store, unconfirmed_core_hours=(6 * each - done) // 60), f"/experiments/{made}/extend"
+    api, path = served(sqlite_store, unconfirmed_core_hours=(6 * each - done) // 60), f"/studies/{made}/extend"
 
     refused = api.post(path, json={"repetitions": 7})
     extended = api.post(f"{path}?confirm_cost=true", json={"repetitions": 7})

@@ -9,25 +9,24 @@ import pytest
 from sqlalchemy import event
 
 from gaplab.schemas.lifecycle import State
-from gaplab.services.archives import export_study, import_archive
-from gaplab.services.experiments import listing, reading, submission
+from gaplab.services.archives import export, import_archive
+from gaplab.services.experiments import listing, reading
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.store.models import Base
 from gaplab.services.store.session import Store
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 from tests.filling import IN_A_STUDY, experiment_id, fill, study_id
 
 READS = {
-    "experiments": lambda store: listing.list_experiments(store, limit=5),
-    "experiments of a study": lambda store: listing.list_experiments(store, ListFilter(study=study_id(0))),
-    "experiments in a state": lambda store: listing.list_experiments(store, ListFilter(state=State.COMPLETED)),
     "studies": lambda store: listing.list_studies(store, limit=2),
+    "studies in a state": lambda store: listing.list_studies(store, ListFilter(state=State.COMPLETED), limit=2),
+    "a study": lambda store: reading.read(store, study_id(0)),
     "an experiment": lambda store: reading.read_experiment(store, experiment_id(0)),
     "samples": lambda store: reading.list_samples(store, experiment_id(0)),
     "a curve": lambda store: curves.curve(store, experiment_id(0)),
-    "a study's curves": lambda store: curves.study_curves(store, study_id(0)),
+    "a study's curves": lambda store: curves.curves(store, [study_id(0)]),
 }
 
 
@@ -58,13 +57,13 @@ def asked(store: Store) -> Any:
 def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store: Store, tmp_path: Path) -> None:
     fill(store, 2 * IN_A_STUDY)
 
-    with export_study(store, study_id(1)).file as archive:
+    with export(store, study_id(1)).file as archive:
         assert len(import_archive(store, archive).experiments) == IN_A_STUDY  # whole logs, or it would be refused
-    shown = listing.list_experiments(store, ListFilter(study=study_id(0))).items
+    shown = reading.read(store, study_id(0)).experiments
     assert {each.state for each in shown} == {State.COMPLETED}
     assert all(each.progress.iterations_done == each.progress.iterations == 44 for each in shown)
     assert [point.n for point in curves.curve(store, experiment_id(3)).points] == [4] * 11
-    submitted = submission.submit_experiment(store, toy())
+    submitted = submit_one(store, toy())
     assert {each.experiment_id for each in execution.claim(store, "me", 9)} == {submitted.id}
 
 
@@ -95,16 +94,14 @@ def test_every_read_finds_its_rows_by_an_index(sqlite_store: Store) -> None:
                 assert not [step for step in steps if step.startswith("SCAN") and "INDEX" not in step], statement
 
 
-@pytest.mark.parametrize("filters", [{}, {"state": State.RUNNING}, {"strategy": "informative"}])
-def test_a_page_of_experiments_is_read_in_its_order_and_not_sorted(sqlite_store: Store, filters: Any) -> None:
-    fill(sqlite_store, IN_A_STUDY)
+def test_a_page_of_studies_is_read_in_its_order_and_not_sorted(sqlite_store: Store) -> None:
+    fill(sqlite_store, 12 * IN_A_STUDY)
     with statements(sqlite_store) as found:
-        listing.list_experiments(sqlite_store, ListFilter(**filters))
-    page, parameters = next(each for each in found if "FROM experiment" in each[0] and "LIMIT" in each[0])
+        listing.list_studies(sqlite_store)
+    page, parameters = next(each for each in found if "FROM study" in each[0] and "LIMIT" in each[0])
 
     with sqlite_store.reading() as session:
         steps = [step for *_, step in session.connection().exec_driver_sql(f"EXPLAIN QUERY PLAN {page}", parameters)]
 
     assert len(steps) == 1
-    assert "created_at_position_id" in steps[0]
-    assert ("SEARCH" in steps[0]) is bool(filters)
+    assert "created_at_id" in steps[0]

@@ -21,11 +21,11 @@ def api(store: Store) -> Iterator[TestClient]:
         yield client
 
 
-def walk(api: TestClient, path: str, **query: Any) -> list[dict[str, Any]]:
+def walk(api: TestClient, **query: Any) -> list[dict[str, Any]]:
     """Every item, two at a time."""
     found, cursor = [], None
     while True:
-        page = api.get(path, params=query | {"limit": 2} | ({"cursor": cursor} if cursor else {}))
+        page = api.get("/studies", params=query | {"limit": 2} | ({"cursor": cursor} if cursor else {}))
         assert page.status_code == 200, page.text
         found += page.json()["items"]
         if (cursor := page.json()["next"]) is None:
@@ -33,14 +33,11 @@ def walk(api: TestClient, path: str, **query: Any) -> list[dict[str, Any]]:
 
 
 @pytest.mark.dialects
-@pytest.mark.parametrize("path", ["/experiments", "/studies"])
-def test_a_sorted_list_has_each_once_and_its_opposite_is_its_reverse(api: TestClient, path: str) -> None:
-    base = TOY if path == "/experiments" else {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
-    made = [api.post(path, json=base | {"name": name}).json()["id"] for name in NAMES]
+def test_a_sorted_list_has_each_once_and_its_opposite_is_its_reverse(api: TestClient) -> None:
+    made = [api.post("/studies", json=TOY | {"name": name}).json()["id"] for name in NAMES]
 
     found = {
-        sort: [each["id"] for each in walk(api, path, sort=sort)]
-        for sort in ("name", "-name", "created_at", "-created_at")
+        sort: [each["id"] for each in walk(api, sort=sort)] for sort in ("name", "-name", "created_at", "-created_at")
     }
 
     assert sorted(found["name"]) == sorted(made)
@@ -48,25 +45,12 @@ def test_a_sorted_list_has_each_once_and_its_opposite_is_its_reverse(api: TestCl
     assert (found["created_at"], found["-created_at"]) == (made, made[::-1])
 
 
-def test_experiments_are_sorted_by_state_and_strategy(api: TestClient) -> None:
-    for strategy in ("simulated_fit", "informative", "random"):
-        last = api.post("/experiments", json=TOY | {"strategy": strategy}).json()["id"]
-    api.post(f"/experiments/{last}/cancel")
-
-    assert [each["strategy"] for each in walk(api, "/experiments", sort="strategy")] == [
-        "informative",
-        "random",
-        "simulated_fit",
-    ]
-    assert [each["state"] for each in walk(api, "/experiments", sort="state")] == ["CANCELLED", "QUEUED", "QUEUED"]
-
-
 @pytest.mark.dialects
 def test_text_is_looked_for_in_names_and_ids_as_it_stands(api: TestClient) -> None:
     ids = {name: api.post("/experiments", json=TOY | {"name": name}).json()["id"] for name in NAMES}
 
     def found(text: str) -> set[str]:
-        return {each["name"] for each in walk(api, "/experiments", text=text)}
+        return {each["name"] for each in walk(api, text=text)}
 
     assert found("ALPHA") == {"Alpha", "alpha 50%", "alpha"}
     assert found("50%") == {"alpha 50%"}
@@ -84,52 +68,46 @@ def test_studies_are_filtered_by_state_strategy_and_text(store: Store, api: Test
         return api.post("/studies", json=spec).json()
 
     called_off, mixed = study("off", "random"), study("mixed", "random", "known_fit")
-    api.post(f"/experiments/{called_off['experiments'][0]['id']}/cancel")
-    api.post(f"/experiments/{mixed['experiments'][0]['id']}/cancel")
+    api.post(f"/studies/{called_off['experiments'][0]['id']}/cancel")
+    api.post(f"/studies/{mixed['experiments'][0]['id']}/cancel")
     study("waiting", "simulated_fit")
     paused, partly = study("paused", "random", "known_fit"), study("partly paused", "random", "known_fit")
     api.post(f"/studies/{paused['id']}/pause")
-    api.post(f"/experiments/{paused['experiments'][0]['id']}/cancel")
-    api.post(f"/experiments/{partly['experiments'][0]['id']}/pause")
+    api.post(f"/studies/{paused['experiments'][0]['id']}/cancel")
+    api.post(f"/studies/{partly['experiments'][0]['id']}/pause")
 
     def found(**which: str) -> set[str]:
-        return {each["name"] for each in walk(api, "/studies", **which)}
+        return {each["name"] for each in walk(api, **which)}
 
     assert found(strategy="random") == {"off", "mixed", "paused", "partly paused"}
     assert found(strategy="random", text="MIX") == {"mixed"}
     for state in State:
-        assert found(state=state) == {each["name"] for each in walk(api, "/studies") if each["state"] == state}
+        assert found(state=state) == {each["name"] for each in walk(api) if each["state"] == state}
     assert found(state="RUNNING") == {"mixed", "partly paused"}
     assert found(state="PAUSED") == {"paused"}
     assert found(state="CANCELLED") == {"off"}
 
 
-@pytest.mark.parametrize("path", ["/experiments", "/studies"])
-def test_a_cursor_is_good_only_for_the_list_that_gave_it(api: TestClient, path: str) -> None:
-    base = TOY if path == "/experiments" else {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
+def test_a_cursor_is_good_only_for_the_list_that_gave_it(api: TestClient) -> None:
     for _ in range(2):
-        api.post(path, json=base)
-    cursor = api.get(path, params={"limit": 1}).json()["next"]
+        api.post("/studies", json=TOY)
+    cursor = api.get("/studies", params={"limit": 1}).json()["next"]
 
     for other in ({"sort": "created_at"}, {"text": "r"}, {"state": "QUEUED"}, {"strategy": "random"}):
-        refused = api.get(path, params=other | {"cursor": cursor})
+        refused = api.get("/studies", params=other | {"cursor": cursor})
         assert refused.status_code == 422
         assert refused.json()["errors"][0]["pointer"] == "cursor"
-    assert len(api.get(path, params={"cursor": cursor, "limit": 7}).json()["items"]) == 1
+    assert len(api.get("/studies", params={"cursor": cursor, "limit": 7}).json()["items"]) == 1
 
 
-def submitted(api: TestClient, noun: str) -> tuple[str, str]:
-    base = TOY if noun == "experiments" else {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
-    address = f"/{noun}/{api.post(f'/{noun}', json=base).json()['id']}"
+def submitted(api: TestClient) -> tuple[str, str]:
+    address = f"/studies/{api.post('/experiments', json=TOY).json()['id']}"
     return address, api.get(address).headers["etag"]
 
 
 @pytest.mark.dialects
-@pytest.mark.parametrize("noun", ["experiments", "studies"])
-def test_a_change_that_starts_from_what_is_there_is_made_and_another_that_does_too_is_refused(
-    api: TestClient, noun: str
-) -> None:
-    address, tag = submitted(api, noun)
+def test_a_change_that_starts_from_what_is_there_is_made_and_another_that_does_too_is_refused(api: TestClient) -> None:
+    address, tag = submitted(api)
 
     first = api.patch(address, json={"name": "first", "notes": "new\0 notes"}, headers={"If-Match": tag})
     second = api.patch(address, json={"name": "second"}, headers={"If-Match": f'"9.aa", {tag}'})
@@ -140,7 +118,24 @@ def test_a_change_that_starts_from_what_is_there_is_made_and_another_that_does_t
     assert first.json()["notes"].startswith("new")
     shown = api.get(address).json()
     assert (shown["name"], shown["notes"], shown["edits"]) == ("first", None, 2)
-    assert api.get(f"/{noun}", params={"text": "FIRST"}).json()["items"][0]["edits"] == 2
+    assert shown["experiments"][0]["name"] == "first"
+    assert api.get("/studies", params={"text": "FIRST"}).json()["items"][0]["edits"] == 2
+
+
+def test_an_experiment_among_others_has_a_name_of_its_own_and_the_notes_and_tags_of_its_study(api: TestClient) -> None:
+    spec = {"name": "both", "strategies": ["random", "known_fit"], "robot": "toy_function", "budget": "smoke"}
+    study = api.post("/studies", json=spec).json()
+    one, whatever = f"/studies/{study['experiments'][0]['id']}", {"If-Match": "*"}
+
+    renamed = api.patch(one, json={"name": "half the weight"}, headers=whatever).json()
+    refused = api.patch(one, json={"tags": ["a"]}, headers=whatever)
+
+    assert (renamed["name"], renamed["edits"]) == ("half the weight", 1)
+    shown = api.get(f"/studies/{study['id']}").json()
+    assert shown["name"] == "both"
+    assert [each["name"] for each in shown["experiments"]] == ["half the weight", "known_fit"]
+    assert refused.status_code == 409
+    assert study["id"] in refused.json()["detail"]
 
 
 def test_a_change_that_cannot_be_made_says_why(api: TestClient) -> None:
@@ -154,7 +149,7 @@ def test_a_change_that_cannot_be_made_says_why(api: TestClient) -> None:
         ({"If-Match": "*"}, {"state": "COMPLETED"}, 422),
         ({"If-Match": "*"}, {"notes": "x" * 10_001}, 422),
     ]
-    address, _ = submitted(api, "experiments")
+    address, _ = submitted(api)
 
     answers = [api.patch(address, json=body, headers=headers) for headers, body, _ in wrong]
 
@@ -164,7 +159,7 @@ def test_a_change_that_cannot_be_made_says_why(api: TestClient) -> None:
 
 
 def test_progress_outdates_what_was_seen_but_refuses_no_edit(store: Store, api: TestClient) -> None:
-    address, tag = submitted(api, "experiments")
+    address, tag = submitted(api)
     same = api.get(address, headers={"If-None-Match": f'"0.0", W/{tag}'})
     execution.claim(store, "me", 1)
 
@@ -178,7 +173,7 @@ def test_progress_outdates_what_was_seen_but_refuses_no_edit(store: Store, api: 
 
 
 def test_whatever_there_is_is_not_sent_and_what_is_changed_is_shown(api: TestClient) -> None:
-    address, tag = submitted(api, "experiments")
+    address, tag = submitted(api)
     whatever = {"If-None-Match": "*"}
 
     read = api.get(address, headers=whatever)

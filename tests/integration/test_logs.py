@@ -16,9 +16,8 @@ from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
 from gaplab.services import logs
-from gaplab.services.experiments import submission
 from gaplab.services.store.session import Store
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 from tests.waiting import LONGEST_S, wait_until
 
 SECRET = "Zm9vYmFyLTEyMzQ1"
@@ -110,7 +109,7 @@ def test_a_traceback_has_no_secrets_either() -> None:
 @pytest.mark.usefixtures("restored")
 @pytest.mark.parametrize("kind", [io.StringIO, Terminal])
 def test_values_of_a_row_that_postgres_quotes_are_left_out(postgres_store: Store, kind: Any) -> None:
-    submission.submit_experiment(postgres_store, toy(name="peculiar\nname"))
+    submit_one(postgres_store, toy(name="peculiar\nname"))
     stream = kind()
     try:
         postgres_store.write(lambda session: session.execute(text("UPDATE experiment SET state = 'NONSENSE'")))
@@ -178,8 +177,8 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
             secret = {"Authorization": f"Bearer {SECRET}", "X-Token": SECRET}
             assert http.get("/assets/dashboard/app.js").status_code == 200
             assert http.get("/experiments/abc", headers=secret).status_code == 401
-            assert http.get("/experiments/abc").status_code == 404
-            assert http.get("/experiments", params={"token": SECRET, "x": SECRET}).status_code == 422
+            assert http.get("/studies/abc").status_code == 404
+            assert http.get("/studies", params={"token": SECRET, "x": SECRET}).status_code == 422
             assert http.get(f"/experiments/gaplab_abc_{TOKEN}/curve").status_code == 404
             assert http.get(f"/gaplab%5Fabc%5F{TOKEN}", params={"gaplab_abc_": TOKEN}).status_code == 404
     finally:
@@ -191,10 +190,10 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
     assert SECRET not in said
     assert TOKEN[:16] not in said
     assert lines[0]["message"].startswith("gaplab serves on http://")
-    assert [(each["path"], each["status"], each.get("experiment")) for each in lines[1:]] == [
+    assert [(each["path"], each["status"], each.get("experiment") or each.get("study")) for each in lines[1:]] == [
         ("/experiments/abc", 401, "abc"),
-        ("/experiments/abc", 404, "abc"),
-        ("/experiments", 422, None),
+        ("/studies/abc", 404, "abc"),
+        ("/studies", 422, None),
         ("/experiments/gaplab_…/curve", 404, "gaplab_…"),
         ("/gaplab_…", 404, None),
     ]

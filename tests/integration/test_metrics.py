@@ -10,10 +10,10 @@ from sqlalchemy import event
 from gaplab.api.app import create_app
 from gaplab.api.http import metrics
 from gaplab.services.core.errors import StoreUnavailable
-from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments import reading
 from gaplab.services.running import execution, supervisors
 from gaplab.services.store.session import Store
-from tests.experiments import cancel, run, toy
+from tests.experiments import cancel, run, submit_one, toy
 
 
 def read(api: TestClient) -> dict[tuple[str, ...], float]:
@@ -26,8 +26,8 @@ def read(api: TestClient) -> dict[tuple[str, ...], float]:
 
 @pytest.mark.dialects
 def test_it_counts_what_the_database_holds(store: Store) -> None:
-    submission.submit_experiment(store, toy())
-    cancel(store, submission.submit_experiment(store, toy()).id)
+    submit_one(store, toy())
+    cancel(store, submit_one(store, toy()).id)
     first, _ = execution.claim(store, "me", 2)
     run(store, first)
     supervisors.heartbeat(store, "me")
@@ -52,7 +52,7 @@ def test_it_counts_what_the_database_holds(store: Store) -> None:
 
 def test_requests_are_counted_by_route_and_not_by_what_was_asked(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store))
-    id_ = submission.submit_experiment(sqlite_store, toy()).id
+    id_ = submit_one(sqlite_store, toy()).id
     for path in (f"/experiments/{id_}", f"/experiments/{id_}", "/experiments/nobody", "/no/such/1", "/no/such/2"):
         api.get(path)
     api.request("BREW", "/experiments")
@@ -105,13 +105,13 @@ def test_without_a_database_it_says_so_and_counts_the_errors() -> None:
 
 
 def test_what_a_deletion_takes_away_is_no_counter(store: Store) -> None:
-    id_ = submission.submit_experiment(store, toy(repetitions=1)).id
+    id_ = submit_one(store, toy(repetitions=1)).id
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim)
     api = TestClient(create_app(store))
     before = read(api)
 
-    api.delete(f"/experiments/{id_}")
+    api.delete(f"/studies/{id_}")
 
     names = ("gaplab_rollouts_done", "gaplab_steps_done")
     assert all(before[name,] > 0 for name in names)

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,12 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, inspect
+from sqlalchemy import Connection, MetaData, inspect, select
 
 from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.store.engine import WRITES, open_engine
-from gaplab.services.store.models import REVISION, Base
+from gaplab.services.store.models import REVISION, Base, ExperimentRow, NotificationRow, StudyRow, ViewRow
 from gaplab.services.store.session import Store
 
 pytestmark = pytest.mark.dialects
@@ -62,6 +63,35 @@ def test_the_schema_goes_up_to_what_the_models_say_and_down_to_nothing(database_
         "ck_sensitivity_state",
         "ck_token_role",
     ]
+
+
+def test_an_experiment_without_a_study_gets_one_and_what_people_wrote_goes_to_the_study(database_url: str) -> None:
+    engine = open_engine(database_url, enforce_foreign_keys=False).execution_options(**{WRITES: True})
+    with engine.begin() as connection:
+        command.upgrade(migrations.configuration(connection), "0003")
+        before = MetaData()
+        before.reflect(connection)
+        at = datetime(2026, 11, 5, tzinfo=UTC)
+        named: dict[str, Any] = {"strategy": "random", "state": "QUEUED", "spec": {}, "spec_version": 1, "position": 0}
+        row = named | {"iterations": 1, "rollouts": 1, "created_at": at, "turn_at": at}
+        alone = row | {"id": "a", "study_id": None, "name": "alone", "notes": "wet", "tags": " gait ", "webhook": "w"}
+        member = row | {"id": "m", "study_id": "s", "name": "member", "notes": "bent", "tags": " b ", "webhook": None}
+        study = {"id": "s", "name": "both", "notes": "all", "tags": " a ", "created_at": at}
+        message = {"event": 1, "subject_id": "a", "experiment_id": "a", "channel": "webhook", "attempts": 0}
+        view = {"name": "v", "shows": "experiments", "sort": "-state", "created_at": at}
+        connection.execute(before.tables["study"].insert(), study)
+        connection.execute(before.tables["experiment"].insert(), [alone, member])
+        connection.execute(before.tables["notification"].insert(), message | {"message": {"kind": "study", "id": "1"}})
+        connection.execute(before.tables["view"].insert(), view)
+        command.upgrade(migrations.configuration(connection), "head")
+        studies = connection.execute(select(StudyRow.id, StudyRow.name, StudyRow.notes, StudyRow.tags)).all()
+        kept = dict(connection.execute(select(ExperimentRow.id, ExperimentRow.study_id)).all())
+        sent, sort = connection.scalar(select(NotificationRow.message)), connection.scalar(select(ViewRow.sort))
+    engine.dispose()
+
+    assert sorted(studies) == [("a", "alone", "wet", " gait "), ("s", "both", "all\n\nmember: bent", " a b ")]
+    assert kept == {"a": "a", "m": "s"}
+    assert (sent, sort) == ({"id": "1"}, "-created_at")
 
 
 def test_upgrading_at_head_changes_nothing(store_url: str) -> None:

@@ -12,13 +12,13 @@ from gaplab.schemas.misfit import Identification
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments import reading
 from gaplab.services.results.misfit import misfit, misfit_csv
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
-from tests.experiments import run, some_log, toy
+from tests.experiments import run, some_log, submit_one, toy
 
 SECRET = 0.987654321
 
@@ -29,7 +29,7 @@ def stored_log(store: Store, repetition: Any) -> Any:
 
 
 def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(repetitions=2)).id
+    experiment = submit_one(store, toy(repetitions=2)).id
     for claim in execution.claim(store, "me", 2):
         run(store, claim)
 
@@ -46,7 +46,7 @@ def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store: Stor
 
 
 def test_repetitions_that_are_under_way_count_as_far_as_they_are(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(repetitions=2)).id
+    experiment = submit_one(store, toy(repetitions=2)).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
     for step in list(some_log())[:6]:  # up to the tuning of iteration 1
@@ -61,7 +61,7 @@ def test_advice_counts_samples_and_not_iterations(store: Store) -> None:
     """The repetitions disagree, and 40 samples are from before: two more do not tell whether more would help."""
     known = [{"genome": [0.5], "values": [0.5]}] * 40
     spec = toy(repetitions=5, reality={"kind": "physical", "samples": known})
-    experiment = submission.submit_experiment(store, spec).id
+    experiment = submit_one(store, spec).id
     for number, claim in enumerate(execution.claim(store, "me", 5)):
         found = Simulator([0.3 * number, 0.2 * number], 0.04)  # type: ignore[arg-type]
         for step in some_log():
@@ -75,7 +75,7 @@ def test_advice_counts_samples_and_not_iterations(store: Store) -> None:
 
 
 def test_a_coefficient_at_its_bound_is_remarked_on(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(repetitions=1, iterations=1)).id
+    experiment = submit_one(store, toy(repetitions=1, iterations=1)).id
     (claim,) = execution.claim(store, "me", 1)
     simulators = (Simulator([1.5, 0.7], 0.04),)  # type: ignore[arg-type]
     log = [
@@ -97,9 +97,9 @@ def test_a_coefficient_at_its_bound_is_remarked_on(store: Store) -> None:
 
 
 def test_an_experiment_without_results_has_no_misfit_yet_and_the_direct_baseline_never(store: Store) -> None:
-    waiting = submission.submit_experiment(store, toy()).id
+    waiting = submit_one(store, toy()).id
     execution.claim(store, "me", 9)
-    direct = submission.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
+    direct = submit_one(store, toy(strategy="direct", repetitions=1)).id
     (claim,) = execution.claim(store, "me", 9)
     run(store, claim, some_log(iterations=0))
 
@@ -109,7 +109,7 @@ def test_an_experiment_without_results_has_no_misfit_yet_and_the_direct_baseline
 
 def test_nothing_of_reality_is_shown(store: Store) -> None:
     spec = toy(repetitions=1, reality={"parameters": {"static_friction": SECRET}})
-    experiment = submission.submit_experiment(store, spec).id
+    experiment = submit_one(store, spec).id
     run(store, execution.claim(store, "me", 1)[0])
 
     assert str(SECRET) not in misfit(store, experiment).model_dump_json()
@@ -121,7 +121,7 @@ def test_the_misfit_of_an_unknown_experiment_is_not_found(store: Store) -> None:
 
 
 def test_held_out_samples_are_stored_and_their_error_is_shown_beside_the_other(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(repetitions=1, held_out=0.5)).id
+    experiment = submit_one(store, toy(repetitions=1, held_out=0.5)).id
     (claim,) = execution.claim(store, "me", 1)
     for step in repetition(setting(claim.spec, 0)):
         assert execution.record(store, claim, step)
@@ -146,7 +146,7 @@ def test_held_out_samples_are_stored_and_their_error_is_shown_beside_the_other(s
 
 
 def test_a_posterior_and_intervals_say_what_a_single_repetition_knows(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(repetitions=1, iterations=1)).id
+    experiment = submit_one(store, toy(repetitions=1, iterations=1)).id
     (claim,) = execution.claim(store, "me", 1)
     interval = np.array([[0.9, 1.1], [0.0, 1.5]])
     simulators = (

@@ -8,22 +8,22 @@ from fastapi.testclient import TestClient
 from gaplab.api.app import create_app
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.experiments import submission
 from gaplab.services.running.execution import claim
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
-from tests.experiments import run, toy
+from tests.experiments import run, submit_one, toy
 from tests.parameters import few
 
 WHY = "'gone'; permitted: ", "the robot 'gone' with the hash"
-STORED = ("", "/curve", "/misfit", "/simulators", "/report", "/export")
+OF_ONE = ("/experiments/{}", "/experiments/{}/curve", "/experiments/{}/misfit", "/experiments/{}/simulators")
+STORED = (*OF_ONE, "/studies/{}", "/studies/{}/report", "/studies/{}/export")
 COMPUTED = ("/experiments/{}/predictions", "/figures/predictions?experiment={}", "/figures/toy?experiment={}")
 
 
 def experiment_without(store: Store, kind: str) -> str:
     """The id of one that is computed, and whose plug-in of this kind, or whose robot's file, is gone."""
-    made = submission.submit_experiment(store, toy(repetitions=1))
+    made = submit_one(store, toy(repetitions=1))
     (one,) = claim(store, "me", 1)
     run(store, one)
     with store.transaction() as session:
@@ -42,7 +42,7 @@ def test_what_is_stored_is_shown(sqlite_store: Store, kind: str) -> None:
     id_ = experiment_without(sqlite_store, kind)
     api = TestClient(create_app(sqlite_store))
 
-    answers = {path: api.get(f"/experiments/{id_}{path}").status_code for path in STORED}
+    answers = {path: api.get(path.format(id_)).status_code for path in STORED}
 
     assert answers == dict.fromkeys(STORED, 200)
 

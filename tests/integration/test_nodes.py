@@ -21,13 +21,14 @@ from ray.cluster_utils import Cluster
 from gaplab.arithmetic import FIXED
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import ClusterUnusable
-from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments import reading
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
 from gaplab.workers import task
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
 from tests.arithmetic import told
+from tests.experiments import submit_one
 from tests.integration.test_workers import expected, run, stored, toy
 
 pytestmark = pytest.mark.release
@@ -91,7 +92,7 @@ def ran_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 def test_without_cores_what_waits_is_a_demand_that_an_autoscaler_sees_and_runs_once_a_node_joins(
     joined: Any, head: Any, sqlite_store: Store
 ) -> None:
-    experiment = submission.submit_experiment(sqlite_store, toy()).id
+    experiment = submit_one(sqlite_store, toy()).id
     supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions)
     gcs = GcsClient(address=head.address)
 
@@ -114,7 +115,7 @@ def test_the_numbers_do_not_depend_on_how_many_nodes_there_are(
     joined: Any, sqlite_store: Store, ran_on: Any, in_one_process: Any, request: pytest.FixtureRequest
 ) -> None:
     count = request.node.callspec.params["joined"]
-    experiment = submission.submit_experiment(sqlite_store, SPEC).id
+    experiment = submit_one(sqlite_store, SPEC).id
 
     run(Supervisor(sqlite_store, joined.capacity, joined.versions), sqlite_store, experiment)
 
@@ -132,7 +133,7 @@ def test_the_nodes_run_the_same_code_of_numpy_as_this_process(joined: Any) -> No
 def test_a_node_lost_in_the_middle_costs_no_result(
     joined: Any, head: Any, sqlite_store: Store, ran_on: Any, in_one_process: Any
 ) -> None:
-    experiment = submission.submit_experiment(sqlite_store, SPEC).id
+    experiment = submit_one(sqlite_store, SPEC).id
     supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions)
     run(supervisor, sqlite_store, experiment, until=lambda: len(ran_on()) == 4)
 
@@ -150,7 +151,7 @@ def test_a_node_lost_in_the_middle_costs_no_result(
 def test_a_node_that_joins_with_other_versions_ends_the_work_before_a_step_of_it_is_stored(
     joined: Any, sqlite_store: Store
 ) -> None:
-    experiment = submission.submit_experiment(sqlite_store, toy()).id
+    experiment = submit_one(sqlite_store, toy()).id
     supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions | {"gaplab": "0.0.1"})
 
     with pytest.raises(ClusterUnusable, match=r"the supervisor has gaplab 0\.0\.1"):
@@ -170,7 +171,7 @@ from gaplab.services.store.session import Store
 
 spec = ExperimentSpec.model_validate_json(sys.argv[1])
 store = Store(os.environ["GAPLAB_DATABASE_URL"])
-experiment = submission.submit_experiment(store, spec).id
+experiment = submit_one(store, spec).id
 head = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
 os.environ["GAPLAB_RAY_ADDRESS"] = head.address
 del os.environ["RAY_AUTH_MODE"]  # the supervisor's own default

@@ -27,8 +27,8 @@ from gaplab.services import events
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import lifecycle, reading, submission
-from gaplab.services.experiments.deletion import Deleter, delete_experiment
-from gaplab.services.experiments.extension import extend_experiment
+from gaplab.services.experiments.deletion import Deleter, delete
+from gaplab.services.experiments.extension import extend
 from gaplab.services.notifications import delivery, outbox
 from gaplab.services.notifications.courier import Courier, courier
 from gaplab.services.notifications.webhooks import refusal, set_webhook
@@ -37,7 +37,7 @@ from gaplab.services.settings import Notify
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import EventRow, NotificationRow, NotifierRow
 from gaplab.services.store.session import Store
-from tests.experiments import cancel, run, some_log, toy
+from tests.experiments import cancel, run, some_log, submit_one, toy
 from tests.waiting import wait_until
 
 STUDY = {"strategies": ["random", "known_fit"], "robot": "toy_function", "budget": "smoke", "repetitions": 1}
@@ -111,7 +111,7 @@ def later(store: Store, seconds: float) -> Iterator[None]:
 
 def test_a_study_is_told_once_when_its_last_experiment_has_ended(store: Store, receiver: Receiver) -> None:
     bob = begun(store, url=receiver.url)
-    study = submission.submit_study(store, StudySpec.model_validate(STUDY | {"name": "gaits"}))
+    study = submission.submit(store, StudySpec.model_validate(STUDY | {"name": "gaits"}))
     cancel(store, study.experiments[0].id)
     bob.work()
     assert receiver.messages == []
@@ -122,20 +122,20 @@ def test_a_study_is_told_once_when_its_last_experiment_has_ended(store: Store, r
 
     (message,) = receiver.messages
     assert message["text"] == "The study gaits is COMPLETED: 1 CANCELLED, 1 COMPLETED."
-    assert (message["kind"], message["subject"], message["state"]) == ("study", study.id, "COMPLETED")
+    assert (message["subject"], message["state"]) == (study.id, "COMPLETED")
     assert message["url"] == f"http://lab.example:8000/#/studies/{study.id}"
     assert receiver.headers[0]["Gaplab-Notification"] == message["id"]
     assert "Gaplab-Signature" not in receiver.headers[0]
-    assert told(store) == [(EventKind.NOTIFIED, {"channel": "webhook", "of": "study", "attempt": 1})]
+    assert told(store) == [(EventKind.NOTIFIED, {"channel": "webhook", "attempt": 1})]
 
 
 def test_a_study_that_goes_on_is_told_again(store: Store, receiver: Receiver) -> None:
     bob = begun(store, url=receiver.url)
-    alone = submission.submit_experiment(store, toy(repetitions=1))
+    alone = submit_one(store, toy(repetitions=1))
     finish(store)
     bob.work()
 
-    extend_experiment(store, alone.id, ExtensionSpec(repetitions=2))
+    extend(store, alone.id, ExtensionSpec(repetitions=2))
     bob.work()
     finish(store)
     bob.work()
@@ -146,9 +146,9 @@ def test_a_study_that_goes_on_is_told_again(store: Store, receiver: Receiver) ->
 
 def test_an_experiment_that_ended_twice_before_anybody_looked_is_told_once(store: Store, receiver: Receiver) -> None:
     bob = begun(store, url=receiver.url)
-    alone = submission.submit_experiment(store, toy(repetitions=1))
+    alone = submit_one(store, toy(repetitions=1))
     finish(store)
-    extend_experiment(store, alone.id, ExtensionSpec(repetitions=2))
+    extend(store, alone.id, ExtensionSpec(repetitions=2))
     finish(store)
 
     bob.work()
@@ -160,26 +160,26 @@ def test_a_study_whose_last_experiment_was_cancelled_and_deleted_at_once_is_told
     store: Store, receiver: Receiver
 ) -> None:
     bob = begun(store, url=receiver.url)
-    study = submission.submit_study(store, StudySpec.model_validate(STUDY))
+    study = submission.submit(store, StudySpec.model_validate(STUDY))
     first, second = (each.id for each in study.experiments)
-    lifecycle.ask_experiment(store, second, Verb.PAUSE)
+    lifecycle.ask(store, second, Verb.PAUSE)
     finish(store)
     bob.work()
     assert receiver.messages == []
 
     cancel(store, second)
-    delete_experiment(store, second, Deleter(None, may_delete_all=True))
+    delete(store, second, Deleter(None, may_delete_all=True))
     bob.work()
 
     (message,) = receiver.messages
-    assert (message["kind"], message["subject"], message["state"]) == ("study", study.id, "COMPLETED")
+    assert (message["subject"], message["state"]) == (study.id, "COMPLETED")
     assert [each["id"] for each in message["experiments"]] == [first]
 
 
 @pytest.mark.dialects
 def test_what_is_not_delivered_is_tried_again_after_pauses_until_it_is(store: Store, receiver: Receiver) -> None:
     bob = begun(store, url=receiver.url)
-    cancel(store, submission.submit_experiment(store, toy()).id)
+    cancel(store, submit_one(store, toy()).id)
     receiver.status = 503
 
     for pause in (0, 10):
@@ -192,11 +192,11 @@ def test_what_is_not_delivered_is_tried_again_after_pauses_until_it_is(store: St
 
     assert len(receiver.messages) == 3
     assert len({message["id"] for message in receiver.messages}) == 1
-    failed = {"channel": "webhook", "of": "experiment", "reason": "it answered 503"}
+    failed = {"channel": "webhook", "reason": "it answered 503"}
     assert told(store) == [
         (EventKind.NOTIFICATION_FAILED, failed | {"attempt": 1, "again_in_s": 10}),
         (EventKind.NOTIFICATION_FAILED, failed | {"attempt": 2, "again_in_s": 60}),
-        (EventKind.NOTIFIED, {"channel": "webhook", "of": "experiment", "attempt": 3}),
+        (EventKind.NOTIFIED, {"channel": "webhook", "attempt": 3}),
     ]
 
 
@@ -204,7 +204,7 @@ def test_a_notification_is_given_up_after_its_last_pause_or_where_it_is_refused(
     sqlite_store: Store, receiver: Receiver
 ) -> None:
     bob = begun(sqlite_store, url=receiver.url)
-    cancel(sqlite_store, submission.submit_experiment(sqlite_store, toy()).id)
+    cancel(sqlite_store, submit_one(sqlite_store, toy()).id)
     receiver.status = 500
     for pause in (0, *outbox.PAUSES_S, 86_400):
         with later(sqlite_store, pause):
@@ -215,7 +215,7 @@ def test_a_notification_is_given_up_after_its_last_pause_or_where_it_is_refused(
     for status in (404, 302):
         receiver.messages.clear()
         receiver.status = status
-        cancel(sqlite_store, submission.submit_experiment(sqlite_store, toy()).id)
+        cancel(sqlite_store, submit_one(sqlite_store, toy()).id)
         bob.work()
         with later(sqlite_store, 86_400):
             bob.work()
@@ -225,7 +225,7 @@ def test_a_notification_is_given_up_after_its_last_pause_or_where_it_is_refused(
 @pytest.mark.dialects
 def test_another_process_continues_what_one_that_died_had_begun(store: Store, receiver: Receiver) -> None:
     begun(store, url=receiver.url)
-    cancel(store, submission.submit_experiment(store, toy()).id)
+    cancel(store, submit_one(store, toy()).id)
     heir = Courier(store, Notify(url=receiver.url))
     assert not heir.work()
     with store.transaction() as session:
@@ -237,9 +237,9 @@ def test_another_process_continues_what_one_that_died_had_begun(store: Store, re
 
 
 def test_nobody_is_told_of_what_ended_before_or_long_ago(store: Store, receiver: Receiver) -> None:
-    cancel(store, submission.submit_experiment(store, toy()).id)
+    cancel(store, submit_one(store, toy()).id)
     bob = begun(store, url=receiver.url)
-    cancel(store, submission.submit_experiment(store, toy()).id)
+    cancel(store, submit_one(store, toy()).id)
     with store.transaction() as session:
         session.execute(update(EventRow).values(at=moment(session) - timedelta(days=2)))
 
@@ -253,7 +253,7 @@ def test_a_database_that_was_restored_tells_what_ends_from_then_on(store: Store,
     with store.transaction() as session:
         session.execute(update(NotifierRow).values(after=10_000))
     bob.work()
-    cancel(store, submission.submit_experiment(store, toy()).id)
+    cancel(store, submit_one(store, toy()).id)
 
     bob.work()
 
@@ -262,7 +262,7 @@ def test_a_database_that_was_restored_tells_what_ends_from_then_on(store: Store,
 
 def test_a_signature_proves_who_sent_it(sqlite_store: Store, receiver: Receiver) -> None:
     bob = begun(sqlite_store, url=receiver.url, secret="key")
-    cancel(sqlite_store, submission.submit_experiment(sqlite_store, toy()).id)
+    cancel(sqlite_store, submit_one(sqlite_store, toy()).id)
 
     bob.work()
 
@@ -282,7 +282,7 @@ def test_the_owners_command_reads_the_message_and_sees_no_secret(
         "sys.exit(len(sys.argv) - 2)"
     )
     bob = begun(sqlite_store, command=f"{sys.executable} {script} 'one argument'")
-    made = submission.submit_experiment(sqlite_store, toy(name="$(touch /tmp/never); `id`"))
+    made = submit_one(sqlite_store, toy(name="$(touch /tmp/never); `id`"))
     cancel(sqlite_store, made.id)
 
     bob.work()
@@ -302,7 +302,7 @@ def test_the_owners_command_reads_the_message_and_sees_no_secret(
 )
 def test_a_command_that_fails_is_said(sqlite_store: Store, command: str, reason: str) -> None:
     bob = begun(sqlite_store, command=command)
-    cancel(sqlite_store, submission.submit_experiment(sqlite_store, toy()).id)
+    cancel(sqlite_store, submit_one(sqlite_store, toy()).id)
 
     bob.work()
 
@@ -314,14 +314,14 @@ def test_a_command_that_fails_is_said(sqlite_store: Store, command: str, reason:
 def test_a_webhook_of_ones_own_is_told_of_that_alone(store: Store, receiver: Receiver) -> None:
     hosts = receiver.url.removeprefix("http://")
     bob = begun(store, hosts=hosts)
-    mine, other = (submission.submit_experiment(store, toy()).id for _ in range(2))
-    study = submission.submit_study(store, StudySpec.model_validate(STUDY))
-    shown = set_webhook(store, "experiment", mine, WebhookSpec(url=f"{receiver.url}/secret"), {hosts})
-    set_webhook(store, "study", study.id, WebhookSpec(url=receiver.url), {hosts})
+    mine, other = (submit_one(store, toy()).id for _ in range(2))
+    study = submission.submit(store, StudySpec.model_validate(STUDY))
+    shown = set_webhook(store, mine, WebhookSpec(url=f"{receiver.url}/secret"), {hosts})
+    set_webhook(store, study.id, WebhookSpec(url=receiver.url), {hosts})
 
     for id_ in (mine, other):
         cancel(store, id_)
-    lifecycle.ask_study(store, study.id, Verb.CANCEL)
+    lifecycle.ask(store, study.id, Verb.CANCEL)
     bob.work()
 
     assert shown.host == hosts
@@ -330,8 +330,8 @@ def test_a_webhook_of_ones_own_is_told_of_that_alone(store: Store, receiver: Rec
 
 def test_a_webhook_is_not_told_once_its_host_is_no_longer_permitted(store: Store, receiver: Receiver) -> None:
     hosts = receiver.url.removeprefix("http://")
-    made = submission.submit_experiment(store, toy()).id
-    set_webhook(store, "experiment", made, WebhookSpec(url=receiver.url), {hosts})
+    made = submit_one(store, toy()).id
+    set_webhook(store, made, WebhookSpec(url=receiver.url), {hosts})
     bob = begun(store, hosts="hooks.example.org")
     cancel(store, made)
 
@@ -387,31 +387,31 @@ def test_a_listed_port_permits_no_other() -> None:
 def test_a_webhook_after_the_end_is_refused_until_there_is_another_end(store: Store) -> None:
     notify = Notify(hosts="hooks.example.org")
     webhook = {"url": "https://hooks.example.org/x"}
-    study = submission.submit_study(store, StudySpec.model_validate(STUDY))
-    paths = [f"/studies/{study.id}", *(f"/experiments/{each.id}" for each in study.experiments)]
+    study = submission.submit(store, StudySpec.model_validate(STUDY))
+    path, one = f"/studies/{study.id}", f"/studies/{study.experiments[0].id}"
     with TestClient(create_app(store, notify=notify)) as api:
-        assert [api.put(f"{path}/webhook", json=webhook).status_code for path in paths] == [200] * 3
         cancel(store, study.experiments[0].id)
-        half = [api.put(f"{path}/webhook", json=webhook).status_code for path in paths]
+        half = api.put(f"{path}/webhook", json=webhook).status_code
+        alone = api.put(f"{one}/webhook", json=webhook)
         finish(store)
-        ended = [api.put(f"{path}/webhook", json=webhook) for path in paths]
-        removed = [api.delete(f"{path}/webhook").json() for path in paths]
-        api.post(f"{paths[2]}/extend", json={"repetitions": 2})
-        again = api.put(f"{paths[2]}/webhook", json=webhook)
+        ended = api.put(f"{path}/webhook", json=webhook)
+        removed = api.delete(f"{path}/webhook").json()
+        api.post(f"{path}/extend", json={"repetitions": 2})
+        again = api.put(f"{path}/webhook", json=webhook)
 
-    assert half == [200, 409, 200]
-    assert [each.status_code for each in ended] == [409] * 3
-    assert f"({study.id}) has ended, so nothing would be sent" in ended[0].json()["detail"]
-    assert removed == [{"host": None}] * 3
+    assert (half, alone.status_code, ended.status_code) == (200, 409, 409)
+    assert f"one experiment of the study {study.id!r}" in alone.json()["detail"]
+    assert f"({study.id}) has ended, so nothing would be sent" in ended.json()["detail"]
+    assert removed == {"host": None}
     assert again.json() == {"host": "hooks.example.org"}
 
 
 def test_without_listed_hosts_a_webhook_is_refused_with_the_setting(sqlite_store: Store) -> None:
-    made = submission.submit_experiment(sqlite_store, toy()).id
+    made = submit_one(sqlite_store, toy()).id
     with TestClient(create_app(sqlite_store)) as api:
-        refused = api.put(f"/experiments/{made}/webhook", json={"url": "https://hooks.example.org/secret"})
-        assert api.get(f"/experiments/{made}/webhook").json() == {"host": None}
-        assert api.delete(f"/experiments/{made}/webhook").json() == {"host": None}
+        refused = api.put(f"/studies/{made}/webhook", json={"url": "https://hooks.example.org/secret"})
+        assert api.get(f"/studies/{made}/webhook").json() == {"host": None}
+        assert api.delete(f"/studies/{made}/webhook").json() == {"host": None}
 
     assert refused.status_code == 422
     assert "GAPLAB_NOTIFY_HOSTS" in refused.json()["errors"][0]["message"]
@@ -419,19 +419,19 @@ def test_without_listed_hosts_a_webhook_is_refused_with_the_setting(sqlite_store
 
 
 def test_no_notification_changes_a_spec_or_is_shown_with_its_address(sqlite_store: Store) -> None:
-    made = submission.submit_experiment(sqlite_store, toy())
+    made = submit_one(sqlite_store, toy())
     hosts = {"hooks.example.org"}
-    set_webhook(sqlite_store, "experiment", made.id, WebhookSpec(url="https://hooks.example.org/T0/secret"), hosts)
+    set_webhook(sqlite_store, made.id, WebhookSpec(url="https://hooks.example.org/T0/secret"), hosts)
 
     assert reading.read_experiment(sqlite_store, made.id) == made
     with pytest.raises(InvalidSpec):
-        set_webhook(sqlite_store, "experiment", made.id, WebhookSpec(url="https://other.example/"), hosts)
+        set_webhook(sqlite_store, made.id, WebhookSpec(url="https://other.example/"), hosts)
 
 
 def test_the_courier_works_in_the_background_until_it_is_stopped(sqlite_store: Store, receiver: Receiver) -> None:
     with courier(sqlite_store, Notify(url=receiver.url), "") as bob:
         assert bob.work()
-        cancel(sqlite_store, submission.submit_experiment(sqlite_store, toy()).id)
+        cancel(sqlite_store, submit_one(sqlite_store, toy()).id)
         wait_until(lambda: told(sqlite_store))
     assert len(receiver.messages) == 1
 
@@ -458,7 +458,7 @@ def dripping() -> Iterator[str]:
 
 
 def message() -> Notification:
-    about: Any = {"id": "1-x", "kind": "experiment", "subject": "x", "name": "x", "state": State.FAILED, "text": "x"}
+    about: Any = {"id": "1-x", "subject": "x", "name": "x", "state": State.FAILED, "text": "x"}
     return Notification(**about, experiments=(), ended_at=datetime(2026, 1, 1, tzinfo=UTC))
 
 

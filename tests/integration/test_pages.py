@@ -47,7 +47,7 @@ def test_a_script_that_someone_slipped_in_as_a_name_is_no_script_of_the_page(sql
     bad = "<script>alert(1)</script>"
     made = api.post("/experiments", json=TOY | {"name": bad}).json()["id"]
 
-    answer = api.get("/figures/curves", params={"experiment": made, "title": bad})
+    answer = api.get("/figures/curves", params={"study": made, "title": bad})
 
     assert answer.status_code == 200
     assert bad not in answer.text

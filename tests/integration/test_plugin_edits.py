@@ -17,7 +17,7 @@ from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import checks, reading, submission
+from gaplab.services.experiments import checks, reading
 from gaplab.services.plugins import watching
 from gaplab.services.plugins.watching import FolderWatch
 from gaplab.services.running import execution, provenance, sensitivity, versions
@@ -30,7 +30,7 @@ from gaplab.workers import nodes
 from gaplab.workers.cluster import cluster
 from gaplab.workers.plugins import FIRST_S, LONGEST_S, Plugins
 from gaplab.workers.supervisor import Supervisor
-from tests.experiments import some_log, toy
+from tests.experiments import some_log, submit_one, toy
 from tests.fakes import CAREFUL
 from tests.integration import test_workers
 
@@ -82,7 +82,7 @@ def looks_at_files_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def submit(store: Store, **changes: Any) -> str:
-    return submission.submit_experiment(store, toy(**{"repetitions": 2} | changes)).id
+    return submit_one(store, toy(**{"repetitions": 2} | changes)).id
 
 
 def claimed(store: Store, plugins: Plugins | None = None) -> list[str]:
@@ -199,7 +199,7 @@ def test_a_plug_in_that_changes_gaplab_changes_no_number_of_specs_that_do_not_na
         monkeypatch.delenv("CHANGES_GAPLAB")
         supervisor = Supervisor(sqlite_store, lambda: 1, joined.versions)
         changed, plain = (toy(strategy=each, repetitions=1) for each in ("careful", "simulated_fit"))
-        ids = [submission.submit_experiment(sqlite_store, spec).id for spec in (changed, plain)]
+        ids = [submit_one(sqlite_store, spec).id for spec in (changed, plain)]
         for each in ids:
             test_workers.run(supervisor, sqlite_store, each)
 

@@ -18,10 +18,10 @@ from gaplab.schemas.resolved import SPEC_VERSION
 from gaplab.services import events
 from gaplab.services.core.errors import Conflict, StoreUnavailable
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments import reading
 from gaplab.services.running import execution, provenance, versions
 from gaplab.services.store.session import Store
-from tests.experiments import run, same, some_log, toy
+from tests.experiments import run, same, some_log, submit_one, toy
 
 HERE = versions.provenance()
 OTHERS = {
@@ -41,7 +41,7 @@ ALIKE = HERE.model_copy(
 
 def begun(store: Store, under: Any = HERE) -> Any:
     """An experiment with a step, queued again."""
-    submission.submit_experiment(store, toy(repetitions=2))
+    submit_one(store, toy(repetitions=2))
     (claim,) = execution.claim(store, "me", 1, under)
     execution.record(store, claim, next(some_log()))
     execution.hand_back(store, claim)
@@ -49,7 +49,7 @@ def begun(store: Store, under: Any = HERE) -> Any:
 
 
 def test_it_is_recorded_with_the_first_claim(store: Store) -> None:
-    id_ = submission.submit_experiment(store, toy(repetitions=2)).id
+    id_ = submit_one(store, toy(repetitions=2)).id
     assert provenance.read(store, id_).uses == ()
 
     execution.claim(store, "me", 2)
@@ -61,7 +61,7 @@ def test_it_is_recorded_with_the_first_claim(store: Store) -> None:
 
 @pytest.mark.dialects
 def test_of_two_that_begin_it_at_once_one_is_bound_and_the_other_leaves_it_alone(store: Store) -> None:
-    id_ = submission.submit_experiment(store, toy(repetitions=2)).id
+    id_ = submit_one(store, toy(repetitions=2)).id
 
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
@@ -163,7 +163,7 @@ def test_one_that_differs_only_in_what_changes_no_number_goes_on(store: Store) -
 
 def test_what_it_leaves_alone_keeps_nothing_else_waiting(store: Store) -> None:
     begun(store)
-    later = submission.submit_experiment(store, toy(repetitions=1)).id
+    later = submit_one(store, toy(repetitions=1)).id
 
     claims = execution.claim(store, "other", 1, OTHERS["architecture"])
 
@@ -179,7 +179,7 @@ def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store: Store) ->
     accepted = provenance.accept_versions(store, id_)
     claims = execution.claim(store, "other", 9, other)
 
-    assert accepted.warnings == ()
+    assert accepted.experiments[0].warnings == ()
     assert same(claims[0].log, tuple(some_log())[:1])
     found = provenance.read(store, id_)
     assert [each.provenance for each in found.uses] == [HERE, other]
@@ -195,7 +195,7 @@ def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store: Store) ->
 
 def test_a_refused_plug_in_unbinds_an_experiment_unless_it_has_steps_of_its_own(store: Store) -> None:
     kept = begun(store)
-    loose = submission.submit_experiment(store, toy(repetitions=1)).id
+    loose = submit_one(store, toy(repetitions=1)).id
     claims = execution.claim(store, "me", 3)
     assert {each.experiment_id for each in claims} == {kept, loose}
     for each in claims:
@@ -208,7 +208,7 @@ def test_a_refused_plug_in_unbinds_an_experiment_unless_it_has_steps_of_its_own(
 
 
 def test_there_is_nothing_to_accept_before_it_has_begun_or_after_it_has_ended(store: Store) -> None:
-    id_ = submission.submit_experiment(store, toy(repetitions=1)).id
+    id_ = submit_one(store, toy(repetitions=1)).id
 
     with pytest.raises(Conflict, match="has not started"):
         provenance.accept_versions(store, id_)
@@ -221,8 +221,8 @@ def test_over_http(sqlite_store: Store) -> None:
     id_ = begun(sqlite_store)
     with TestClient(create_app(sqlite_store)) as api:
         shown = api.get(f"/experiments/{id_}/provenance").json()
-        accepted = api.post(f"/experiments/{id_}/accept-versions")
-        missing = api.post("/experiments/nobody/accept-versions")
+        accepted = api.post(f"/studies/{id_}/accept-versions")
+        missing = api.post("/studies/nobody/accept-versions")
 
     assert shown["uses"][0]["provenance"]["python"] == HERE.python
     assert (accepted.status_code, accepted.json()["id"]) == (200, id_)
@@ -230,13 +230,13 @@ def test_over_http(sqlite_store: Store) -> None:
 
 
 def test_a_spec_of_a_later_version_is_not_read_and_not_run(store: Store) -> None:
-    id_ = submission.submit_experiment(store, toy()).id
+    id_ = submit_one(store, toy()).id
     with store.transaction() as session:
         session.execute(text("UPDATE experiment SET spec_version = 99"))
 
     with pytest.raises(StoreUnavailable, match=rf"'{id_}' is of version 99, .* reads up to {SPEC_VERSION}"):
         reading.read_experiment(store, id_)
     assert execution.claim(store, "me", 9) == ()
-    later = submission.submit_experiment(store, toy(repetitions=1))
+    later = submit_one(store, toy(repetitions=1))
     assert [each.experiment_id for each in execution.claim(store, "me", 9)] == [later.id]
     assert reading.read_experiment(store, later.id).state is State.RUNNING

@@ -8,17 +8,17 @@ from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.experiments import archiving, editing, lifecycle, listing, submission
+from gaplab.services.experiments import archiving, editing, lifecycle, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
-from gaplab.services.experiments.query.conditions import EXPERIMENT_FIELDS, STUDY_FIELDS
+from gaplab.services.experiments.query.conditions import FIELDS
 from gaplab.services.experiments.query.parsing import LONGEST
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
-from tests.experiments import run, some_log, toy
+from tests.experiments import run, some_log, submit_one, toy
 
 
 def edit(store: Store, id_: str, **changes: Any) -> None:
-    editing.edit_experiment(store, id_, Edit(**changes), starting_from=None)
+    editing.edit(store, id_, Edit(**changes), starting_from=None)
 
 
 @pytest.fixture
@@ -26,31 +26,23 @@ def ids(store: Store) -> dict[str, str]:
     """An experiment that is complete, one that is tagged and noted, one with another strategy, and a study of two."""
     made = {}
     for name, strategy in (("done", "informative"), ("Tagged", "random"), ("other", "simulated_fit")):
-        made[name] = submission.submit_experiment(
-            store, toy(strategy=strategy, name=name, iterations=1, repetitions=2)
-        ).id
+        made[name] = submit_one(store, toy(strategy=strategy, name=name, iterations=1, repetitions=2)).id
         if name == "done":
             for number, claim in enumerate(execution.claim(store, "me", 2)):
                 run(store, claim, some_log(1, recorded=0.5 + number / 2))
     edit(store, made["Tagged"], tags=("gait", "50-percent"), notes="the floor was *Slippery*, 50% wet")
-    spec = StudySpec.model_validate(
-        {"name": "both", "strategies": ["known_fit", "direct"], "robot": "toy_function", "budget": "smoke"}
-    )
-    study = submission.submit_study(store, spec)
-    editing.edit_study(store, study.id, Edit(tags=("paper",), notes="a bent leg"), starting_from=None)
-    made |= {"study": study.id, "known_fit": study.experiments[0].id, "direct": study.experiments[1].id}
-    return made
+    spec = {"name": "both", "strategies": ["known_fit", "direct"], "robot": "toy_function", "budget": "smoke"}
+    study = submission.submit(store, StudySpec.model_validate(spec))
+    edit(store, study.id, tags=("paper",), notes="a bent leg")
+    lifecycle.ask(store, study.experiments[1].id, Verb.CANCEL)
+    return made | {"both": study.id, "known_fit": study.experiments[0].id}
 
 
 def found(store: Store, q: str) -> set[str]:
-    return {each.name for each in listing.list_experiments(store, ListFilter(q=q)).items}
-
-
-def studies(store: Store, q: str) -> set[str]:
     return {each.name for each in listing.list_studies(store, ListFilter(q=q)).items}
 
 
-ALL = {"done", "Tagged", "other", "known_fit", "direct"}
+ALL = {"done", "Tagged", "other", "both"}
 
 QUERIES = {
     "": ALL,
@@ -58,20 +50,29 @@ QUERIES = {
     "STRATEGY = informative and STATE = completed": {"done"},
     "strategy != informative": ALL - {"done"},
     "strategy in (informative, random)": {"done", "Tagged"},
-    "strategy not in (informative, random)": {"other", "known_fit", "direct"},
+    "strategy not in (informative, random)": {"other", "both"},
+    "strategy = known_fit": {"both"},
+    "strategy != direct": ALL - {"both"},
+    "experiment = known_fit": {"both"},
+    "strategy = direct and experiment_state = CANCELLED": {"both"},
+    "strategy = known_fit and experiment_state = CANCELLED": set(),
+    "strategy = known_fit and (strategy = direct or experiment_state = CANCELLED)": set(),
+    "(strategy = known_fit) and not strategy = random and experiment_state = CANCELLED": set(),
+    "strategy = known_fit and not experiment_state = COMPLETED": {"both"},
     "not strategy = informative or done": ALL,
-    "state = QUEUED and not tag = gait": {"other", "known_fit", "direct"},
+    "state = RUNNING": {"both"},
+    "state = QUEUED and not tag = gait": {"other"},
     "tag = GAIT": {"Tagged"},
     "tag = gai": set(),
     "tag ~ gai": {"Tagged"},
-    "tag = paper": {"known_fit", "direct"},
+    "tag = paper": {"both"},
     "tag = none": {"done", "other"},
     "tag != gait": ALL - {"Tagged"},
     'note ~ "slippery"': {"Tagged"},
     "note ~ 50%": {"Tagged"},
     "note ~ '%'": {"Tagged"},
     "note ~ _": set(),
-    "note = none": ALL - {"Tagged"},
+    "note = none": {"done", "other"},
     "note !~ slippery": ALL - {"Tagged"},
     "fitness > 1.7": {"done"},
     "fitness = 1.75": {"done"},
@@ -79,19 +80,20 @@ QUERIES = {
     "fitness > 1.75": set(),
     "fitness >= 1.75 and fitness <= 1.75": {"done"},
     "fitness = none": ALL - {"done"},
-    "study = none": {"done", "Tagged", "other"},
     "robot = toy_function": ALL,
     "engine = analytic and optimizer = steady_state": ALL,
     "controller_optimizer = steady_state": ALL,
     "controller_optimizer = cma_es": set(),
     "reality = analytic": ALL,
-    "repetitions = 2 and study = none": {"done", "Tagged", "other"},
+    "repetitions = 2 and iterations = 1": {"done", "Tagged", "other"},
     "iterations < 2 and priority = 0": {"done", "Tagged", "other"},
     "created > -1h": ALL,
-    "created < 2012-11-05 or ended > 2012-11-05T09:00": {"done"},
+    "created < 2012-11-05 or ended > 2012-11-05T09:00": {"done", "both"},
     "ended = none": ALL - {"done"},
     "ended in (none, 2012-11-05)": ALL - {"done"},
-    "note not in (None)": {"Tagged"},
+    "note not in (None)": {"Tagged", "both"},
+    "note ~ bent": {"both"},
+    "bent": {"both"},
     "note ~ 'none'": set(),
     "tag ~ 'none'": set(),
     "created > 9999-12-31": set(),
@@ -117,49 +119,18 @@ def test_queries_find_what_they_say(store: Store, ids: dict[str, str]) -> None:
 
     assert wrong == {}
     assert found(store, f"id = {ids['done']}") == {"done"}
-    assert found(store, f"study = {ids['study']}") == {"known_fit", "direct"}
+    assert found(store, f"id in ({ids['both']}, x)") == found(store, f"id = {ids['known_fit']}") == {"both"}
+    assert found(store, ids["known_fit"]) == {"both"}
 
 
 @pytest.mark.dialects
 def test_the_queried_fitness_is_the_one_that_is_shown(store: Store, ids: dict[str, str]) -> None:
-    (shown,) = listing.list_experiments(store, ListFilter(q="strategy = informative")).items
+    shown = reading.read_experiment(store, ids["done"])
 
     assert shown.fitness is not None
     assert shown.best_fitness is not None
     assert found(store, f"fitness = {shown.fitness.mean!r}") == {"done"}
     assert found(store, f"best_fitness = {shown.best_fitness!r}") == {"done"}
-
-
-STUDY_QUERIES = {
-    "strategy = known_fit": True,
-    "strategy in (known_fit, random)": True,
-    "strategy != random": True,
-    "tag = paper": True,
-    "note ~ bent": True,
-    "bent": True,
-    "state = QUEUED": True,
-    "state != COMPLETED": True,
-    "fitness = none": True,
-    "created > -1d and robot = toy_function": True,
-    "archived = false": True,
-    "both": True,
-    "strategy = random": False,
-    "strategy != known_fit": False,
-    "tag = gait": False,
-    "fitness > 0": False,
-    "slippery": False,
-}
-
-
-@pytest.mark.dialects
-def test_a_query_finds_a_study_by_itself_and_by_its_experiments(store: Store, ids: dict[str, str]) -> None:
-    assert {q: bool(studies(store, q)) for q in STUDY_QUERIES} == STUDY_QUERIES
-
-
-def test_a_study_is_found_by_a_tag_of_an_experiment(store: Store, ids: dict[str, str]) -> None:
-    edit(store, ids["direct"], add_tags=("odd",), notes="a limp")
-
-    assert studies(store, "tag = odd and note ~ limp") == {"both"}
 
 
 ERRORS = {
@@ -198,16 +169,15 @@ ERRORS = {
 }
 
 
-@pytest.mark.parametrize("read", [listing.list_experiments, listing.list_studies])
-def test_a_mistake_in_a_query_is_named_with_its_place(sqlite_store: Store, read: Any) -> None:
+def test_a_mistake_in_a_query_is_named_with_its_place(sqlite_store: Store) -> None:
     wrong: list[Any] = []
     for q, (message, nearest) in ERRORS.items():
         with pytest.raises(InvalidSpec) as refused:
-            read(sqlite_store, ListFilter(q=q))
+            found(sqlite_store, q)
 
-        (found,) = refused.value.violations
-        as_expected = found.pointer == "q" and message in found.message and found.nearest == nearest
-        wrong += [] if as_expected else [found]
+        (mistake,) = refused.value.violations
+        as_expected = mistake.pointer == "q" and message in mistake.message and mistake.nearest == nearest
+        wrong += [] if as_expected else [mistake]
 
     assert wrong == []
 
@@ -218,38 +188,33 @@ def test_a_query_of_many_parentheses_costs_no_stack(sqlite_store: Store) -> None
 
 @pytest.mark.dialects
 def test_every_field_can_be_asked_on_both_databases(store: Store, ids: dict[str, str]) -> None:
-    values = {"state": "QUEUED", "archived": "any"}
+    values = {"state": "QUEUED", "experiment_state": "QUEUED", "archived": "any"}
 
-    for fields, ask in ((EXPERIMENT_FIELDS, found), (STUDY_FIELDS, studies)):
-        for name, field in fields.items():
-            number = name in {"fitness", "best_fitness", "iterations", "repetitions", "priority"}
-            time = name in {"created", "started", "ended"}
-            value = values.get(name, "1.5" if number else "2012-11-05" if time else "none")
-            for operator in field.operators:
-                asked = f'"{value}"' if operator == "~" else value
-                ask(store, f"{name} {operator} {asked}")
-                ask(store, f"not ({name} {operator} {asked}) and {name} not in ({value}, {value})")
+    for name, field in FIELDS.items():
+        number = name in {"fitness", "best_fitness", "iterations", "repetitions", "priority"}
+        time = name in {"created", "started", "ended"}
+        value = values.get(name, "1.5" if number else "2012-11-05" if time else "none")
+        for operator in field.operators:
+            asked = f'"{value}"' if operator == "~" else value
+            found(store, f"{name} {operator} {asked}")
+            found(store, f"not ({name} {operator} {asked}) and {name} not in ({value}, {value})")
 
 
-def test_archived_ones_are_listed_only_if_the_query_or_the_study_asks(store: Store, ids: dict[str, str]) -> None:
-    archiving.archive_experiment(store, ids["done"])
-    lifecycle.ask_study(store, ids["study"], Verb.CANCEL)
-    archiving.archive_study(store, ids["study"])
+def test_archived_ones_are_listed_only_if_the_query_asks(store: Store, ids: dict[str, str]) -> None:
+    archiving.archive(store, ids["done"])
+    lifecycle.ask(store, ids["both"], Verb.CANCEL)
+    archiving.archive(store, ids["both"])
 
     assert found(store, "") == {"Tagged", "other"}
-    assert found(store, "archived = true") == {"done", "known_fit", "direct"}
+    assert found(store, "archived = true") == {"done", "both"}
     assert found(store, "done or archived = any") == ALL
-    assert studies(store, "") == set()
-    assert studies(store, "archived = true") == {"both"}
-    of_study = listing.list_experiments(store, ListFilter(study=ids["study"])).items
-    assert {each.name for each in of_study} == {"known_fit", "direct"}
 
 
 @pytest.mark.dialects
 def test_a_query_is_paged_and_its_cursor_belongs_to_it(store: Store, ids: dict[str, str]) -> None:
     names, cursor = [], None
     while True:
-        page = listing.list_experiments(store, ListFilter(q="not done", sort="name"), limit=2, cursor=cursor)
+        page = listing.list_studies(store, ListFilter(q="not done", sort="name"), limit=2, cursor=cursor)
         names += [each.name for each in page.items]
         if (cursor := page.next) is None:
             break
@@ -257,4 +222,4 @@ def test_a_query_is_paged_and_its_cursor_belongs_to_it(store: Store, ids: dict[s
 
     assert sorted(names) == sorted(ALL - {"done"})
     with pytest.raises(InvalidSpec, match="other filters"):
-        listing.list_experiments(store, ListFilter(q="done", sort="name"), limit=2, cursor=last)
+        listing.list_studies(store, ListFilter(q="done", sort="name"), limit=2, cursor=last)

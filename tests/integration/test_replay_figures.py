@@ -12,7 +12,6 @@ from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Probed, Transferred, Tuned
 from gaplab.services.engines.analytic import speed
-from gaplab.services.experiments import submission
 from gaplab.services.figures.kinds.gait import gait_figure
 from gaplab.services.figures.kinds.readings import readings_figure
 from gaplab.services.figures.kinds.toy import toy_figure
@@ -24,7 +23,7 @@ from gaplab.services.results.toy import toy_iterations
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.session import Store
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 
 FORMATS = {"html": b"<!doctype", "svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
 
@@ -69,7 +68,7 @@ def marks(figure: Any, kind: Any) -> Any:
 
 def walked(store: Store, **changes: Any) -> Any:
     """The id of an experiment on the toy function that has ended, and the log of its first repetition."""
-    submitted = submission.submit_experiment(store, toy(repetitions=1, iterations=3, **changes)).id
+    submitted = submit_one(store, toy(repetitions=1, iterations=3, **changes)).id
     (claim,) = execution.claim(store, "me", 1)
     log = list(repetition(setting(claim.spec, 0)))
     for step in log:
@@ -180,7 +179,7 @@ def test_the_error_of_the_toy_is_of_what_tuning_saw_and_minimised(
 
 
 def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store: Store) -> None:
-    running = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    running = submit_one(sqlite_store, toy(repetitions=1)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     log = repetition(setting(claim.spec, 0))
     for _ in range(8):
@@ -196,8 +195,8 @@ def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store
 
 
 def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_store: Store) -> None:
-    waiting = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
-    walking = submission.submit_experiment(sqlite_store, toy(robot="quadruped", repetitions=1)).id
+    waiting = submit_one(sqlite_store, toy(repetitions=1)).id
+    walking = submit_one(sqlite_store, toy(robot="quadruped", repetitions=1)).id
 
     assert toy_figure(toy_iterations(sqlite_store, waiting, 0, [])).empty
     for repetition_, iterations in ((1, [0]), (0, [3])):
@@ -208,7 +207,7 @@ def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_
 
 
 def test_the_direct_baseline_has_no_simulators_and_its_fittest_is_in_reality(sqlite_store: Store) -> None:
-    experiment = submission.submit_experiment(sqlite_store, toy(strategy="direct", repetitions=1)).id
+    experiment = submit_one(sqlite_store, toy(strategy="direct", repetitions=1)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     for step in repetition(setting(claim.spec, 0)):
         execution.record(sqlite_store, claim, step)

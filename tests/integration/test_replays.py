@@ -25,7 +25,6 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
 from gaplab.services.engines import engines
 from gaplab.services.engines.pybullet.engine import PyBullet
-from gaplab.services.experiments import submission
 from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.running import execution
@@ -35,7 +34,7 @@ from gaplab.services.store.lease import Requested
 from gaplab.services.store.models import RequestRow
 from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.session import Store
-from tests.experiments import run, toy
+from tests.experiments import run, submit_one, toy
 from tests.fakes import install
 from tests.waiting import LONGEST_S, wait_until
 
@@ -103,7 +102,7 @@ def log_of_an_iteration() -> tuple[Any, ...]:
 
 def walked(store: Store, **changes: Any) -> Any:
     """Id, log and claim of an experiment with a part of a log."""
-    submitted = submission.submit_experiment(store, quadruped(**changes)).id
+    submitted = submit_one(store, quadruped(**changes)).id
     (claim,) = execution.claim(store, "me", 1)
     for step in log_of_an_iteration():
         assert execution.record(store, claim, step)
@@ -153,7 +152,7 @@ def test_a_replay_has_what_the_sensors_said_in_both_worlds(sqlite_store: Store, 
 
 def test_a_controller_that_a_robot_on_a_bench_is_to_run_walks_in_its_simulator(sqlite_store: Store, api: Any) -> None:
     bench = quadruped(reality={"kind": "physical", "probes": "each"})
-    experiment = submission.submit_experiment(sqlite_store, bench).id
+    experiment = submit_one(sqlite_store, bench).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     known = Quadruped().known
     execution.record(sqlite_store, claim, Tuned(0, (Simulator(frozen(UNTUNED)),)))
@@ -236,7 +235,7 @@ def test_what_is_not_there_is_not_found_and_what_is_not_yet_there_is_a_conflict(
 
 
 def test_a_robot_without_a_body_has_nothing_to_show(sqlite_store: Store, api: Any) -> None:
-    experiment = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    experiment = submit_one(sqlite_store, toy(repetitions=1)).id
     run(sqlite_store, *execution.claim(sqlite_store, "me", 1))  # type: ignore[arg-type]
 
     answer = api.get(f"/experiments/{experiment}/replay")
@@ -246,7 +245,7 @@ def test_a_robot_without_a_body_has_nothing_to_show(sqlite_store: Store, api: An
 
 
 def test_the_direct_baseline_is_seen_in_reality_alone(sqlite_store: Store, api: Any) -> None:
-    experiment = submission.submit_experiment(sqlite_store, quadruped(strategy="direct")).id
+    experiment = submit_one(sqlite_store, quadruped(strategy="direct")).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     known = Quadruped().known
     real = setting(claim.spec, 0).reality(known).fitness
@@ -364,7 +363,7 @@ def test_without_an_iteration_the_last_measured_controller_is_replayed(sqlite_st
 
 
 def test_predictions_are_of_the_simulators_before_and_after_a_sample(sqlite_store: Store, app: Any) -> None:
-    experiment = submission.submit_experiment(sqlite_store, toy(repetitions=2)).id
+    experiment = submit_one(sqlite_store, toy(repetitions=2)).id
     errors = {}
     for claim in execution.claim(sqlite_store, "me", 2):
         for step in repetition(setting(claim.spec, claim.number)):
@@ -383,7 +382,7 @@ def test_predictions_are_of_the_simulators_before_and_after_a_sample(sqlite_stor
 
 
 def test_samples_that_no_tuning_sees_have_no_predictions(sqlite_store: Store, app: Any) -> None:
-    experiment = submission.submit_experiment(sqlite_store, toy(repetitions=1, iterations=4, held_out=0.5)).id
+    experiment = submit_one(sqlite_store, toy(repetitions=1, iterations=4, held_out=0.5)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     for step in repetition(setting(claim.spec, 0)):
         assert execution.record(sqlite_store, claim, step)
@@ -399,9 +398,7 @@ def test_an_experiment_without_iterations_shows_what_samples_from_before_gave(
 ) -> None:
     known = [{"genome": [gene], "values": [gene + 0.1]} for gene in (0.2, 0.5, 0.8)]
     reality = {"kind": "physical", "samples": known}
-    experiment = submission.submit_experiment(
-        sqlite_store, toy(repetitions=1, iterations=0, held_out=0.4, reality=reality)
-    ).id
+    experiment = submit_one(sqlite_store, toy(repetitions=1, iterations=0, held_out=0.4, reality=reality)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     for step in repetition(setting(claim.spec, 0)):
         assert execution.record(sqlite_store, claim, step)

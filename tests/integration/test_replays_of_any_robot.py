@@ -24,13 +24,13 @@ from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots import robots
 from gaplab.services.core.types import Simulator, Transferred, Tuned
 from gaplab.services.core.world import PDMotor
-from gaplab.services.experiments import submission
 from gaplab.services.plugins import folders, watching
 from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Requested
 from gaplab.services.store.session import Store
 from tests.drawn_robot import FILES, strode
+from tests.experiments import submit_one
 from tests.integration.test_client import InProcess
 
 
@@ -107,7 +107,7 @@ def test_its_video_shows_each_colour(sqlite_store: Store, api: TestClient) -> No
 def test_a_controller_in_a_loop_has_no_motion_to_take_to_the_bench(sqlite_store: Store, api: TestClient) -> None:
     spec = {"strategy": "simulated_fit", "robot": "strider", "engine": "puppet", "iterations": 1, "repetitions": 1}
     bench = spec | {"budget": "smoke", "reality": {"kind": "physical", "probes": "each"}}
-    experiment = submission.submit_experiment(sqlite_store, ExperimentSpec.model_validate(bench)).id
+    experiment = submit_one(sqlite_store, ExperimentSpec.model_validate(bench)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     genome = robots["strider"]().known
     for step in (Tuned(0, (Simulator(frozen([1.0, 0.8, 0.0])),)), Transferred(0, genome, 0.4)):

@@ -14,7 +14,7 @@ from gaplab.services.results import curves
 from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
-from tests.experiments import run, some_log, toy
+from tests.experiments import run, some_log, submit_one, toy
 
 
 def study_with_results(store: Store, recorded: Any = (1.0, 2.0)) -> Any:
@@ -23,7 +23,7 @@ def study_with_results(store: Store, recorded: Any = (1.0, 2.0)) -> Any:
         "repetitions": 2,
         "strategies": ["simulated_fit", "direct"],
     }
-    study = submission.submit_study(store, StudySpec.model_validate(spec))
+    study = submission.submit(store, StudySpec.model_validate(spec))
     claims = execution.claim(store, "me", 9)
     first, second, *direct = sorted(claims, key=lambda each: (each.spec.strategy.name == "direct", each.number))
     run(store, first, some_log(recorded=recorded[0]))
@@ -58,7 +58,7 @@ def test_the_curve_of_direct_is_one_point_at_zero(store: Store) -> None:
 
 
 def test_a_curve_is_as_long_as_what_was_computed_and_not_as_the_spec_asks_for(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(iterations=1_000)).id
+    experiment = submit_one(store, toy(iterations=1_000)).id
     before = curves.curve(store, experiment)
     (claim,) = execution.claim(store, "me", 1)
     for step in some_log(1):
@@ -71,7 +71,7 @@ def test_a_curve_is_as_long_as_what_was_computed_and_not_as_the_spec_asks_for(st
 
 
 def test_a_failed_measurement_is_no_value_of_the_curve(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(repetitions=1)).id
+    experiment = submit_one(store, toy(repetitions=1)).id
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(recorded=float("nan")))
 
@@ -84,7 +84,7 @@ def test_the_curves_of_a_study_are_those_of_its_experiments_in_order(store: Stor
     study = study_with_results(store)
     ids = [each.id for each in study.experiments]
 
-    found = curves.study_curves(store, study.id)
+    found = curves.curves(store, [study.id])
 
     assert [each.experiment for each in found] == ids
     assert found == curves.curves(store, ids) == tuple(curves.curve(store, each) for each in ids)
@@ -96,7 +96,7 @@ def test_the_curves_of_what_is_not_there_are_not_found(store: Store) -> None:
     with pytest.raises(NotFound, match="no-such"):
         curves.curves(store, [study.experiments[0].id, "no-such"])
     with pytest.raises(NotFound, match="no-such"):
-        curves.study_curves(store, "no-such")
+        curves.curves(store, ["no-such"])
 
 
 def test_a_comparison_begins_at_the_last_shared_count_and_direct_counts_at_any(sqlite_store: Store) -> None:
@@ -117,7 +117,7 @@ def test_a_comparison_begins_at_the_last_shared_count_and_direct_counts_at_any(s
 
 
 def test_a_comparison_is_of_every_pair(sqlite_store: Store) -> None:
-    ids = [submission.submit_experiment(sqlite_store, toy()).id for _ in range(3)]
+    ids = [submit_one(sqlite_store, toy()).id for _ in range(3)]
 
     found = compare(sqlite_store, ids)
 
@@ -129,7 +129,7 @@ def test_a_comparison_is_of_every_pair(sqlite_store: Store) -> None:
 def test_a_margin_as_a_share_of_direct_is_in_the_unit_of_fitness(sqlite_store: Store) -> None:
     study = study_with_results(sqlite_store)
     ids = [each.id for each in study.experiments]
-    seeds = [submission.submit_experiment(sqlite_store, toy(seed=seed)).id for seed in (1, 2)]
+    seeds = [submit_one(sqlite_store, toy(seed=seed)).id for seed in (1, 2)]
 
     (pair,) = compare(sqlite_store, ids, margin=Margin(0.1, of_direct=True))
 
@@ -146,14 +146,14 @@ def test_a_margin_as_a_share_of_direct_is_in_the_unit_of_fitness(sqlite_store: S
 
 @pytest.mark.parametrize("bounds", [(2, 1), (-1, 2), (3, None)])
 def test_a_range_that_is_none_is_refused(sqlite_store: Store, bounds: Any) -> None:
-    ids = [submission.submit_experiment(sqlite_store, toy()).id for _ in range(2)]
+    ids = [submit_one(sqlite_store, toy()).id for _ in range(2)]
 
     with pytest.raises(InvalidSpec, match="range"):
         compare(sqlite_store, ids, from_evaluations=bounds[0], to_evaluations=bounds[1])
 
 
 def test_a_comparison_needs_two_experiments(sqlite_store: Store) -> None:
-    one = submission.submit_experiment(sqlite_store, toy()).id
+    one = submit_one(sqlite_store, toy()).id
 
     for ids in ([], [one], [one, one]):
         with pytest.raises(InvalidSpec, match="two or more"):
@@ -162,7 +162,7 @@ def test_a_comparison_needs_two_experiments(sqlite_store: Store) -> None:
 
 def test_a_name_in_the_csv_is_no_formula(sqlite_store: Store) -> None:
     names = ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "=cmd|' /C calc'!A0"]
-    ids = [submission.submit_experiment(sqlite_store, toy(name=name, repetitions=1)).id for name in names]
+    ids = [submit_one(sqlite_store, toy(name=name, repetitions=1)).id for name in names]
     for claim in execution.claim(sqlite_store, "me", len(names)):
         run(sqlite_store, claim, some_log(recorded=-2.0))
 
@@ -176,7 +176,7 @@ def test_a_name_in_the_csv_is_no_formula(sqlite_store: Store) -> None:
 def test_the_csv_has_a_line_for_each_value(sqlite_store: Store) -> None:
     study = study_with_results(sqlite_store, recorded=(0.1 + 0.2, 1 / 3))
 
-    lines = list(csv.DictReader(curves.curves_csv(curves.study_curves(sqlite_store, study.id)).splitlines()))
+    lines = list(csv.DictReader(curves.curves_csv(curves.curves(sqlite_store, [study.id])).splitlines()))
 
     assert tuple(lines[0]) == curves.COLUMNS
     assert len(lines) == 5 + 2

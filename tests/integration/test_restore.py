@@ -16,7 +16,6 @@ import pytest
 from sqlalchemy import text
 
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
-from gaplab.services.experiments import listing, submission
 from gaplab.services.store.backup import PG_DUMP, backup
 from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.restore import restore
@@ -24,7 +23,7 @@ from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import in_use
 from tests.commands import Gaplab
 from tests.conftest import Postgres
-from tests.experiments import toy
+from tests.experiments import listed, submit_one, toy
 from tests.postgres import VERSION
 
 NOBODY = 65_534
@@ -50,14 +49,14 @@ def copied(url: str, tmp_path: Path) -> Path:
 
 def submit(url: str) -> None:
     store = Store(url)
-    submission.submit_experiment(store, toy())
+    submit_one(store, toy())
     store.dispose()
 
 
 def count(file: Path) -> int:
     store = Store(f"sqlite:///{file}")
     store.check()
-    found = len(listing.list_experiments(store).items)
+    found = len(listed(store))
     store.dispose()
     return found
 
@@ -150,7 +149,7 @@ def left_by_a_kill(file: Path, target: Path) -> None:
 
 def names(file: Path) -> set[str]:
     store = Store(f"sqlite:///{file}")
-    found = {each.name for each in listing.list_experiments(store).items}
+    found = {each.name for each in listed(store)}
     store.dispose()
     return found
 

@@ -17,13 +17,12 @@ from gaplab.services.core.robot_files import read_robot_file
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.core.world import Material
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
-from tests.experiments import run
+from tests.experiments import run, submit_one
 from tests.robot_texts import MJCF
 from tests.unit.test_robot_import import path_of
 
@@ -164,9 +163,7 @@ def tuned(sqlite_store: Store) -> str:
     pytest.importorskip("pybullet")
     tunables = ["static_friction", "dynamic_friction", "restitution"]
     wanted = {"strategy": "random", "robot": "quadruped", "engine": "pybullet", "budget": "smoke", "tunables": tunables}
-    submitted = submit_experiment(
-        sqlite_store, ExperimentSpec.model_validate(wanted | {"iterations": 2, "repetitions": 1})
-    )
+    submitted = submit_one(sqlite_store, ExperimentSpec.model_validate(wanted | {"iterations": 2, "repetitions": 1}))
     (claim,) = execution.claim(sqlite_store, "test", limit=1)
     run(sqlite_store, claim, log(Quadruped().known))
     return submitted.id
@@ -220,7 +217,7 @@ def test_a_file_that_cannot_be_written_is_refused_with_every_reason(
 
 def test_an_experiment_without_tuned_simulators_says_so(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path) -> None:
     spec = ExperimentSpec.model_validate({"strategy": "random", "robot": "quadruped", "budget": "smoke"})
-    waiting = submit_experiment(sqlite_store, spec)
+    waiting = submit_one(sqlite_store, spec)
 
     said = gaplab("simulator", waiting.id, "-o", str(tmp_path / "tuned.json"))
 
@@ -237,9 +234,7 @@ def tuned_a1(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> str:
     assert gaplab("robot", "add", file).code == 0
     tunables = ["mass(trunk)", "joint_damping(*_hip_joint)", "max_torque"]
     wanted = {"strategy": "random", "robot": "a1", "engine": "pybullet", "budget": "smoke", "tunables": tunables}
-    submitted = submit_experiment(
-        sqlite_store, ExperimentSpec.model_validate(wanted | {"iterations": 2, "repetitions": 1})
-    )
+    submitted = submit_one(sqlite_store, ExperimentSpec.model_validate(wanted | {"iterations": 2, "repetitions": 1}))
     (claim,) = execution.claim(sqlite_store, "test", limit=1)
     run(sqlite_store, claim, log(frozen(np.zeros(3))))
     return submitted.id

@@ -11,14 +11,14 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
-from gaplab.services.experiments import checks, listing, reading, submission
+from gaplab.services.experiments import checks, reading, submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import subject
 from gaplab.services.specs.resolution import resolve_sensitivity
 from gaplab.services.store.models import SensitivityRow
 from gaplab.services.store.session import Store
-from tests.experiments import toy
+from tests.experiments import listed, submit_one, toy
 
 SECRET = 0.987654321
 
@@ -47,7 +47,7 @@ def stored_checks(store: Store) -> Any:
 
 
 def test_submitting_an_experiment_queues_a_check_of_what_it_tunes(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy())
+    experiment = submit_one(store, toy())
 
     found = checks.read(store, experiment.sensitivity)
 
@@ -62,12 +62,12 @@ def test_submitting_an_experiment_queues_a_check_of_what_it_tunes(store: Store) 
 
 
 def test_the_same_robot_engine_and_tunables_are_checked_once(store: Store) -> None:
-    first = submission.submit_experiment(store, toy())
-    second = submission.submit_experiment(
+    first = submit_one(store, toy())
+    second = submit_one(
         store, toy(strategy="random", seed=7, budget="desk", reality={"parameters": {"static_friction": SECRET}})
     )
     asked = checks.admit(store, settings(seed=3)).answer
-    narrower = submission.submit_experiment(store, toy(tunables=[{"name": "static_friction", "upper": 1.0}]))
+    narrower = submit_one(store, toy(tunables=[{"name": "static_friction", "upper": 1.0}]))
     finer = checks.admit(store, settings(points=33)).answer
 
     assert first.sensitivity == second.sensitivity == asked.id
@@ -84,12 +84,12 @@ def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_thei
         monkeypatch.setattr(checks, "external_plugins", lambda: {kind: file, "robot other": file})
 
     edited("own.py 0123456789ab")
-    before = submission.submit_experiment(store, toy())
+    before = submit_one(store, toy())
     asked_before = checks.admit(store, settings()).answer
     edited("own.py ba9876543210")
-    after = submission.submit_experiment(store, toy())
+    after = submit_one(store, toy())
     asked_after = checks.admit(store, settings()).answer
-    other = submission.submit_experiment(store, toy(tunables=["static_friction"], robot="toy_function"))
+    other = submit_one(store, toy(tunables=["static_friction"], robot="toy_function"))
 
     assert before.sensitivity == asked_before.id != after.sensitivity == asked_after.id
     assert reading.read_experiment(store, before.id).sensitivity == before.sensitivity
@@ -98,12 +98,12 @@ def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_thei
 
 def test_a_study_has_one_check_and_the_direct_baseline_alone_has_none(store: Store) -> None:
     common = toy().model_dump(exclude={"strategy", "name"})
-    study = submission.submit_study(store, StudySpec.model_validate(common | {"strategies": ["random", "direct"]}))
+    study = submission.submit(store, StudySpec.model_validate(common | {"strategies": ["random", "direct"]}))
 
     strategies = {each.strategy: each.sensitivity for each in study.experiments}
 
     assert strategies == {"random": stored_checks(store)[0], "direct": None}
-    other = submission.submit_experiment(store, toy(strategy="direct", tunables=["restitution"]))
+    other = submit_one(store, toy(strategy="direct", tunables=["restitution"]))
     assert other.sensitivity is None
     assert len(stored_checks(store)) == 1
 
@@ -111,13 +111,13 @@ def test_a_study_has_one_check_and_the_direct_baseline_alone_has_none(store: Sto
 @pytest.mark.dialects
 def test_experiments_that_are_submitted_at_once_share_a_check(store: Store) -> None:
     with ThreadPoolExecutor(4) as pool:
-        submitted = list(pool.map(lambda seed: submission.submit_experiment(store, toy(seed=seed)), range(8)))
+        submitted = list(pool.map(lambda seed: submit_one(store, toy(seed=seed)), range(8)))
 
     assert len({each.sensitivity for each in submitted}) == len(stored_checks(store)) == 1
 
 
 def test_what_a_check_finds_is_shown_and_warns_the_experiments(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+    experiment = submit_one(store, toy()).id
     claim = sensitivity.claim(store, "me")
     found = check(subject(claim.spec), SteadyState(), Effort(claim.spec.points, claim.spec.evaluations))
 
@@ -133,11 +133,11 @@ def test_what_a_check_finds_is_shown_and_warns_the_experiments(store: Store) -> 
         "the tunables, or check other bounds or another engine with the command gaplab sensitivity",
     )
     assert reading.read_experiment(store, experiment).warnings == read.warnings
-    assert listing.list_experiments(store).items[0].warnings == read.warnings
+    assert listed(store)[0].warnings == read.warnings
 
 
 def test_the_toys_tunables_are_smooth_and_warn_of_nothing(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(tunables=["static_friction", "restitution"])).id
+    experiment = submit_one(store, toy(tunables=["static_friction", "restitution"])).id
     claim = sensitivity.claim(store, "me")
     found = check(subject(claim.spec), SteadyState(), Effort(claim.spec.points, claim.spec.evaluations))
 
@@ -156,7 +156,7 @@ def test_a_tunable_between_bounds_too_narrow_to_matter_does_nothing() -> None:
 
 
 def test_a_failed_check_fails_no_experiment_and_says_why(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+    experiment = submit_one(store, toy()).id
     claim = sensitivity.claim(store, "me")
 
     assert sensitivity.fail(store, claim, "ValueError: nul\0")

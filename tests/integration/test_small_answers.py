@@ -29,15 +29,13 @@ SMALL = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": 
 
 
 def test_a_study_is_told_apart_from_an_unknown_experiment(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path) -> None:
-    study = submission.submit_study(sqlite_store, StudySpec.model_validate(SMALL))
+    study = submission.submit(sqlite_store, StudySpec.model_validate(SMALL))
     first = study.experiments[0].id
 
-    accepted = gaplab("accept-versions", study.id)
     drawn = gaplab("figure", "simulators", study.id, "--out", str(tmp_path / "a.svg"))
 
-    assert accepted.code == Exit.NOT_FOUND
-    assert f"'{study.id}' is a study, and this needs an experiment: {first} (random), " in accepted.err
-    assert f"a figure of simulators has one experiment, not a study; choose one of {first} (random), " in drawn.err
+    assert drawn.code == Exit.NOT_FOUND
+    assert f"'{study.id}' is a study, and this needs an experiment: {first} (random), " in drawn.err
 
 
 def test_an_address_without_its_scheme_is_told_how_it_begins(gaplab: Gaplab) -> None:
@@ -76,7 +74,7 @@ def test_every_command_is_in_a_group_of_the_help() -> None:
 def test_a_figure_and_a_report_as_pdf_log_no_fonts(
     gaplab: Gaplab, sqlite_store: Store, tmp_path: Path, terminal: bool
 ) -> None:
-    study = submission.submit_study(sqlite_store, StudySpec.model_validate(SMALL))
+    study = submission.submit(sqlite_store, StudySpec.model_validate(SMALL))
     log = io.StringIO()
     log.isatty = lambda: terminal  # type: ignore[method-assign]
     root = logging.getLogger()

@@ -16,7 +16,7 @@ from gaplab.api.app import create_app
 from gaplab.arithmetic import chosen, has
 from gaplab.schemas.archives import RepetitionRerun
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.archives import export_study, rerunning
+from gaplab.services.archives import export, rerunning
 from gaplab.services.archives.recomputing import Recorded, difference, rerun, result_of
 from gaplab.services.archives.rerunning import rerun_all, submitted_spec
 from gaplab.services.core.arrays import frozen
@@ -27,8 +27,8 @@ from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.specs import shortening
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.resolution import resolve_experiment, resolve_study
-from gaplab.services.specs.shortening import experiment_spec, study_spec
+from gaplab.services.specs.resolution import resolve, resolve_experiment
+from gaplab.services.specs.shortening import shortest
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import run, toy
@@ -75,11 +75,11 @@ SMALL = {"strategies": ["simulated_fit", "direct"], "robot": "toy_function", "bu
 
 
 def stored(spec: dict[str, object]) -> list[dict[str, object]]:
-    return [each.model_dump(mode="json") for each in resolve_study(StudySpec.model_validate(spec))]
+    return [each.model_dump(mode="json") for each in resolve(StudySpec.model_validate(spec))]
 
 
 def exported(store: Store, study: str) -> bytes:
-    with export_study(store, study).file as archive:
+    with export(store, study).file as archive:
         return archive.read()
 
 
@@ -94,7 +94,7 @@ def compute(store: Store) -> None:
 def test_a_short_spec_of_a_study_gives_the_same_experiments(name: str) -> None:
     given = json.loads((EXAMPLES / f"{name}.json").read_text())
 
-    found = study_spec(given["name"], stored(given))
+    found = shortest(given["name"], stored(given))
 
     assert found.spec is not None
     assert found.remarks == ()
@@ -108,7 +108,7 @@ def test_a_short_spec_of_an_experiment_gives_the_same(name: str) -> None:
     given = ExperimentSpec.model_validate_json((EXAMPLES / f"{name}.json").read_text())
     resolved = resolve_experiment(given)
 
-    found = experiment_spec(resolved.model_dump(mode="json"))
+    found = shortest(resolved.name, [resolved.model_dump(mode="json")])
 
     assert resolve_experiment(ExperimentSpec.model_validate(found.spec)) == resolved
     assert found.spec is not None
@@ -128,7 +128,9 @@ def test_many_known_samples_are_shortened_in_as_many_trials_as_few(monkeypatch: 
         samples = [{"genome": [0.2], "values": [0.4]}, {"genome": [0.7], "values": [0.5], "unit": "m/s"}] * count
         spec = toy(reality={"kind": "physical", "samples": samples})
         before = len(trials)
-        assert experiment_spec(resolve_experiment(spec).model_dump(mode="json")).spec["reality"]["samples"] == samples  # type: ignore[index]
+        found = shortest("simulated_fit", [resolve_experiment(spec).model_dump(mode="json")]).spec
+        assert found is not None
+        assert found["reality"]["samples"] == samples
         return len(trials) - before
 
     assert tried(10) == tried(1)
@@ -138,7 +140,7 @@ def test_a_study_whose_experiments_were_extended_has_the_size_that_all_have() ->
     experiments = stored(SMALL | {"repetitions": 3})
     grown = [experiments[0] | {"repetitions": 9}, experiments[1]]
 
-    found = study_spec("study", grown)
+    found = shortest("study", grown)
 
     assert found.spec is not None
     assert [each["repetitions"] for each in stored(found.spec)] == [9, 3]
@@ -147,7 +149,7 @@ def test_a_study_whose_experiments_were_extended_has_the_size_that_all_have() ->
 def test_experiments_that_differ_in_more_than_strategy_have_no_single_spec() -> None:
     one, other = stored(SMALL)
 
-    found = study_spec("mixed", [one, other | {"seed": 5}])
+    found = shortest("mixed", [one, other | {"seed": 5}])
 
     assert found.spec is None
     assert "differ in more than their strategies" in found.remarks[0]
@@ -155,14 +157,14 @@ def test_experiments_that_differ_in_more_than_strategy_have_no_single_spec() -> 
 
 def test_hidden_parameters_are_in_no_spec_until_the_experiment_has_ended(sqlite_store: Store) -> None:
     spec = {**SMALL, "reality": {"parameters": {"static_friction": 0.77}}, "tunables": ["static_friction"]}
-    study = submission.submit_study(sqlite_store, StudySpec.model_validate(spec))
+    study = submission.submit(sqlite_store, StudySpec.model_validate(spec))
 
     with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
         before = api.get(f"/studies/{study.id}/spec")
         archive = BytesIO(exported(sqlite_store, study.id))
         compute(sqlite_store)
         after = api.get(f"/studies/{study.id}/spec").json()
-        one = api.get(f"/experiments/{study.experiments[0].id}/spec").json()
+        one = api.get(f"/studies/{study.experiments[0].id}/spec").json()
 
     assert "0.77" not in before.text
     assert "static_friction are hidden until" in before.json()["remarks"][0]
@@ -177,7 +179,7 @@ def test_hidden_parameters_are_in_no_spec_until_the_experiment_has_ended(sqlite_
 def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
     gaplab: Gaplab, sqlite_store: Store, tmp_path: Path
 ) -> None:
-    study = submission.submit_study(sqlite_store, StudySpec.model_validate(SMALL | {"repetitions": 1}))
+    study = submission.submit(sqlite_store, StudySpec.model_validate(SMALL | {"repetitions": 1}))
     compute(sqlite_store)
     file = tmp_path / "a.zip"
     file.write_bytes(exported(sqlite_store, study.id))

@@ -19,7 +19,7 @@ from gaplab.schemas.lifecycle import ENDS, MOVES, PERMITTED, Ending, ExtensionSp
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import extension, lifecycle, submission
+from gaplab.services.experiments import extension, lifecycle
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.specs.assembly import setting
@@ -28,6 +28,7 @@ from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
+from tests.experiments import submit_one
 from tests.fakes import flat
 
 MOST_ITERATIONS, MOST_REPETITIONS = 2, 3
@@ -137,7 +138,7 @@ class LifeCycle(RuleBasedStateMachine):
     @precondition(lambda self: len(self.experiments) < 2)
     @rule(iterations=st.integers(1, MOST_ITERATIONS), repetitions=st.integers(1, MOST_REPETITIONS - 1))
     def submit(self, iterations: Any, repetitions: Any) -> None:
-        read = submission.submit_experiment(self.store, spec(iterations, repetitions))
+        read = submit_one(self.store, spec(iterations, repetitions))
         made = [Repetition() for _ in range(repetitions)]
         self.experiments.append(Experiment(read.id, iterations, made))
 
@@ -148,10 +149,10 @@ class LifeCycle(RuleBasedStateMachine):
         held = self.claims()
         if experiment.state not in PERMITTED[verb]:
             with pytest.raises(Conflict):
-                lifecycle.ask_experiment(self.store, experiment.id, verb)
+                lifecycle.ask(self.store, experiment.id, verb)
             return
         experiment.ask(verb)
-        assert lifecycle.ask_experiment(self.store, experiment.id, verb).state is experiment.state
+        assert lifecycle.ask(self.store, experiment.id, verb).state is experiment.state
         self.gone += [each for each in held if each not in self.claims()]
 
     @precondition(lambda self: any(each.state is State.COMPLETED for each in self.experiments))
@@ -162,20 +163,20 @@ class LifeCycle(RuleBasedStateMachine):
         new = repetitions - len(experiment.repetitions)
         if new < 0 or iterations < experiment.iterations:
             with pytest.raises(InvalidSpec):
-                extension.extend_experiment(self.store, experiment.id, totals)
+                extension.extend(self.store, experiment.id, totals)
             return
         again = [
             each for each in experiment.of(State.COMPLETED, State.CANCELLED) if points(each.steps) < iterations + 1
         ]
         if not (again or new):
             with pytest.raises(Conflict):
-                extension.extend_experiment(self.store, experiment.id, totals)
+                extension.extend(self.store, experiment.id, totals)
             return
         for each in again:
             each.state, each.losses = State.QUEUED, 0
         experiment.repetitions += [Repetition() for _ in range(new)]
         experiment.iterations, experiment.state = iterations, State.QUEUED
-        extension.extend_experiment(self.store, experiment.id, totals)
+        extension.extend(self.store, experiment.id, totals)
 
     @rule(limit=st.integers(1, 3))
     def claim(self, limit: Any) -> None:
@@ -327,7 +328,7 @@ class LifeCycle(RuleBasedStateMachine):
     def teardown(self) -> None:
         for each in self.experiments:
             with suppress(Conflict):
-                lifecycle.ask_experiment(self.store, each.id, Verb.CANCEL)
+                lifecycle.ask(self.store, each.id, Verb.CANCEL)
 
 
 def drive(store: Store, examples: Any, steps: Any) -> None:

@@ -15,12 +15,12 @@ from sqlalchemy import event, text
 
 from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
-from gaplab.services.experiments import listing, submission
+from gaplab.services.experiments import listing
 from gaplab.services.running import execution
 from gaplab.services.store.engine import parse
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.session import Store
-from tests.experiments import same, some_log, toy
+from tests.experiments import listed, same, some_log, submit_one, toy
 
 OPEN_FILES = Path("/proc/self/fd")
 
@@ -45,7 +45,7 @@ def log_of(store: Store) -> Any:
 
 @pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.dialects), 2, 3, 4, 5])
 def test_a_kill_between_any_two_statements_leaves_nothing_half_written(store: Store, steps: Any) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     log = list(some_log())[: steps + 3]
     for step in log[:-1]:
@@ -110,7 +110,7 @@ for count, step in enumerate(some_log(30), start=1):
 
 @pytest.mark.release
 def test_what_was_acknowledged_survives_kill_9(sqlite_url: str, sqlite_store: Store) -> None:
-    submission.submit_experiment(sqlite_store, toy(repetitions=1, iterations=30))
+    submit_one(sqlite_store, toy(repetitions=1, iterations=30))
     root = Path(__file__).parents[2]
 
     with subprocess.Popen([sys.executable, "-c", CHILD, sqlite_url], stdout=subprocess.PIPE, cwd=root) as child:
@@ -132,7 +132,7 @@ def test_on_sqlite_a_commit_returns_when_no_power_loss_can_undo_it(sqlite_store:
 
 @pytest.mark.dialects
 def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     first, *_ = some_log()
 
@@ -150,7 +150,7 @@ def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store: S
 
 @pytest.mark.dialects
 def test_writers_wait_for_each_other(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy()).id
+    experiment = submit_one(store, toy()).id
 
     def rename(number: Any) -> None:
         with store.transaction() as session:
@@ -167,14 +167,14 @@ def test_writers_wait_for_each_other(store: Store) -> None:
 def test_a_read_sees_one_moment(postgres_store: Store) -> None:
     with postgres_store.reading() as session:
         before = session.scalar(text("SELECT count(*) FROM experiment"))
-        submission.submit_experiment(postgres_store, toy())
+        submit_one(postgres_store, toy())
         after = session.scalar(text("SELECT count(*) FROM experiment"))
 
     assert before == after == 0
 
 
 def test_a_deadlock_is_tried_again(postgres_store: Store) -> None:
-    ids = [submission.submit_experiment(postgres_store, toy()).id for _ in range(2)]
+    ids = [submit_one(postgres_store, toy()).id for _ in range(2)]
     together, attempts = Barrier(2), []
 
     def lock_both(order: Any) -> Any:
@@ -198,7 +198,7 @@ def test_a_deadlock_is_tried_again(postgres_store: Store) -> None:
 
 
 def test_the_store_recovers_from_lost_connections(postgres_store: Store) -> None:
-    submission.submit_experiment(postgres_store, toy())
+    submit_one(postgres_store, toy())
     url = postgres_store._engine.url.set(drivername="postgresql").render_as_string(hide_password=False)
 
     with psycopg.connect(url, autocommit=True) as connection:
@@ -207,7 +207,7 @@ def test_the_store_recovers_from_lost_connections(postgres_store: Store) -> None
             " WHERE datname = current_database() AND pid <> pg_backend_pid()"
         )
 
-    assert len(listing.list_experiments(postgres_store).items) == 1
+    assert len(listed(postgres_store)) == 1
 
 
 def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store: Store) -> None:
@@ -235,11 +235,11 @@ def test_an_unreachable_database_is_unavailable_and_recovers_by_itself(tmp_path:
     store = Store(url)
 
     with pytest.raises(StoreUnavailable, match="cannot be used now"):
-        submission.submit_experiment(store, toy())
+        submit_one(store, toy())
     folder.mkdir()
     migrations.upgrade(url)
 
-    assert submission.submit_experiment(store, toy()).id
+    assert submit_one(store, toy()).id
     store.dispose()
 
 

@@ -18,7 +18,6 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
-from gaplab.services.experiments import submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.store.lease import Failure, Pulse
@@ -28,6 +27,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers import sensitivity as checking
 from gaplab.workers import supervisor
 from gaplab.workers.task import delivered
+from tests.experiments import submit_one
 from tests.fakes import flat
 from tests.without_ray import OPEN, SPEC, Here, HereRepetitions, HereRun, Stop
 
@@ -139,7 +139,7 @@ BROKEN = ExperimentSpec.model_validate(
 
 def outcome(store: Store) -> Any:
     """What came of everything, after supervisors that are stopped and started until all has ended."""
-    names = {submission.submit_experiment(store, each).id: each.name for each in (SPEC, BROKEN)}
+    names = {submit_one(store, each).id: each.name for each in (SPEC, BROKEN)}
     rounds = 0
     while unfinished(store):
         assert rounds < 100

@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 from gaplab.api.app import create_app
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.archives import export_experiment
+from gaplab.services.archives import export
 from gaplab.services.archives.rerunning import verify
 from gaplab.services.core import robot_library, world_checks
 from gaplab.services.core.errors import InvalidSpec
@@ -22,7 +22,6 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.robots.robot_file import Imported
 from gaplab.services.core.world import Inertia
 from gaplab.services.experiments import stored_robots, submission
-from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
@@ -30,7 +29,7 @@ from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, RobotRow
 from gaplab.services.store.session import Store
 from tests.archiving import exported, imported
-from tests.experiments import run
+from tests.experiments import listed, run, submit_one
 
 JSON = {"Content-Type": "application/json"}
 SPEC: dict[str, Any] = {
@@ -119,11 +118,11 @@ def test_a_robot_cannot_have_the_name_of_a_plug_in_or_a_controller_that_is_not_t
 
 def test_a_spec_means_the_newest_robot_of_a_name_and_keeps_its_hash(store: Store) -> None:
     old = stored_robots.add_robot(store, file_of().text)
-    first = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    first = submit_one(store, ExperimentSpec.model_validate(SPEC))
     heavier = json.loads(file_of().text)
     heavier["world"]["bodies"][0]["mass_kg"] = 3.0
     new = stored_robots.add_robot(store, json.dumps(heavier))
-    second = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    second = submit_one(store, ExperimentSpec.model_validate(SPEC))
 
     assert [each.spec["robot"]["options"]["sha256"] for each in (first, second)] == [old.sha256, new.sha256]
     assert first.spec["robot"]["options"]["name"] == "walker"
@@ -131,7 +130,7 @@ def test_a_spec_means_the_newest_robot_of_a_name_and_keeps_its_hash(store: Store
 
 def test_an_unknown_robot_is_told_with_every_other_mistake(store: Store) -> None:
     with pytest.raises(InvalidSpec) as raised:
-        submission.submit_study(store, StudySpec.model_validate({"robot": "wolker", "optimizer": "none"}))
+        submission.submit(store, StudySpec.model_validate({"robot": "wolker", "optimizer": "none"}))
 
     assert {each.pointer for each in raised.value.violations} == {"/robot", "/optimizer"}
 
@@ -166,7 +165,7 @@ def test_a_robot_that_the_process_knows_but_that_is_not_stored_is_refused(store:
     unstored = {"name": "robot_file", "options": {"sha256": file_of().sha256}}
 
     with pytest.raises(InvalidSpec, match=r"no robot with the hash .* is stored here"):
-        submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC | {"robot": unstored}))
+        submit_one(store, ExperimentSpec.model_validate(SPEC | {"robot": unstored}))
 
 
 def test_it_is_said_why_an_engine_cannot_run_a_robot(store: Store) -> None:
@@ -176,23 +175,19 @@ def test_it_is_said_why_an_engine_cannot_run_a_robot(store: Store) -> None:
     stored_robots.add_robot(store, file_of().model_copy(update={"world": world}).text)
 
     with pytest.raises(InvalidSpec, match=r"pybullet cannot run the .*, since its bodies and shapes need \d+ links"):
-        submission.submit_experiment(
-            store, ExperimentSpec.model_validate(SPEC | {"robot": "walker", "engine": "pybullet"})
-        )
+        submit_one(store, ExperimentSpec.model_validate(SPEC | {"robot": "walker", "engine": "pybullet"}))
 
 
 def test_a_robot_from_a_file_takes_no_options(store: Store) -> None:
     stored_robots.add_robot(store, file_of().text)
     with pytest.raises(InvalidSpec, match="comes from a file, which has no options"):
-        submission.submit_experiment(
-            store, ExperimentSpec.model_validate(SPEC | {"robot": {"name": "walker", "options": {"legs": 4}}})
-        )
+        submit_one(store, ExperimentSpec.model_validate(SPEC | {"robot": {"name": "walker", "options": {"legs": 4}}}))
 
 
 @pytest.mark.release
 def test_a_robot_from_a_file_has_the_numbers_of_the_plug_in_to_the_last_bit(store: Store) -> None:
     stored_robots.add_robot(store, file_of().text)
-    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     with store.reading() as session:
         from_file = ResolvedSpec.model_validate(session.get_one(ExperimentRow, made.id).spec)
     plug_in = resolve_experiment(ExperimentSpec.model_validate(SPEC | {"robot": Quadruped.name}))
@@ -203,7 +198,7 @@ def test_a_robot_from_a_file_has_the_numbers_of_the_plug_in_to_the_last_bit(stor
 
 def test_a_spec_whose_robot_is_gone_says_so(store: Store) -> None:
     stored_robots.add_robot(store, file_of("lost").text)
-    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC | {"robot": "lost"}))
+    made = submit_one(store, ExperimentSpec.model_validate(SPEC | {"robot": "lost"}))
     with store.transaction() as session:
         session.delete(session.get_one(RobotRow, made.spec["robot"]["options"]["sha256"]))
         spec = ResolvedSpec.model_validate(session.get_one(ExperimentRow, made.id).spec)
@@ -218,7 +213,7 @@ def test_a_stored_robot_stays_usable_where_later_checks_would_refuse_it(
     store: Store, http: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored_robots.add_robot(store, file_of().text)
-    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     robot_library._known.clear()
     monkeypatch.setattr(world_checks, "MOST_BODIES", 3)
 
@@ -246,20 +241,20 @@ def test_a_robot_whose_usual_task_is_gone_is_unavailable_in_the_catalogue(store:
 
 def test_queries_and_the_catalogue_know_it_by_its_name(store: Store, http: TestClient) -> None:
     stored_robots.add_robot(store, file_of().text)
-    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     entry = next(each for each in http.get("/catalogue").json()["robots"] if each["name"] == "walker")
 
     assert entry["details"]["controller"]["name"] == "square_pulses"
     assert (entry["details"]["genes"], entry["details"]["unit"]) == (24, "m/s")
-    assert [each.id for each in list_experiments(store, ListFilter(q="robot = walker")).items] == [made.id]
-    assert list_experiments(store, ListFilter(q="robot = imported")).items == ()
+    assert [each.id for each in listed(store, q="robot = walker")] == [made.id]
+    assert listed(store, q="robot = imported") == []
 
 
 def test_an_archive_has_its_robots_and_brings_them(store: Store, other: Store) -> None:
     file = file_of()
     stored_robots.add_robot(store, file.text)
-    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
-    archive = exported(export_experiment(store, made.id))
+    made = submit_one(store, ExperimentSpec.model_validate(SPEC))
+    archive = exported(export(store, made.id))
     robot_library._known.clear()
 
     imported(other, archive)
@@ -270,10 +265,10 @@ def test_an_archive_has_its_robots_and_brings_them(store: Store, other: Store) -
 @pytest.mark.release
 def test_an_archive_of_a_robot_from_a_file_is_verified_in_processes_that_do_not_know_it(store: Store) -> None:
     stored_robots.add_robot(store, file_of().text)
-    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
+    made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, repetition(setting(claim.spec, claim.number)))
-    archive = BytesIO(exported(export_experiment(store, made.id)))
+    archive = BytesIO(exported(export(store, made.id)))
     robot_library._known.clear()
 
     (found,) = verify(archive, cores=1).repetitions
@@ -284,8 +279,8 @@ def test_an_archive_of_a_robot_from_a_file_is_verified_in_processes_that_do_not_
 
 def test_an_archive_gives_no_name_another_meaning(store: Store, other: Store) -> None:
     stored_robots.add_robot(store, file_of().text)
-    made = submission.submit_experiment(store, ExperimentSpec.model_validate(SPEC))
-    archive = exported(export_experiment(store, made.id))
+    made = submit_one(store, ExperimentSpec.model_validate(SPEC))
+    archive = exported(export(store, made.id))
     own = json.loads(file_of().text)
     own["world"]["bodies"][0]["mass_kg"] = 3.0
     mine = stored_robots.add_robot(other, json.dumps(own))

@@ -21,12 +21,12 @@ from gaplab.services.reports.content import verdict_on
 from gaplab.services.reports.document import report_on
 from gaplab.services.reports.pdf import render_pdf
 from gaplab.services.running import execution
-from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.store.lease import Claim
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from tests.archiving import imported
-from tests.experiments import run, some_log, toy
+from tests.experiments import run, some_log, submit_one, toy
 
 STUDIES = Path(__file__).parents[2] / "docs" / "studies"
 EVIL = "<script>alert(1)</script>"
@@ -84,7 +84,7 @@ class Page(HTMLParser):
 def recorded(store: Store, means: list[float], spread: float, repetitions: int = 8) -> str:
     """An experiment with these recorded values, a constant apart in each repetition."""
     spec = toy(iterations=len(means) - 1, repetitions=repetitions)
-    made = submission.submit_experiment(store, ExperimentSpec.model_validate(spec)).id
+    made = submit_one(store, ExperimentSpec.model_validate(spec)).id
     for claim in execution.claim(store, "test", limit=repetitions):
         record(store, claim, means, spread, repetitions)
     return made
@@ -103,7 +103,7 @@ def record(store: Store, claim: Claim, means: list[float], spread: float, repeti
 def test_the_verdict_on_a_flat_curve_says_since_when_and_advises(sqlite_store: Store, api: TestClient) -> None:
     made = recorded(sqlite_store, [0.2, 0.5, 0.8, 1.0, 1.0, 1.0, 1.0], spread=0.05)
 
-    verdict = api.get(f"/experiments/{made}/report", params={"format": "json"}).json()
+    verdict = api.get(f"/studies/{made}/report", params={"format": "json"}).json()
 
     assert verdict["headline"] == "Flat since iteration 3; not worth continuing."
     (trend,) = verdict["trends"]
@@ -113,7 +113,7 @@ def test_the_verdict_on_a_flat_curve_says_since_when_and_advises(sqlite_store: S
 def test_the_verdict_on_a_rising_curve_advises_to_continue(sqlite_store: Store, api: TestClient) -> None:
     made = recorded(sqlite_store, [0.2, 0.4, 0.6, 0.8, 1.0], spread=0.05)
 
-    verdict = api.get(f"/experiments/{made}/report", params={"format": "json"}).json()
+    verdict = api.get(f"/studies/{made}/report", params={"format": "json"}).json()
 
     assert verdict["headline"] == "Still rising: Simulated fit."
     assert verdict["trends"][0]["continuing"] is True
@@ -122,7 +122,7 @@ def test_the_verdict_on_a_rising_curve_advises_to_continue(sqlite_store: Store, 
 def test_four_repetitions_are_too_few_for_a_verdict(sqlite_store: Store, api: TestClient) -> None:
     made = recorded(sqlite_store, [0.2, 0.5, 1.0, 1.0, 1.0, 1.0], spread=0.05, repetitions=4)
 
-    verdict = api.get(f"/experiments/{made}/report", params={"format": "json"}).json()
+    verdict = api.get(f"/studies/{made}/report", params={"format": "json"}).json()
 
     assert verdict["headline"] == "Too few repetitions or evaluations to say whether continuing is worthwhile."
     assert verdict["trends"][0]["continuing"] is None
@@ -131,14 +131,14 @@ def test_four_repetitions_are_too_few_for_a_verdict(sqlite_store: Store, api: Te
 def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
     published: Store, reader: TestClient, study: str
 ) -> None:
-    experiments = reading.read_study(published, study).experiments
-    asked: Any = {"experiment": [each.id for each in experiments], "from": 3, "to": 3}
+    experiments = reading.read(published, study).experiments
+    asked: Any = {"study": [each.id for each in experiments], "from": 3, "to": 3}
     pairs = reader.get("/comparisons", params=asked).json()
     learned = {each.id for each in experiments if not each.direct}
     compared = [pair for pair in pairs if {pair["first"], pair["second"]} <= learned]
     differing = [pair for pair in compared if pair["trusted"]["p_holm"] < 0.05]
 
-    verdict = verdict_on(published, reading.read_study(published, study))
+    verdict = verdict_on(published, reading.read(published, study))
 
     assert verdict.evaluations == 3
     assert 0 < len(differing) < len(compared)
@@ -153,19 +153,17 @@ def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
 )
 def test_the_verdict_on_two_strategies(sqlite_store: Store, ahead: float, headline: str) -> None:
     spec = toy(iterations=4, repetitions=8).model_dump(mode="json", exclude_unset=True, exclude={"strategy"})
-    made = submission.submit_study(
-        sqlite_store, StudySpec.model_validate({**spec, "strategies": ["random", "known_fit"]})
-    )
+    made = submission.submit(sqlite_store, StudySpec.model_validate({**spec, "strategies": ["random", "known_fit"]}))
     first = made.experiments[0].id
     for claim in execution.claim(sqlite_store, "test", limit=16):
         record(sqlite_store, claim, [0.2, 0.5, 0.6, 0.7, 0.7 + ahead * (claim.experiment_id == first)], spread=0.02)
 
-    verdict = verdict_on(sqlite_store, reading.read_study(sqlite_store, made.id))
+    verdict = verdict_on(sqlite_store, reading.read(sqlite_store, made.id))
     assert verdict.headline.replace("\xa0", " ").startswith(headline)
 
 
 def test_the_verdict_tells_the_share_of_direct(published: Store, study: str) -> None:
-    sentences = verdict_on(published, reading.read_study(published, study)).sentences
+    sentences = verdict_on(published, reading.read(published, study)).sentences
 
     assert any("Share of the fitness of Direct" in sentence and "%" in sentence for sentence in sentences)
 
@@ -187,9 +185,9 @@ def test_only_a_margin_turns_no_significance_into_no_difference(reader: TestClie
 
 
 def test_a_study_without_results_has_no_verdict(sqlite_store: Store) -> None:
-    made = submission.submit_study(sqlite_store, StudySpec.model_validate({"robot": "toy_function", "budget": "smoke"}))
+    made = submission.submit(sqlite_store, StudySpec.model_validate({"robot": "toy_function", "budget": "smoke"}))
 
-    assert verdict_on(sqlite_store, made).headline == "There are no results yet."
+    assert verdict_on(sqlite_store, reading.read(sqlite_store, made.id)).headline == "There are no results yet."
 
 
 def test_the_page_needs_no_other_file_and_no_script(reader: TestClient, study: str) -> None:
@@ -208,9 +206,9 @@ def test_the_page_needs_no_other_file_and_no_script(reader: TestClient, study: s
 
 
 def test_a_name_cannot_become_markup(sqlite_store: Store, api: TestClient) -> None:
-    made = submission.submit_experiment(sqlite_store, toy(name=EVIL)).id
+    made = submit_one(sqlite_store, toy(name=EVIL)).id
 
-    text = api.get(f"/experiments/{made}/report").text
+    text = api.get(f"/studies/{made}/report").text
 
     assert EVIL not in text
     assert EVIL in Page(text).words
@@ -218,7 +216,7 @@ def test_a_name_cannot_become_markup(sqlite_store: Store, api: TestClient) -> No
 
 @pytest.mark.release
 def test_the_same_report_is_the_same_pdf(published: Store, study: str) -> None:
-    report, at = report_on(published, reading.read_study(published, study)), datetime(2026, 1, 1, tzinfo=UTC)
+    report, at = report_on(published, reading.read(published, study)), datetime(2026, 1, 1, tzinfo=UTC)
 
     first, second = (render_pdf(report, "made", at) for _ in range(2))
 
@@ -229,9 +227,9 @@ def test_the_same_report_is_the_same_pdf(published: Store, study: str) -> None:
 
 @pytest.mark.release
 def test_the_pdf_is_served(sqlite_store: Store, api: TestClient) -> None:
-    made = submission.submit_experiment(sqlite_store, toy()).id
+    made = submit_one(sqlite_store, toy()).id
 
-    answer = api.get(f"/experiments/{made}/report", params={"format": "pdf"})
+    answer = api.get(f"/studies/{made}/report", params={"format": "pdf"})
 
     assert answer.headers["content-type"] == "application/pdf"
     assert answer.content.startswith(b"%PDF")
@@ -240,22 +238,22 @@ def test_the_pdf_is_served(sqlite_store: Store, api: TestClient) -> None:
 def test_hidden_parameters_of_reality_are_in_no_report(sqlite_store: Store, api: TestClient) -> None:
     secret = 0.7319462853
     reality = {"parameters": {"static_friction": secret, "dynamic_friction": 0.3}}
-    made = submission.submit_experiment(sqlite_store, toy(reality=reality)).id
+    made = submit_one(sqlite_store, toy(reality=reality)).id
     (claim, *_) = execution.claim(sqlite_store, "test", limit=1)
     run(sqlite_store, claim)
 
-    hidden = api.get(f"/experiments/{made}/report").text
-    lifecycle.ask_experiment(sqlite_store, made, Verb.CANCEL)
+    hidden = api.get(f"/studies/{made}/report").text
+    lifecycle.ask(sqlite_store, made, Verb.CANCEL)
 
     assert str(secret) not in hidden
-    assert str(secret) in api.get(f"/experiments/{made}/report").text
+    assert str(secret) in api.get(f"/studies/{made}/report").text
 
 
 def test_the_spec_in_a_report_gives_the_same_experiments(published: Store, study: str) -> None:
-    experiments = reading.read_study(published, study).experiments
+    experiments = reading.read(published, study).experiments
 
     (spec,), _ = how_to_reproduce(published, study)
-    resolved = resolve_study(StudySpec.model_validate_json(spec))
+    resolved = resolve(StudySpec.model_validate_json(spec))
 
     known = set(experiments[0].spec)  # without the schedule, which changes no number
     stored = [{**each.spec, "name": None} for each in experiments]
@@ -264,7 +262,7 @@ def test_the_spec_in_a_report_gives_the_same_experiments(published: Store, study
 
 def how_to_reproduce(store: Store, study: str) -> tuple[list[str], list[str]]:
     """Return the specs and the sentences of the report's section."""
-    blocks = report_on(store, reading.read_study(store, study)).sections[-1].blocks
+    blocks = report_on(store, reading.read(store, study)).sections[-1].blocks
     return (
         [block.text for block in blocks if isinstance(block, Code)],
         [block.text for block in blocks if isinstance(block, Paragraph)],
@@ -275,7 +273,7 @@ def two_strategies(store: Store) -> tuple[str, list[str]]:
     """A study with two repetitions of two strategies, and the ids of its experiments."""
     spec = toy(repetitions=2).model_dump(mode="json", exclude_unset=True, exclude={"strategy"})
     both = StudySpec.model_validate({**spec, "strategies": ["simulated_fit", "informative"]})
-    made = submission.submit_study(store, both)
+    made = submission.submit(store, both)
     return made.id, [experiment.id for experiment in made.experiments]
 
 
@@ -285,11 +283,11 @@ def test_the_spec_of_a_study_of_which_one_experiment_was_extended_has_the_size_t
     study, (extended, _) = two_strategies(sqlite_store)
     for claim in execution.claim(sqlite_store, "test", limit=4):
         run(sqlite_store, claim)
-    extension.extend_experiment(sqlite_store, extended, ExtensionSpec(repetitions=3))
+    extension.extend(sqlite_store, extended, ExtensionSpec(repetitions=3))
 
     (spec,), sentences = how_to_reproduce(sqlite_store, study)
 
-    resolved = resolve_study(StudySpec.model_validate_json(spec))
+    resolved = resolve(StudySpec.model_validate_json(spec))
     assert [(each.strategy.name, each.repetitions) for each in resolved] == [("simulated_fit", 2), ("informative", 2)]
     remark = "Experiments were extended since; the spec has the iterations and repetitions that all have."
     assert remark in sentences
@@ -312,7 +310,6 @@ def test_experiments_without_a_single_spec_have_a_spec_each(sqlite_store: Store)
     assert any(sentence.startswith("The experiments differ in more") for sentence in sentences)
 
 
-@pytest.mark.parametrize("address", ["/studies/nope/report", "/experiments/nope/report"])
-def test_there_is_no_report_of_nothing(api: TestClient, address: str) -> None:
+def test_there_is_no_report_of_nothing(api: TestClient) -> None:
     for format_ in ("html", "pdf", "json"):
-        assert api.get(address, params={"format": format_}).status_code == 404
+        assert api.get("/studies/nope/report", params={"format": format_}).status_code == 404

@@ -14,9 +14,9 @@ from gaplab.api.clients.confirmation import NotSubmitted, confirm, duration, sen
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.services.experiments import listing
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
+from tests.experiments import listed, submit_one
 from tests.integration.test_bench import bench, compute, measure, pending
 
 SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
@@ -37,7 +37,7 @@ def test_a_dry_run_prints_the_complete_spec_and_submits_nothing(gaplab: Gaplab, 
         gaplab("submit", "-", "--dry-run", *options, stdin=json.dumps(SMALL)) for options in ([], ["--json"])
     )
 
-    assert listing.list_experiments(sqlite_store).items == ()
+    assert listed(sqlite_store) == []
     assert json.loads(text.out)["iterations"] == 2
     assert json.loads(text.out)["engine"]["name"] == "analytic"
     assert "Nothing was submitted" in text.err
@@ -81,7 +81,7 @@ def test_further_tunables_are_tried_on_the_samples_of_an_experiment(gaplab: Gapl
 @pytest.mark.release
 def test_further_tunables_are_tried_on_readings_of_a_robot_on_a_bench(gaplab: Gaplab, sqlite_store: Store) -> None:
     changes = {"robot": "quadruped", "engine": "mujoco", "iterations": 1, "discrepancy": "readings"}
-    id = submit_experiment(sqlite_store, bench(**changes, reality={"repeats": 2, "limits": {"tilt": 2.0}})).id
+    id = submit_one(sqlite_store, bench(**changes, reality={"repeats": 2, "limits": {"tilt": 2.0}})).id
     compute(sqlite_store)
     readings = tuple((((None, *([0.01] * 4)),) * 10) for _ in range(2))
     while asked := pending(sqlite_store):
@@ -135,7 +135,7 @@ def test_the_client_asks_a_person_too(url: str, monkeypatch: pytest.MonkeyPatch,
         client.submit(SMALL)
         client.submit({}, yes=True)
 
-    assert len(listing.list_experiments(sqlite_store).items) == 1 + 7
+    assert len(listed(sqlite_store)) == 1 + 7
 
 
 def test_an_estimate_of_an_experiment_is_that_of_a_study_with_its_strategy(url: str) -> None:

@@ -11,21 +11,20 @@ from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.types import Probed
 from gaplab.services.experiments import lifecycle, listing, reading, submission
-from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Claim
-from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.specs.resolution import resolve
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
-from tests.experiments import cancel, run, some_log, toy
+from tests.experiments import cancel, listed, run, some_log, submit_one, toy
 
 SHARED = {"robot": "toy_function", "iterations": 2, "budget": "smoke", "tunables": ["static_friction", "restitution"]}
 
 
 def study(store: Store, *strategies: str, repetitions: int = 1) -> Any:
     spec = StudySpec.model_validate(SHARED | {"strategies": strategies, "repetitions": repetitions})
-    return submission.submit_study(store, spec)
+    return submission.submit(store, spec)
 
 
 def claims(store: Store, limit: int = 20) -> dict[str, list[Claim]]:
@@ -47,7 +46,7 @@ def record(store: Store, claim: Claim, *fitnesses: float, complete: bool = True)
 
 @pytest.mark.dialects
 def test_the_fitness_is_a_point_of_the_curve_and_not_the_mean_of_maxima(store: Store) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=2)).id
+    made = submit_one(store, toy(repetitions=2)).id
     assert reading.read_experiment(store, made).fitness is None
     first, second = claims(store)[made]
 
@@ -60,11 +59,11 @@ def test_the_fitness_is_a_point_of_the_curve_and_not_the_mean_of_maxima(store: S
     assert (read.fitness.evaluations, read.fitness.n) == (2, 2)
     assert (read.fitness.mean, read.fitness.sd) == (point.mean, point.sd)
     assert read.best_fitness == pytest.approx(0.85)
-    assert listing.list_experiments(store).items[0].fitness == read.fitness
+    assert listed(store)[0].fitness == read.fitness
 
 
 def test_while_it_runs_the_fitness_is_after_the_last_number_that_all_begun_have_reached(store: Store) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=3)).id
+    made = submit_one(store, toy(repetitions=3)).id
     first, second, _ = claims(store)[made]
 
     record(store, first, 0.5, 0.6, 0.7, complete=False)
@@ -80,12 +79,12 @@ def test_while_it_runs_the_fitness_is_after_the_last_number_that_all_begun_have_
 
 
 def test_a_repetition_that_was_stopped_does_not_take_the_fitness_back_to_where_it_stopped(store: Store) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=2)).id
+    made = submit_one(store, toy(repetitions=2)).id
     first, second = claims(store)[made]
     record(store, first, 0.5, 0.6, 0.7)
     record(store, second, 0.1, complete=False)
 
-    lifecycle.ask_experiment(store, made, Verb.STOP)
+    lifecycle.ask(store, made, Verb.STOP)
     execution.release(store, second, "killed")
     read = reading.read_experiment(store, made)
 
@@ -95,12 +94,12 @@ def test_a_repetition_that_was_stopped_does_not_take_the_fitness_back_to_where_i
 
 
 def test_the_fitness_of_repetitions_that_were_all_stopped_is_after_the_last_number_they_share(store: Store) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=2)).id
+    made = submit_one(store, toy(repetitions=2)).id
     first, second = claims(store)[made]
     record(store, first, 0.5, 0.6, complete=False)
     record(store, second, 0.1, complete=False)
 
-    lifecycle.ask_experiment(store, made, Verb.STOP)
+    lifecycle.ask(store, made, Verb.STOP)
     for claim in (first, second):
         execution.release(store, claim, "killed")
     read = reading.read_experiment(store, made)
@@ -121,9 +120,9 @@ def test_the_best_of_a_study_is_the_highest_curve_at_the_last_shared_number_with
     record(store, found[known][0], 0.9, 0.9, complete=False)
     record(store, found[direct][0], 2.0)
 
-    running = reading.read_study(store, made.id).best
+    running = reading.read(store, made.id).best
     cancel(store, known)
-    ended = reading.read_study(store, made.id).best
+    ended = reading.read(store, made.id).best
 
     assert running
     assert (running.name, running.evaluations, running.mean) == ("known_fit", 1, 0.9)
@@ -141,7 +140,7 @@ def test_the_best_of_a_study_is_one_of_those_with_the_most_repetitions(store: St
     record(store, found[random][0], 0.9, 0.9, 0.9)
     cancel(store, random)
 
-    best = reading.read_study(store, made.id).best
+    best = reading.read(store, made.id).best
 
     assert best
     assert (best.name, best.n) == ("simulated_fit", 2)
@@ -151,19 +150,19 @@ def test_the_baseline_alone_is_the_best_of_its_study(store: Store) -> None:
     made = study(store, "direct")
     record(store, claims(store)[made.experiments[0].id][0], 2.0)
 
-    best = reading.read_study(store, made.id).best
+    best = reading.read(store, made.id).best
 
     assert best
     assert (best.name, best.evaluations, best.mean) == ("direct", 0, 2.0)
 
 
 def test_an_experiment_that_was_stopped_says_so_and_how_much_is_done(store: Store) -> None:
-    made = submission.submit_experiment(store, toy(repetitions=2)).id
+    made = submit_one(store, toy(repetitions=2)).id
     first, second = claims(store)[made]
     run(store, first)
     record(store, second, 0.5, complete=False)
 
-    lifecycle.ask_experiment(store, made, Verb.STOP)
+    lifecycle.ask(store, made, Verb.STOP)
     execution.release(store, second, "killed")
     read = reading.read_experiment(store, made)
 
@@ -179,21 +178,22 @@ def test_a_study_says_what_became_of_its_experiments(store: Store) -> None:
     found = claims(store)
     run(store, found[fit][0])
     execution.fail(store, found[random][0], Failure("it broke"))
-    going_on = reading.read_study(store, made.id)
+    going_on = reading.read(store, made.id)
     cancel(store, known)
-    ended = reading.read_study(store, made.id)
+    ended = reading.read(store, made.id)
 
     assert (going_on.state, going_on.caveat) == (State.RUNNING, "1 of 3 experiments failed")
     assert ended.state is State.COMPLETED
     assert ended.caveat
     assert ended.caveat.startswith("1 of 3 experiments failed, 1 cancelled; ")
     assert reading.read_experiment(store, fit).caveat is None
+    assert reading.read(store, random).caveat is None
 
 
 def test_equal_strategies_of_a_study_get_numbers_and_others_keep_their_names() -> None:
     weighted = {"name": "simulated_fit_and_informative", "options": {"informative_weight": 0.25}}
     strategies = ["random", weighted, "simulated_fit_and_informative", "random"]
-    names = [each.name for each in resolve_study(StudySpec.model_validate(SHARED | {"strategies": strategies}))]
+    names = [each.name for each in resolve(StudySpec.model_validate(SHARED | {"strategies": strategies}))]
 
     assert names == [
         "random (1)",
@@ -201,14 +201,6 @@ def test_equal_strategies_of_a_study_get_numbers_and_others_keep_their_names() -
         "simulated_fit_and_informative",
         "random (2)",
     ]
-
-
-def test_experiments_without_a_study_are_listed_alone(store: Store) -> None:
-    alone = submission.submit_experiment(store, toy()).id
-    study(store, "random")
-
-    assert [each.id for each in listing.list_experiments(store, ListFilter(alone=True)).items] == [alone]
-    assert len(listing.list_experiments(store).items) == 2
 
 
 def test_a_browser_that_is_lost_gets_a_page_with_a_way_home_and_a_program_a_problem(sqlite_store: Store) -> None:

@@ -23,7 +23,7 @@ from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.schemas.measurements import TakeSpec
 from gaplab.services.bench import taking
 from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged
-from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments import reading
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.running import execution
 from gaplab.services.running.leases import Silences
@@ -33,7 +33,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers import watch
 from gaplab.workers.ray_folder import PREFIX, ray_folder
 from gaplab.workers.supervisor import Supervisor
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 from tests.integration.test_bench import bench, compute, pending
 from tests.waiting import wait_until
 from tests.without_ray import Here, Stop
@@ -192,7 +192,7 @@ def test_as_a_process_it_then_ends_with_a_sentence(
 @pytest.mark.release
 def test_a_supervisor_that_is_stopped_is_killed_and_another_goes_on(sqlite_url: str, tmp_path: Path) -> None:
     store = Store(sqlite_url)
-    experiment = submission.submit_experiment(store, toy(repetitions=1)).id
+    experiment = submit_one(store, toy(repetitions=1)).id
     environment = {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_WORKERS": "1"}
     kept = SupervisorProcess(environment, silence=Silence(told_s=1, killed_s=15), store=store)
     kept.start()
@@ -216,7 +216,7 @@ def owners(store: Store) -> set[str]:
 
 
 def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_is_set_to(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=1, strategy="direct"))  # without a sensitivity check
+    submit_one(store, toy(repetitions=1, strategy="direct"))  # without a sensitivity check
     (claim,) = execution.claim(store, "silent", 1)
     patient, hasty = (Supervisor(store, lambda: 0, lease_s=lease_s) for lease_s in (600, 0.2))
     time.sleep(0.5)
@@ -233,7 +233,7 @@ def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_
 def test_a_time_in_which_nobody_could_show_a_sign_of_life_ends_no_take(
     sqlite_store: Store, caplog: pytest.LogCaptureFixture
 ) -> None:
-    submission.submit_experiment(sqlite_store, bench())
+    submit_one(sqlite_store, bench())
     compute(sqlite_store)
     (request,) = pending(sqlite_store)
     taking.take(sqlite_store, request.id, TakeSpec(operator="Ada"), FREELY)
@@ -260,11 +260,11 @@ def test_a_time_in_which_nobody_could_show_a_sign_of_life_ends_no_take(
 
 
 def test_what_has_begun_is_never_handed_back_for_what_is_more_urgent(sqlite_store: Store) -> None:
-    usual = submission.submit_experiment(sqlite_store, toy(repetitions=2)).id
+    usual = submit_one(sqlite_store, toy(repetitions=2)).id
     here = Here(sqlite_store)
     for _ in range(3):
         here.step()
-    submission.submit_experiment(sqlite_store, toy(repetitions=1, priority=9))
+    submit_one(sqlite_store, toy(repetitions=1, priority=9))
 
     here.step()
 

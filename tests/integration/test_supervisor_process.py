@@ -16,12 +16,12 @@ from sqlalchemy import select, text, update
 from gaplab.api.app import create_app
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.schemas.lifecycle import Ending
-from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments import reading
 from gaplab.services.running import execution, supervisors
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
-from tests.experiments import toy
+from tests.experiments import submit_one, toy
 from tests.waiting import wait_until
 
 SOON = Silence(told_s=1, killed_s=3)
@@ -116,7 +116,7 @@ def readyz(app: FastAPI) -> Any:
 def test_a_supervisor_that_stands_still_is_killed_and_its_work_goes_to_another(
     keep: Callable[..., SupervisorProcess], notes: Path, app: FastAPI, sqlite_store: Store
 ) -> None:
-    experiment = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    experiment = submit_one(sqlite_store, toy(repetitions=1)).id
     app.state.supervisor = keep(STANDS_STILL)
 
     wait_until(lambda: readyz(app).status_code == 503)
@@ -178,7 +178,7 @@ def test_a_silent_supervisor_of_another_process_is_told_as_a_warning(sqlite_stor
 
 
 def test_work_without_any_supervisor_is_told(sqlite_store: Store, app: FastAPI) -> None:
-    submission.submit_experiment(sqlite_store, toy())
+    submit_one(sqlite_store, toy())
 
     assert "no supervisor runs them" in readyz(app).json()["warnings"][0]
 
@@ -207,7 +207,7 @@ _AHEAD = {
 
 @pytest.mark.dialects
 def test_a_clock_that_was_set_back_by_an_hour_stalls_nothing(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy(repetitions=1)).id
+    experiment = submit_one(store, toy(repetitions=1)).id
     (claim,) = execution.claim(store, "crashed", 1)
     supervisors.heartbeat(store, "crashed")
     for table in ("repetition", "supervisor"):
@@ -239,7 +239,7 @@ def test_supervisors_of_long_ago_and_of_a_clock_far_ahead_are_forgotten(sqlite_s
 
 
 def test_a_clock_that_goes_back_a_little_loses_no_lease(store: Store) -> None:
-    submission.submit_experiment(store, toy(repetitions=1))
+    submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
 
     assert execution.requeue_lost(store, stale_after_s=5) == 0

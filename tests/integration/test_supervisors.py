@@ -19,7 +19,7 @@ import pytest
 from gaplab.schemas.lifecycle import Ending, State, Verb
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import lifecycle, reading, submission
+from gaplab.services.experiments import lifecycle, reading
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
@@ -27,7 +27,7 @@ from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from gaplab.workers.supervisor import Supervisor
-from tests.experiments import cancel
+from tests.experiments import cancel, submit_one
 from tests.fakes import flat
 from tests.processes import processes_of_ray
 from tests.supervising import impatient
@@ -75,17 +75,17 @@ def attempts(store: Store, experiment: Any, repetitions: Any) -> Any:
 
 
 def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numbers(store: Store) -> None:
-    experiment = submission.submit_experiment(store, spec(3)).id
+    experiment = submit_one(store, spec(3)).id
     supervisor = Supervisor(store, lambda: 3)
     wait_until(lambda: len(stored(store, experiment)[0]) > 1, meanwhile=supervisor.step)
 
-    lifecycle.ask_experiment(store, experiment, Verb.PAUSE)
+    lifecycle.ask(store, experiment, Verb.PAUSE)
     wait_until(lambda: state(store, experiment) is State.PAUSED, meanwhile=supervisor.step)
     wait_until(lambda: not (supervisor.busy or processes_of_ray("run")), meanwhile=supervisor.step)
     paused = stored(store, experiment)
     for _ in range(3):
         supervisor.step()
-    lifecycle.ask_experiment(store, experiment, Verb.RESUME)
+    lifecycle.ask(store, experiment, Verb.RESUME)
     wait_until(lambda: state(store, experiment).ended, meanwhile=supervisor.step)
 
     found = stored(store, experiment)
@@ -96,12 +96,12 @@ def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numb
 
 @pytest.mark.release
 def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sqlite_store: Store) -> None:
-    experiment = submission.submit_experiment(sqlite_store, spec(3)).id
+    experiment = submit_one(sqlite_store, spec(3)).id
     supervisor = Supervisor(sqlite_store, lambda: 3)
     done = lambda: reading.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
     wait_until(done, meanwhile=supervisor.step)
 
-    lifecycle.ask_experiment(sqlite_store, experiment, Verb.STOP)
+    lifecycle.ask(sqlite_store, experiment, Verb.STOP)
     wait_until(lambda: state(sqlite_store, experiment).ended, meanwhile=supervisor.step)
 
     found = stored(sqlite_store, experiment)
@@ -113,10 +113,10 @@ def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sq
 
 @pytest.mark.release
 def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite_store: Store) -> None:
-    large = submission.submit_experiment(sqlite_store, spec(8)).id
+    large = submit_one(sqlite_store, spec(8)).id
     supervisor = Supervisor(sqlite_store, lambda: 4)
     wait_until(lambda: len(stored(sqlite_store, large)[0]) > 1, meanwhile=supervisor.step)
-    small = submission.submit_experiment(sqlite_store, spec(1, controller_evaluations=100)).id
+    small = submit_one(sqlite_store, spec(1, controller_evaluations=100)).id
 
     wait_until(lambda: state(sqlite_store, small).ended, meanwhile=supervisor.step)
 
@@ -127,7 +127,7 @@ def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite
 
 
 def test_two_supervisors_on_one_database_do_nothing_twice(store: Store) -> None:
-    ids = [submission.submit_experiment(store, spec(2)).id for _ in range(2)]
+    ids = [submit_one(store, spec(2)).id for _ in range(2)]
     stop = Event()
 
     with ThreadPoolExecutor(2) as pool:
@@ -181,7 +181,7 @@ def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(
 ) -> None:
     impatient(monkeypatch.setattr)
     process, said = other
-    experiment = submission.submit_experiment(store, spec(2)).id
+    experiment = submit_one(store, spec(2)).id
     wait_until(lambda: len(stored(store, experiment)[0]) > 1)
 
     stop_outside_transactions(store, process.pid)

@@ -21,12 +21,11 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.engines.mujoco.engine import MuJoCo
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.running import execution
 from gaplab.services.store.models import AnswerRow
 from gaplab.services.store.session import Store
-from tests.experiments import run, toy
+from tests.experiments import run, submit_one, toy
 from tests.integration.test_bench import compute, measure, pending
 from tests.integration.test_bench_safety import ask
 from tests.integration.test_client import InProcess
@@ -69,7 +68,7 @@ def log() -> Iterator[Step]:
 
 
 def walked(store: Store) -> str:
-    experiment = submit_experiment(store, toy(**WALKING))
+    experiment = submit_one(store, toy(**WALKING))
     (claim,) = execution.claim(store, "here", 1)
     run(store, claim, log())
     return experiment.id
@@ -151,7 +150,7 @@ def test_the_page_is_one_file_that_says_what_was_found(store: Store, client: Cli
 
 def test_repeats_of_a_bench_are_taken_home(store: Store, client: Client, tmp_path: Path) -> None:
     reality = {"kind": "physical", "repeats": 2, "probes": "each"}
-    experiment = submit_experiment(store, toy(repetitions=1, iterations=1, reality=reality))
+    experiment = submit_one(store, toy(repetitions=1, iterations=1, reality=reality))
     with pytest.raises(ServiceError, match="measured and tuned nothing yet"):
         client.take_home(experiment.id, tmp_path / "home.zip")
     compute(store)
@@ -169,7 +168,7 @@ def test_repeats_of_a_bench_are_taken_home(store: Store, client: Client, tmp_pat
 
 def test_samples_from_before_are_taken_home(store: Store, client: Client, tmp_path: Path) -> None:
     reality = {"kind": "physical", "samples": [{"genome": [0.2], "values": [0.3]}], "probes": "never"}
-    experiment = submit_experiment(store, toy(repetitions=1, iterations=0, reality=reality))
+    experiment = submit_one(store, toy(repetitions=1, iterations=0, reality=reality))
     compute(store)
 
     found = files(client.take_home(experiment.id, tmp_path / "home.zip").read_bytes())
@@ -179,7 +178,7 @@ def test_samples_from_before_are_taken_home(store: Store, client: Client, tmp_pa
 
 def test_readings_of_all_repeats_and_traces_are_taken_home(store: Store, client: Client, tmp_path: Path) -> None:
     reality = {"kind": "physical", "repeats": 2, "probes": "each"}
-    experiment = submit_experiment(store, toy(**WALKING, reality=reality))
+    experiment = submit_one(store, toy(**WALKING, reality=reality))
     ask(store)
     said = [[[0.1 * repeat, None, 0.2, 0.3, 0.4]] * 10 for repeat in (1, 2)]
     client.bench.answer(pending(store)[0].id, [0.4, 0.5], readings=said)
@@ -197,10 +196,10 @@ def test_readings_of_all_repeats_and_traces_are_taken_home(store: Store, client:
 
 
 def test_an_experiment_without_results_or_of_another_id_says_so(store: Store, client: Client, tmp_path: Path) -> None:
-    experiment = submit_experiment(store, toy())
+    experiment = submit_one(store, toy())
     with pytest.raises(ServiceError, match="nothing yet"):
         client.take_home(experiment.id, tmp_path / "home.zip")
-    with pytest.raises(ServiceError, match="no experiment"):
+    with pytest.raises(ServiceError, match="no study or experiment"):
         client.take_home("absent", tmp_path / "home.zip")
     with pytest.raises(ValueError, match="permitted: zip, html"):
         client.take_home(experiment.id, tmp_path / "home.pdf")

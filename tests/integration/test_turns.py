@@ -6,15 +6,15 @@ import pytest
 from sqlalchemy import text
 
 from gaplab.schemas.lifecycle import ScheduleChange
-from gaplab.services.experiments import lifecycle, reading, submission
+from gaplab.services.experiments import lifecycle, reading
 from gaplab.services.running import execution, turns
 from gaplab.services.running.versions import provenance as present_provenance
 from gaplab.services.store.session import Store
-from tests.experiments import run, toy
+from tests.experiments import run, submit_one, toy
 
 
 def submitted(store: Store, **changes: Any) -> Any:
-    return submission.submit_experiment(store, toy(**changes)).id
+    return submit_one(store, toy(**changes)).id
 
 
 def claimed(store: Store, limit: Any) -> Any:
@@ -84,8 +84,8 @@ def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(stor
     first, second = submitted(store, max_parallel=1), submitted(store)
     spec = reading.read_experiment(store, second).spec
 
-    changed = lifecycle.schedule_experiment(store, second, ScheduleChange(priority=3))
-    free = lifecycle.schedule_experiment(store, first, ScheduleChange(max_parallel=None))
+    (changed,) = lifecycle.schedule(store, second, ScheduleChange(priority=3)).experiments
+    (free,) = lifecycle.schedule(store, first, ScheduleChange(max_parallel=None)).experiments
 
     assert (changed.priority, changed.max_parallel, changed.spec) == (3, None, spec)
     assert (free.priority, free.max_parallel) == (0, None)

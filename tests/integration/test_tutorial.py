@@ -5,8 +5,8 @@ from pathlib import Path
 
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import reading
-from gaplab.services.experiments.submission import submit_experiment
 from gaplab.services.store.session import Store
+from tests.experiments import submit_one
 from tests.integration.test_bench import compute
 
 ROOT = Path(__file__).parents[2]
@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 
 def test_the_first_experiment_has_the_fitness_that_the_tutorial_says(sqlite_store: Store) -> None:
     spec = ExperimentSpec.model_validate_json((ROOT / "examples" / "smoke.json").read_text())
-    submitted = submit_experiment(sqlite_store, spec)
+    submitted = submit_one(sqlite_store, spec)
 
     compute(sqlite_store)
 

@@ -27,7 +27,7 @@ from gaplab.services.core.sensitivity import Effort, check
 from gaplab.services.core.types import Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
-from gaplab.services.experiments import checks, reading, submission
+from gaplab.services.experiments import checks, reading
 from gaplab.services.running import sensitivity
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.specs.resolution import resolve_experiment
@@ -42,7 +42,7 @@ from gaplab.workers.permits import Permits, PermittedReality, asking
 from gaplab.workers.run import Run
 from gaplab.workers.supervisor import Supervisor
 from tests.arithmetic import told
-from tests.experiments import cancel
+from tests.experiments import cancel, submit_one
 from tests.fakes import flat, install
 from tests.processes import processes_of_ray
 from tests.waiting import wait_until
@@ -101,7 +101,7 @@ def given_to(supervisor: Supervisor, task: Any) -> Supervisor:
 def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store: Store) -> None:
     ids = []
     for at_once in (1, 4):
-        ids.append(submission.submit_experiment(store, toy()).id)
+        ids.append(submit_one(store, toy()).id)
         run(Supervisor(store, lambda at_once=at_once: at_once), store, ids[-1])  # type: ignore[misc]
 
     assert [reading.read_experiment(store, each).state for each in ids] == [State.COMPLETED] * 2
@@ -116,7 +116,7 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
             raise ZeroDivisionError(msg)
         yield from task.batches(recorded(setting(claim.spec, claim.number), claim.log, ()))
 
-    experiment = submission.submit_experiment(sqlite_store, toy()).id
+    experiment = submit_one(sqlite_store, toy()).id
 
     run(given_to(Supervisor(sqlite_store, lambda: 4), raising), sqlite_store, experiment)
 
@@ -136,7 +136,7 @@ def test_a_worker_that_hangs_is_ended_with_the_reason_even_if_it_holds_the_inter
             ctypes.PyDLL(None).sleep(3600)  # with Python's lock
         yield from task.delivered(lambda: setting(claim.spec, claim.number), claim, 10.0)
 
-    experiment = submission.submit_experiment(sqlite_store, toy()).id
+    experiment = submit_one(sqlite_store, toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 3, lease_s=3.0, patience=Patience(rollout_s=0.3))
 
     run(given_to(supervisor, hanging), sqlite_store, experiment)
@@ -207,8 +207,8 @@ def test_hardware_stops_when_its_experiment_is_cancelled_or_its_supervisor_stand
     told = tmp_path / "told"
     install(monkeypatch, engines, Bench)
     monkeypatch.setattr(task, "run", moving(told))
-    experiment = submission.submit_experiment(sqlite_store, toy(reality={"engine": "bench"})).id
-    other = submission.submit_experiment(sqlite_store, toy(reality={"engine": "bench"})).id
+    experiment = submit_one(sqlite_store, toy(reality={"engine": "bench"})).id
+    other = submit_one(sqlite_store, toy(reality={"engine": "bench"})).id
     supervisor = Supervisor(sqlite_store, lambda: 3, lease_s=3.0)
 
     run(supervisor, sqlite_store, experiment, until=told.exists)
@@ -223,7 +223,7 @@ def test_hardware_stops_when_its_experiment_is_cancelled_or_its_supervisor_stand
 
 
 def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store: Store) -> None:
-    experiment = submission.submit_experiment(sqlite_store, long_toy()).id
+    experiment = submit_one(sqlite_store, long_toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 2)
     run(
         supervisor,
@@ -252,7 +252,7 @@ def parts_stored(store: Store) -> Any:
 
 @pytest.mark.release
 def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(sqlite_store: Store) -> None:
-    experiment = submission.submit_experiment(sqlite_store, long_steps()).id
+    experiment = submit_one(sqlite_store, long_steps()).id
     supervisor = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05)
     run(supervisor, sqlite_store, experiment, until=lambda: parts_stored(sqlite_store) > 1)
 
@@ -271,7 +271,7 @@ def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
 
 @pytest.mark.release
 def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sqlite_store: Store) -> None:
-    experiment = submission.submit_experiment(sqlite_store, long_steps()).id
+    experiment = submit_one(sqlite_store, long_steps()).id
     first, stop = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05), Event()
     run(first, sqlite_store, experiment, until=lambda: parts_stored(sqlite_store))
     stop.set()
@@ -290,7 +290,7 @@ def checked(store: Store, check: Any, supervisor: Any) -> Any:
 
 
 def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_one_process(store: Store) -> None:
-    experiment = submission.submit_experiment(store, toy())
+    experiment = submit_one(store, toy())
     supervisor = Supervisor(store, lambda: 1)
 
     found = checked(store, experiment.sensitivity, supervisor)
@@ -309,7 +309,7 @@ def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store: Store, monkey
         raise ZeroDivisionError(msg)
 
     monkeypatch.setattr(checking, "check", raising)
-    experiment = submission.submit_experiment(sqlite_store, toy())
+    experiment = submit_one(sqlite_store, toy())
     supervisor = Supervisor(sqlite_store, lambda: 2)
 
     found = checked(sqlite_store, experiment.sensitivity, supervisor)
@@ -333,7 +333,7 @@ def test_a_sensitivity_check_whose_worker_is_killed_runs_again(
         return check(subject(spec), SteadyState(), Effort(spec.points, spec.evaluations))
 
     monkeypatch.setattr(checking, "check", killed_once)
-    check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
+    check_id = submit_one(sqlite_store, toy()).sensitivity
 
     found = checked(sqlite_store, check_id, Supervisor(sqlite_store, lambda: 2))
 
@@ -343,7 +343,7 @@ def test_a_sensitivity_check_whose_worker_is_killed_runs_again(
 
 
 def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_store: Store) -> None:
-    check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
+    check_id = submit_one(sqlite_store, toy()).sensitivity
     first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
     states = [checks.read(sqlite_store, check_id).state]

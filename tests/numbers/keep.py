@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from gaplab import migrations
-from gaplab.services.archives import export_study
+from gaplab.services.archives import export
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
@@ -22,6 +22,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.store.lease import Pulse
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
+from tests.experiments import submit_one
 from tests.numbers.kept_numbers import FOLDER, HALF_WAY, MACHINE, machine
 from tests.numbers.specs import HALF_WAY as HALF_WAY_SPEC
 from tests.numbers.specs import STUDIES
@@ -52,13 +53,13 @@ def new_store(file: Any) -> Any:
 
 def computed(store: Store, spec: Any) -> Any:
     """The archive of a study, computed by the pure loop."""
-    study = submission.submit_study(store, spec).id
+    study = submission.submit(store, spec).id
     while claims := execution.claim(store, OWNER, 100):
         for claim in claims:
             for step in repetition(setting(claim.spec, claim.number)):
                 assert execution.record(store, claim, step)
             assert execution.complete(store, claim)
-    with export_study(store, study).file as file:
+    with export(store, study).file as file:
         data = file.read()
     store.dispose()
     return data
@@ -66,7 +67,7 @@ def computed(store: Store, spec: Any) -> Any:
 
 def interrupt(store: Store) -> None:
     """Leave `HALF_WAY_SPEC` as a supervisor leaves it that is killed in the middle of a step."""
-    submission.submit_experiment(store, HALF_WAY_SPEC)
+    submit_one(store, HALF_WAY_SPEC)
     claim, *_ = execution.claim(store, OWNER, 2)
     delivered, steps, checkpoints = recorded(setting(claim.spec, claim.number), (), (), 0.02), 0, 0
     for item in delivered:

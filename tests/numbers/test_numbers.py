@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.archives import export_study, import_archive
+from gaplab.services.archives import export, import_archive
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed, Selected, Transferred, Tuned
 from gaplab.services.experiments import reading
 from gaplab.services.results import curves
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.specs.resolution import resolve
 from gaplab.services.store.session import Store
 from tests.numbers.kept_numbers import (
     FOLDER,
@@ -124,7 +124,7 @@ def computed_from(specs: Any) -> Any:
 def test_explicit_old_options_give_the_kept_numbers(name: Any) -> None:
     kept = numbers(members(archive(name)))
 
-    computed = computed_from(resolve_study(STUDIES[name]))
+    computed = computed_from(resolve(STUDIES[name]))
 
     if computed != kept and (other := other_machine()):
         pytest.skip(f"the numbers differ, and so does the machine: {other}")
@@ -134,13 +134,13 @@ def test_explicit_old_options_give_the_kept_numbers(name: Any) -> None:
 def test_every_kept_spec_has_the_options_of_its_study() -> None:
     for name, study in STUDIES.items():
         stored = [ResolvedSpec.model_validate(each["spec"]) for each in members(archive(name))["experiment"]]
-        for old, new in zip(stored, resolve_study(study), strict=True):
+        for old, new in zip(stored, resolve(study), strict=True):
             assert old.budget == new.budget
             assert old.strategy == new.strategy
 
 
 def test_a_search_of_its_own_gives_simulated_fit_other_numbers() -> None:
-    (fit, *_) = resolve_study(STUDIES["analytic"])
+    (fit, *_) = resolve(STUDIES["analytic"])
     (kept, *_) = numbers(members(archive("analytic")))
     budget = fit.budget.model_copy(update={"reuse_transfer": False})
 
@@ -164,7 +164,7 @@ def test_an_import_shows_and_exports_the_kept_numbers(kept: Any, store: Store) -
     assert imported.experiments == tuple(each["id"] for each in found["experiment"])
     assert not imported.called_off
     assert_shown(store, found)
-    with export_study(store, imported.study).file as file:
+    with export(store, imported.study).file as file:
         assert_exported(members(file.read()), found)
 
 

@@ -12,12 +12,13 @@ import pytest
 from gaplab import migrations
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.archives import export_experiment
-from gaplab.services.experiments import listing, reading, submission
+from gaplab.services.archives import export
+from gaplab.services.experiments import reading
 from gaplab.services.running import execution
 from gaplab.services.store.models import CheckpointRow
 from gaplab.services.store.session import Store
 from gaplab.workers.supervisor import Supervisor
+from tests.experiments import listed, submit_one
 from tests.numbers.keep import CHECKPOINTS
 from tests.numbers.kept_numbers import HALF_WAY, archive, members, numbers, other_machine
 from tests.processes import processes_of_ray
@@ -28,10 +29,7 @@ pytestmark = pytest.mark.usefixtures("ray")
 
 def submit(store: Store, found: Any) -> Any:
     """Submit the kept specs; the ids of their experiments."""
-    return [
-        submission.submit_experiment(store, ResolvedSpec.model_validate(each["spec"])).id
-        for each in found["experiment"]
-    ]
+    return [submit_one(store, ResolvedSpec.model_validate(each["spec"])).id for each in found["experiment"]]
 
 
 def run(supervisor: Any, store: Store, ids: Any, until: Any = lambda: False) -> None:
@@ -44,7 +42,7 @@ def stored(store: Store, ids: Any) -> Any:
     """The numbers of these experiments, by way of an archive."""
     found = []
     for each in ids:
-        with export_experiment(store, each).file as file:
+        with export(store, each).file as file:
             found += numbers(members(file.read()))
     return found
 
@@ -107,7 +105,7 @@ def test_a_database_of_a_killed_supervisor_ends_with_the_kept_numbers(tmp_path: 
     connection.close()
     migrations.upgrade(f"sqlite:///{file}")
     store = Store(f"sqlite:///{file}")
-    ids = [each.id for each in listing.list_experiments(store).items]
+    ids = [each.id for each in listed(store)]
     execution.requeue_lost(store, stale_after_s=-1)
 
     run(Supervisor(store, lambda: 2), store, ids)

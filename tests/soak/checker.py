@@ -10,7 +10,7 @@ from typing import Any
 from gaplab.schemas.lifecycle import MOVES, State
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import resolve
 from tests.soak.bench_checker import measurements
 from tests.soak.drive_checker import drives, held
 from tests.soak.evidence import on_a_bench, undisturbed
@@ -45,7 +45,6 @@ def violations(history: Any, evidence: Any, expected: Any = undisturbed) -> Any:
 def submissions(history: Any, evidence: Any) -> Iterator[Any]:
     """Each acknowledged one is there exactly once, each other at most once, and nothing else is."""
     names = Counter(evidence.studies.values())
-    names.update(each.name for each in evidence.experiments if each.study is None)
     asked = {record.body["name"]: record for record in history if record.verb == "submit"}
     found = {each.id: each for each in evidence.experiments}
     for name, record in asked.items():
@@ -67,12 +66,10 @@ def _extensions(history: Any) -> Any:
 
 def _as_submitted(record: Any, found: Any, studies: Any, extended: Any) -> Iterator[Any]:
     name, answer = record.body["name"], record.answer
-    if record.path == "/studies":
-        wanted, ids = resolve_study(StudySpec.model_validate(record.body)), [one["id"] for one in answer["experiments"]]
-        if answer["id"] not in studies:
-            yield f"{name}: the study {answer['id']} that was acknowledged is not there"
-    else:
-        wanted, ids = (resolve_experiment(ExperimentSpec.model_validate(record.body)),), [answer["id"]]
+    kind = StudySpec if record.path == "/studies" else ExperimentSpec
+    wanted, ids = resolve(kind.model_validate(record.body)), [one["id"] for one in answer.get("experiments", [answer])]
+    if answer["id"] not in studies:
+        yield f"{name}: the study {answer['id']} that was acknowledged is not there"
     if len(ids) != len(wanted):
         yield f"{name}: {len(ids)} experiments instead of {len(wanted)}"
     for each, spec in zip(ids, wanted, strict=False):

@@ -80,7 +80,7 @@ class Clients:
     def start(self) -> None:
         """Find out what the service can do, and begin."""
         paths = self._http.get("/openapi.json").json()["paths"]
-        self._verbs = [verb for verb in VERBS if f"/experiments/{{id}}/{verb}" in paths]
+        self._verbs = [verb for verb in VERBS if f"/studies/{{id}}/{verb}" in paths]
         for thread in self._threads:
             thread.start()
 
@@ -115,16 +115,17 @@ class Clients:
         self._operators[0].work()
         for state in {str(each) for each in State} & {"PAUSING", "PAUSED"}:
             for paused in self._in(state):
-                self._ask("resume", "POST", f"/experiments/{paused}/resume")
+                self._ask("resume", "POST", f"/studies/{paused}/resume")
 
     def under_way(self) -> Any:
         """Experiments that have not ended."""
         return [each for state in State if not state.ended for each in self._in(state)]
 
     def _in(self, state: Any) -> Any:
-        answer = self._http.get("/experiments", params={"limit": 500, "state": str(state)})
+        answer = self._http.get("/studies", params={"limit": 500, "q": f"experiment_state = {state}"})
         answer.raise_for_status()
-        return [each["id"] for each in answer.json()["items"]]
+        found = [each for study in answer.json()["items"] for each in study["experiments"]]
+        return [each["id"] for each in found if each["state"] == state]
 
     def _use(self, name: Any, rng: Any) -> None:
         wanted = specs(rng)
@@ -160,7 +161,7 @@ class Clients:
         one, spec = rng.choice(self._known if verb == "extend" else self._known[-OPEN:])
         what = rng.choice(("iterations", "repetitions"))
         body = {what: spec[what] + 1} if verb == "extend" else None
-        self._ask(verb, "POST", f"/experiments/{one}/{verb}", body)
+        self._ask(verb, "POST", f"/studies/{one}/{verb}", body)
 
     def _submit(self, path: Any, spec: Any) -> None:
         record = self._ask("submit", "POST", path, spec)

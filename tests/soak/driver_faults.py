@@ -33,7 +33,7 @@ class Driven:
     """`gaplab drive` for one experiment, with a token and a network of its own."""
 
     def __init__(self, stage: Any, experiment: str, robot: str) -> None:
-        self.path, self.token, self.network = f"/experiments/{experiment}", stage.new_token(), Proxy(stage.port)
+        self.path, self.token, self.network = f"/studies/{experiment}", stage.new_token(), Proxy(stage.port)
         journal = stage.journal.with_name(f"{experiment}.journal")
         command = [sys.executable, "-m", "gaplab", "drive", experiment, "--driver", driver.__file__]
         command += ["--journal", str(journal), "--lease-s", str(LEASE_S)]

@@ -36,7 +36,7 @@ class Record:
 
     @property
     def id(self) -> Any:
-        """Of what a verb is about: the second part of /experiments/ID/cancel."""
+        """Of what a verb is about: the second part of /studies/ID/cancel."""
         return self.path.split("/")[2]
 
 

@@ -13,7 +13,7 @@ from tests.integration.test_archives_bad import packed
 from tests.soak.bench_faults import WAIT_S
 from tests.soak.stage import until
 
-LISTS = ("/requests?limit=500&pending=false", "/experiments?limit=500", "/studies?limit=500")
+LISTS = ("/requests?limit=500&pending=false", "/studies?limit=500")
 
 DEEP = json.loads("[" * 900 + "]" * 900)
 
@@ -63,7 +63,7 @@ def _exported(stage: Any) -> Any:
     try:
         requests = stage.http.get(LISTS[0]).json()["items"]
         (experiment, *_) = [each["experiment"] for each in requests if each["answers"]]
-        archive = stage.http.get(f"/experiments/{experiment}/export").content
+        archive = stage.http.get(f"/studies/{experiment}/export").content
         with zipfile.ZipFile(BytesIO(archive)) as opened:
             members = {name: opened.read(name) for name in opened.namelist()}
         return [members] if members["answer.jsonl"] else []

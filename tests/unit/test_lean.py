@@ -14,9 +14,9 @@ from gaplab.services.core.strategies.base import Diverse
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuners.search import SearchOptions, SearchTuner
 from gaplab.services.specs.presets import PRESETS
-from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts
-from gaplab.services.specs.shortening import experiment_spec
+from gaplab.services.specs.shortening import shortest
 from tests.fakes import flat, small_setting
 from tests.parameters import few
 
@@ -89,7 +89,7 @@ class TestPreset:
     def test_a_resolved_spec_resolves_to_itself_and_a_short_one_to_the_same(self) -> None:
         for strategy in ("simulated_fit", *DIVERSE):
             spec = resolved(budget="lean", strategy=strategy)
-            short = experiment_spec(spec.model_dump(mode="json")).spec
+            short = shortest(spec.name, [spec.model_dump(mode="json")]).spec
 
             assert resolve_experiment(spec) == spec
             assert short == {"strategy": strategy, "robot": "toy_function", "engine": "analytic", "budget": "lean"}
@@ -97,7 +97,7 @@ class TestPreset:
 
     def test_the_parts_alone_round_trip(self) -> None:
         spec = resolved(controller_optimizer="cma_es", tuner={"name": "search", "options": {"warm_start": True}})
-        short = experiment_spec(spec.model_dump(mode="json")).spec
+        short = shortest(spec.name, [spec.model_dump(mode="json")]).spec
 
         assert short is not None
         assert short["controller_optimizer"] == "cma_es"
@@ -108,7 +108,7 @@ class TestPreset:
         lean, paper = (
             sum(
                 expected_rollouts(each) * each.repetitions
-                for each in resolve_study(StudySpec.model_validate({"budget": budget, "direct_repetitions": 100}))
+                for each in resolve(StudySpec.model_validate({"budget": budget, "direct_repetitions": 100}))
             )
             for budget in ("lean", "paper")
         )

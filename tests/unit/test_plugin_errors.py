@@ -9,7 +9,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.random import Random
-from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts
 from tests.experiments import toy
 from tests.fakes import CAREFUL, install
@@ -112,7 +112,7 @@ def test_a_study_tells_it_once(put: Put) -> None:
     spec = StudySpec.model_validate({"robot": "hopper", "controller": "pair", "budget": "smoke"})
 
     with pytest.raises(InvalidSpec) as raised:
-        resolve_study(spec)
+        resolve(spec)
 
     assert len(raised.value.violations) == 1
 

@@ -15,7 +15,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
 from gaplab.services.specs.presets import PRESETS
-from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts
 
 EMBODIED = [name for name, engine in engines.items() if engine.runs(Quadruped().world)]
@@ -61,9 +61,7 @@ def test_every_strategy_has_equal_searches_unless_asked_otherwise() -> None:
 
 
 def test_as_published_has_the_papers_numbers_and_its_plain_formulas() -> None:
-    published = {
-        each.strategy.name: each for each in resolve_study(StudySpec.model_validate({"budget": "as_published"}))
-    }
+    published = {each.strategy.name: each for each in resolve(StudySpec.model_validate({"budget": "as_published"}))}
 
     paper = resolve_experiment(experiment())
     assert {each.budget.selection_evaluations for each in published.values()} == {10_000}
@@ -125,7 +123,7 @@ def test_any_number_of_a_budget_can_be_given_instead(preset: Any) -> None:
 
 
 def test_the_papers_whole_figure_4_is_220_million_rollouts() -> None:
-    strategies = [each for each in resolve_study(StudySpec()) if each.strategy.name != "direct"]
+    strategies = [each for each in resolve(StudySpec()) if each.strategy.name != "direct"]
 
     total = sum(expected_rollouts(each) * each.repetitions for each in strategies)
 
@@ -139,7 +137,7 @@ def test_the_toy_runs_on_its_own_engine_if_none_is_named() -> None:
 
 
 def test_the_baseline_of_a_study_may_have_more_repetitions() -> None:
-    *_, direct = resolve_study(StudySpec(repetitions=4, direct_repetitions=10))
+    *_, direct = resolve(StudySpec(repetitions=4, direct_repetitions=10))
 
     assert (direct.strategy.name, direct.repetitions) == ("direct", 10)
 
@@ -218,7 +216,7 @@ def test_what_is_wrong_with_a_study_points_into_the_study() -> None:
     spec = StudySpec.model_validate({"strategies": ["random", "nonsense"], "engine": "analytic"})
 
     with pytest.raises(InvalidSpec) as refusal:
-        resolve_study(spec)
+        resolve(spec)
 
     assert {each.pointer for each in refusal.value.violations} == {"/strategies/1", "/engine"}
 

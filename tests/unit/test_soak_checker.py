@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import resolve, resolve_experiment
 from tests.soak.bench_checker import measurements
 from tests.soak.checker import ends, epochs, results, violations
 from tests.soak.drive_checker import drives, held
@@ -46,8 +46,8 @@ STORED = move(2, "RUNNING", "RUNNING", steps=(0, 4), at=4.0)
 ENDED = move(3, "RUNNING", "COMPLETED", steps=(4, 4), at=5.0)
 SUBMITTED = Record("submit", "/experiments", BODY, 1.0, 2.0, 202, {"id": "e1"})
 DONE = Repetition(1, 0, "COMPLETED", 1, 4, 1, LOG, (0, 1, 2, 3))
-EXPERIMENT = Experiment("e1", None, "one", "COMPLETED", SPEC, (DONE,))
-EVIDENCE = Evidence((EXPERIMENT,), {}, {"c1": "COMPLETED"}, (CLAIMED, STORED, ENDED))
+EXPERIMENT = Experiment("e1", "e1", "one", "COMPLETED", SPEC, (DONE,))
+EVIDENCE = Evidence((EXPERIMENT,), {"e1": "one"}, {"c1": "COMPLETED"}, (CLAIMED, STORED, ENDED))
 
 
 def found(history: Any = (SUBMITTED,), evidence: Any = EVIDENCE) -> Any:
@@ -59,7 +59,7 @@ def with_repetition(**changes: Any) -> Any:
 
 
 def verb(name: Any, status: Any = 200, sent_at: Any = 6.0) -> Any:
-    return Record(name, f"/experiments/e1/{name}", None, sent_at, sent_at + 0.5, status)
+    return Record(name, f"/studies/e1/{name}", None, sent_at, sent_at + 0.5, status)
 
 
 def test_a_service_that_kept_its_word_has_no_violations() -> None:
@@ -67,7 +67,7 @@ def test_a_service_that_kept_its_word_has_no_violations() -> None:
 
 
 def test_a_study_that_is_there_as_it_was_submitted_is_none() -> None:
-    (resolved,) = resolve_study(StudySpec.model_validate(STUDY))
+    (resolved,) = resolve(StudySpec.model_validate(STUDY))
     answer = {"id": "s1", "experiments": [{"id": "e1"}]}
     submitted = Record("submit", "/studies", STUDY, 1.0, 2.0, 202, answer)
     own = replace(EXPERIMENT, study="s1", name="random", spec=resolved.model_dump(mode="json"))
@@ -112,7 +112,7 @@ def replace_steps(move: Any, was: Any, steps: Any) -> Any:
 
 BROKEN = {
     "lost": ("there 0 times", [SUBMITTED], Evidence()),
-    "twice": ("there 2 times", [SUBMITTED], replace(EVIDENCE, experiments=(EXPERIMENT, replace(EXPERIMENT, id="e2")))),
+    "twice": ("there 2 times", [SUBMITTED], replace(EVIDENCE, studies={"e1": "one", "e2": "one"})),
     "with another id": ("is not there", [SUBMITTED], replace(EVIDENCE, experiments=(replace(EXPERIMENT, id="e2"),))),
     "with another spec": (
         "another spec",

@@ -25,7 +25,7 @@ from gaplab.services.engines.analytic import Analytic
 from gaplab.services.plugins.external import named_in
 from gaplab.services.specs import resolution
 from gaplab.services.specs.assembly import edits_of
-from gaplab.services.specs.resolution import resolve_experiment, resolve_sensitivity, resolve_study
+from gaplab.services.specs.resolution import resolve, resolve_experiment, resolve_sensitivity
 from gaplab.services.specs.simulation import Simulation
 
 WORLD = Quadruped().world
@@ -390,8 +390,8 @@ def test_a_robot_has_its_usual_tunables_where_a_spec_names_none(monkeypatch: pyt
     assert names(resolved().tunables) == usual
     assert names(resolved(tunables=given).tunables) == given
     study = {"strategies": ["random"], "engine": "mujoco"}
-    assert names(resolve_study(StudySpec.model_validate(study))[0].tunables) == usual
-    assert names(resolve_study(StudySpec.model_validate({**study, "tunables": given}))[0].tunables) == given
+    assert names(resolve(StudySpec.model_validate(study))[0].tunables) == usual
+    assert names(resolve(StudySpec.model_validate({**study, "tunables": given}))[0].tunables) == given
     assert names(resolve_sensitivity(SensitivitySpec.model_validate({"engine": "mujoco"})).tunables) == usual
 
 

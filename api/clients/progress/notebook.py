@@ -8,7 +8,6 @@ from typing import Any
 
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
 from gaplab.api.clients.progress.text import fraction, state_text, time_left
-from gaplab.api.clients.records import Record
 from gaplab.schemas.records import StudyRead
 
 
@@ -17,8 +16,8 @@ def in_notebook() -> bool:
     return "IPython" in sys.modules and hasattr(sys.modules["IPython"].get_ipython(), "kernel")
 
 
-def show(snapshots: Iterable[Snapshot]) -> Record:
-    """Show snapshots in the output of the cell; return the last record."""
+def show(snapshots: Iterable[Snapshot]) -> StudyRead:
+    """Show snapshots in the output of the cell; return the last study."""
     ipython: Any = import_module("IPython.display")
     handle = None
     for snapshot in snapshots:
@@ -27,7 +26,7 @@ def show(snapshots: Iterable[Snapshot]) -> Record:
             handle = ipython.display(html, display_id=True)
         else:
             handle.update(html)
-    return snapshot.record
+    return snapshot.study
 
 
 def table(snapshot: Snapshot) -> str:

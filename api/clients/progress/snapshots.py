@@ -1,11 +1,13 @@
-"""The progress of a study or an experiment, request by request until it ends."""
+"""The progress of a study, request by request until it ends."""
 
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from gaplab.api.clients.connection import Of
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
-from gaplab.api.clients.records import Record, Records, experiments_of
+from gaplab.api.clients.progress.text import Record
+from gaplab.api.clients.records import Records
 from gaplab.api.clients.results import Results
 from gaplab.schemas.curves import Curve
 from gaplab.schemas.records import ExperimentRead, RepetitionRead, StudyRead
@@ -37,17 +39,14 @@ class Snapshot:
     """The progress at one moment.
 
     Attributes:
-        rows: a study and each of its experiments, or one experiment.
+        study: the study.
+        rows: the study and each of its experiments; or the only one.
         away_s: time since the last answer, if the service did not answer; the rows are those of that answer.
     """
 
+    study: StudyRead
     rows: tuple[RecordProgress, ...]
     away_s: float = 0.0
-
-    @property
-    def record(self) -> Record:
-        """The study or the experiment that was asked for."""
-        return self.rows[0].record
 
     @property
     def warning(self) -> str | None:
@@ -56,7 +55,7 @@ class Snapshot:
 
 
 class Snapshots:
-    """Snapshots of a study or an experiment; without `results`, they have no curves and repetitions."""
+    """Snapshots of a study; without `results`, they have no curves and repetitions."""
 
     def __init__(self, records: Records, results: Results | None = None) -> None:
         self._records = records
@@ -64,17 +63,15 @@ class Snapshots:
         self._details: dict[str, tuple[Curve, tuple[RepetitionRead, ...]]] = {}
         self._settled: set[str] = set()
 
-    def of(self, id: str, *, every_s: float, patience_s: float) -> Iterator[Snapshot]:
-        """Yield snapshots until the study or the experiment has ended; see `Watcher.watch`."""
-        snapshot = self._snapshot(self._records.find(id))
+    def of(self, of: Of, *, every_s: float, patience_s: float) -> Iterator[Snapshot]:
+        """Yield snapshots until the study has ended; see `Watcher.watch`."""
+        snapshot = self._snapshot(self._records.study(of))
         yield snapshot
         answered_at = time.monotonic()
-        while not snapshot.record.state.ended:
+        while not snapshot.study.state.ended:
             time.sleep(every_s)
             try:
-                record = snapshot.record
-                read = self._records.study if isinstance(record, StudyRead) else self._records.experiment
-                snapshot = self._snapshot(read(record.id))
+                snapshot = self._snapshot(self._records.study(of))
             except (ServiceError, ServiceUnreachable) as error:
                 away_s = time.monotonic() - answered_at
                 if is_final(error) or away_s > patience_s:
@@ -84,17 +81,16 @@ class Snapshots:
             if not snapshot.away_s:
                 answered_at = time.monotonic()
 
-    def _snapshot(self, record: Record) -> Snapshot:
-        experiments = experiments_of(record)
+    def _snapshot(self, study: StudyRead) -> Snapshot:
         if self._results:
-            self._read_details(experiments, self._results)
-        rows = [RecordProgress(each, *self._details.get(each.id, ())) for each in experiments]
-        if isinstance(record, StudyRead):
-            rows.insert(0, RecordProgress(record))
-        return Snapshot(tuple(rows))
+            self._read_details(study.experiments, self._results)
+        rows = [RecordProgress(each, *self._details.get(each.id, ())) for each in study.experiments]
+        if len(rows) > 1:
+            rows.insert(0, RecordProgress(study))
+        return Snapshot(study, tuple(rows))
 
     def _read_details(self, experiments: Sequence[ExperimentRead], results: Results) -> None:
         moving = [experiment.id for experiment in experiments if experiment.id not in self._settled]
-        for curve in results.curves_of(moving) if moving else ():
+        for curve in results.curves(moving) if moving else ():
             self._details[curve.experiment] = (curve, self._records.repetitions(curve.experiment))
         self._settled = {experiment.id for experiment in experiments if experiment.state.ended}

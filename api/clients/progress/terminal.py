@@ -11,7 +11,6 @@ from rich.table import Table
 
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
 from gaplab.api.clients.progress.text import COLORS, counts, fraction, left, percent, standing
-from gaplab.api.clients.records import Record
 from gaplab.schemas.curves import Curve, from_before
 from gaplab.schemas.records import StudyRead
 
@@ -20,12 +19,12 @@ MOST_REPETITIONS = 60
 """Repetitions of an experiment that have a block; the others are counted."""
 
 
-def show(snapshots: Iterable[Snapshot], console: Console, *, keep: bool = False) -> Record:
-    """Show each snapshot in place of the one before, and perhaps keep the last on the screen; return its record."""
+def show(snapshots: Iterable[Snapshot], console: Console, *, keep: bool = False) -> StudyRead:
+    """Show each snapshot in place of the one before, and perhaps keep the last on the screen; return its study."""
     with Live(console=console, auto_refresh=False, transient=not keep) as live:
         for snapshot in snapshots:
             live.update(view(snapshot), refresh=True)
-    return snapshot.record
+    return snapshot.study
 
 
 def view(snapshot: Snapshot) -> RenderableType:
@@ -46,7 +45,7 @@ def view(snapshot: Snapshot) -> RenderableType:
             left(record),
             *((_curve(row.curve, scale), _repetitions(row)) if curves else bar),
         )
-    lines: list[RenderableType] = [table, counts(snapshot.record.progress)]
+    lines: list[RenderableType] = [table, counts(snapshot.study.progress)]
     return Group(*lines, *([f"[yellow]{snapshot.warning}[/]"] if snapshot.warning else []))
 
 

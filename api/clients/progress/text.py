@@ -3,15 +3,17 @@
 import math
 import re
 from collections.abc import Iterable
+from typing import TypeAlias
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.markup import escape
 from rich.segment import Segment
 
-from gaplab.api.clients.records import Record
 from gaplab.schemas.curves import from_before
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import Progress, StudyRead, TimeLeft
+from gaplab.schemas.records import ExperimentRead, Progress, StudyRead, TimeLeft
+
+Record: TypeAlias = StudyRead | ExperimentRead
 
 COLORS = {
     State.QUEUED: "dim",

@@ -281,11 +281,7 @@ declare namespace Api {
   interface ExperimentRead {
     id: string;
     name: string;
-    notes: string | null;
-    tags: Array<string>;
-    edits: number;
-    archived_at: string | null;
-    study: string | null;
+    study: string;
     strategy: string;
     direct: boolean;
     level: boolean;
@@ -364,7 +360,7 @@ declare namespace Api {
     why: string;
   }
   interface ImportRead {
-    study: string | null;
+    study: string;
     experiments: Array<string>;
     renamed: Record<string, string>;
     called_off: Array<string>;
@@ -416,10 +412,6 @@ declare namespace Api {
   }
   interface NotesRead {
     html: string;
-  }
-  interface Page_ExperimentRead_ {
-    items: Array<ExperimentRead>;
-    next: string | null;
   }
   interface Page_RequestRead_ {
     items: Array<RequestRead>;
@@ -893,16 +885,14 @@ declare namespace Api {
     rules: Array<string>;
   }
   interface ViewRead {
-    shows: "all" | "studies" | "experiments";
     query: string | null;
-    sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+    sort: "created_at" | "-created_at" | "name" | "-name";
     name: string;
     created_at: string;
   }
   interface ViewSpec {
-    shows: "all" | "studies" | "experiments";
     query: string | null;
-    sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+    sort: "created_at" | "-created_at" | "name" | "-name";
   }
   interface VoidSpec {
     reason: string;

@@ -15,10 +15,14 @@ from gaplab.services.store.models.work import LeasedRow
 
 
 class StudyRow(Base):
-    """Experiments that belong together to be compared.
+    """Experiments that belong together to be compared; one alone has the id of its study.
 
     Attributes:
-        notes, tags, edits, archived_at, webhook: as in `ExperimentRow`.
+        notes: Markdown by people.
+        tags: tags with a space before and after each, as `gaplab.services.store.texts` packs them; NULL for none.
+        edits: number of changes of its name, notes or tags, and of names of its experiments.
+        archived_at: time since which lists leave it out; NULL if they do not.
+        webhook: address that is told of its end; NULL for none.
     """
 
     __tablename__ = "study"
@@ -53,26 +57,18 @@ class ExperimentRow(Base):
         hardware: name of the hardware that is its reality; NULL if reality is only computed.
         sensitivity_id: id of its sensitivity check.
         token_id: id of the token that submitted it; NULL without a token.
-        notes: Markdown by people.
-        tags: tags with a space before and after each, as `gaplab.services.store.texts` packs them; NULL for none.
-        edits: number of changes of its name, notes or tags.
-        archived_at: time since which lists leave it out; NULL if they do not.
-        webhook: address that is told of its end; NULL for none.
     """
 
     __tablename__ = "experiment"
     __table_args__ = (
         Index(None, "created_at", "position", "id"),
         Index("ix_experiment_turn", "claimable", "precedence", "running", "turn_at", "position", "id"),
-        Index(None, "name", "id"),
-        Index(None, "strategy", "id"),
         Index(None, "state", "id"),
-        Index(None, "state", "created_at", "position", "id"),
-        Index(None, "strategy", "created_at", "position", "id"),
+        Index(None, "study_id", "state"),
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
-    study_id: Mapped[str | None] = mapped_column(ForeignKey("study.id"), index=True)
+    study_id: Mapped[str] = mapped_column(ForeignKey("study.id"))
     position: Mapped[int]
     name: Mapped[str] = mapped_column(String(200))
     strategy: Mapped[str] = mapped_column(String(100))
@@ -92,11 +88,6 @@ class ExperimentRow(Base):
     hardware: Mapped[str | None] = mapped_column(String(32), index=True)
     sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
     token_id: Mapped[str | None] = mapped_column(String(32))
-    notes: Mapped[str | None] = mapped_column(Text)
-    tags: Mapped[str | None] = mapped_column(Text)
-    edits: Mapped[int] = mapped_column(default=0, server_default="0")
-    archived_at: Mapped[datetime | None]
-    webhook: Mapped[str | None] = mapped_column(Text)
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
@@ -159,7 +150,7 @@ class DeletionRow(Base):
 
     Attributes:
         id: its id, which nothing else has unless its archive is imported again; then this row is removed.
-        study_id: study of a deleted experiment; NULL for a study, or an experiment without one.
+        study_id: study of a deleted experiment; NULL for a study that had several.
         token_id: id of the token that deleted it; NULL without a token.
     """
 

@@ -93,7 +93,7 @@ class NotificationRow(Base):
 
     Attributes:
         event: number of the event that is the end.
-        subject_id: id of the study or the experiment that has ended.
+        subject_id: id of the study that has ended.
         channel: a `Channel`.
         experiment_id: experiment of the event.
         message: what is sent, but for the address of the page.
@@ -137,7 +137,6 @@ class ViewRow(Base):
     """A saved view: a query with a name, which all callers share.
 
     Attributes:
-        shows: `all`, `studies` or `experiments`.
         query: query of the list; NULL for all.
         sort: order of the list.
     """
@@ -145,7 +144,6 @@ class ViewRow(Base):
     __tablename__ = "view"
 
     name: Mapped[str] = mapped_column(String(60), primary_key=True)
-    shows: Mapped[str] = mapped_column(String(16))
     query: Mapped[str | None] = mapped_column(Text)
     sort: Mapped[str] = mapped_column(String(20))
     created_at: Mapped[datetime]

@@ -52,11 +52,12 @@ def read_rows(session: Session, name: str, columns: Iterable[str], owners: Seque
             yield {key: value.value if isinstance(value, Enum) else value for key, value in row.items()}
 
 
-def taken_ids(session: Session, model: type[StudyRow | ExperimentRow], ids: Iterable[str]) -> set[str]:
-    """Return the ids that exist already; a concurrent import waits here until this transaction ends."""
+def taken_ids(session: Session, ids: set[str]) -> set[str]:
+    """Return the ids that a study or an experiment has already; a concurrent import waits here for this one's end."""
     if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write ever overlap
         session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
-    return set(session.scalars(select(model.id).where(model.id.in_(list(ids)))))
+    queries = (select(row.id).where(row.id.in_(ids)) for row in (StudyRow, ExperimentRow))
+    return {each for query in queries for each in session.scalars(query)}
 
 
 def forget_deletions(session: Session, ids: Iterable[str]) -> None:

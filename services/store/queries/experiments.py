@@ -1,26 +1,22 @@
 """Inserts, look-ups and locks of experiments and studies."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from secrets import choice
-from typing import Literal, TypeVar
 
-from sqlalchemy import event, insert, select
+from sqlalchemy import event, insert, or_, select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
 from gaplab.schemas.spec import Schedule
-from gaplab.services.core.errors import NotFound, StoreUnavailable
+from gaplab.services.core.errors import Conflict, NotFound, StoreUnavailable
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import DeletionRow, ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
-
-R = TypeVar("R", ExperimentRow, StudyRow)
-
-Noun = Literal["experiment", "study"]
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
@@ -32,10 +28,40 @@ class Extent:
     Attributes:
         iterations: number of iterations, number 0 included.
         rollouts: expected number of rollouts.
+        hardware: name of the hardware that it needs; None for none.
     """
 
     iterations: int
     rollouts: int
+    hardware: str | None = None
+
+
+@dataclass(frozen=True)
+class Members:
+    """What an id means: all experiments of a study, or one of them alone.
+
+    Attributes:
+        study: their study.
+        experiments: in the order of the study.
+        one: the experiment that alone is meant; None if these are all of the study.
+    """
+
+    study: StudyRow
+    experiments: tuple[ExperimentRow, ...]
+    one: ExperimentRow | None = None
+
+    @property
+    def named(self) -> StudyRow | ExperimentRow:
+        """The study, or the one experiment: it has the id and the name."""
+        return self.one or self.study
+
+    @property
+    def ids(self) -> list[str]:
+        """The ids of the experiments."""
+        return [each.id for each in self.experiments]
+
+    def __str__(self) -> str:
+        return f"{'study' if self.one is None else 'experiment'} {self.named.id!r}"
 
 
 def new_id() -> str:
@@ -47,43 +73,40 @@ def new_id() -> str:
     return "".join(choice(_LETTERS) for _ in range(10))
 
 
-def insert_study(session: Session, name: str) -> StudyRow:
-    """Add a study without experiments."""
+def insert_study(
+    session: Session, name: str, specs: Sequence[tuple[ResolvedSpec, Extent]], token: str | None = None
+) -> Members:
+    """Add a study with its experiments, whose repetitions are all QUEUED; one alone has the id of its study.
+
+    `token` is the id of the token that submitted it.
+    """
     study = StudyRow(id=new_id(), name=storable(name), created_at=moment(session))
     session.add(study)
     session.flush()
-    return study
-
-
-def insert_experiment(
-    session: Session,
-    spec: ResolvedSpec,
-    extent: Extent,
-    *,
-    study: StudyRow | None = None,
-    position: int = 0,
-    token: str | None = None,
-) -> ExperimentRow:
-    """Add an experiment with its repetitions, all QUEUED; `token` is the id of the token that submitted it."""
-    experiment = ExperimentRow(
-        id=new_id(),
-        study_id=study.id if study else None,
-        position=position,
-        name=storable(spec.name),
-        strategy=spec.strategy.name,
-        spec=spec.model_dump(mode="json", exclude=set(Schedule.model_fields)),
-        iterations=extent.iterations,
-        rollouts=extent.rollouts,
-        precedence=-spec.priority,
-        max_parallel=spec.max_parallel,
-        token_id=token,
-        created_at=study.created_at if study else moment(session),
-    )
-    session.add(experiment)
+    rows = [
+        ExperimentRow(
+            id=study.id if len(specs) == 1 else new_id(),
+            study_id=study.id,
+            position=position,
+            name=storable(spec.name),
+            strategy=spec.strategy.name,
+            spec=spec.model_dump(mode="json", exclude=set(Schedule.model_fields)),
+            iterations=extent.iterations,
+            rollouts=extent.rollouts,
+            precedence=-spec.priority,
+            max_parallel=spec.max_parallel,
+            hardware=extent.hardware,
+            token_id=token,
+            created_at=study.created_at,
+        )
+        for position, (spec, extent) in enumerate(specs)
+    ]
+    session.add_all(rows)
     session.flush()
-    insert_repetitions(session, experiment.id, range(spec.repetitions))
-    note(session, EventKind.SUBMITTED, experiment.id, name=experiment.name, repetitions=spec.repetitions)
-    return experiment
+    for row, (spec, _) in zip(rows, specs, strict=True):
+        insert_repetitions(session, row.id, range(spec.repetitions))
+        note(session, EventKind.SUBMITTED, row.id, name=row.name, repetitions=spec.repetitions)
+    return Members(study, tuple(rows))
 
 
 def insert_repetitions(session: Session, experiment_id: str, numbers: range) -> None:
@@ -99,40 +122,72 @@ def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
     Raises:
         NotFound: there is none.
     """
-    return _get(session, ExperimentRow, "experiment", experiment_id)
+    if (found := session.get(ExperimentRow, storable(experiment_id))) is not None:
+        return found
+    names = [f"{row.id} ({row.name})" for row in members(session, experiment_id).experiments]
+    raise NotFound(f"{experiment_id!r} is a study, and this needs an experiment: {', '.join(names)}")
+
+
+def members(session: Session, id_: str) -> Members:
+    """Return what an id means: the experiments of a study, or one of them; the only one stands for its study.
+
+    Raises:
+        NotFound: there is neither.
+    """
+    one, study = None, session.get(StudyRow, storable(id_))
+    if study is None:
+        if (one := session.get(ExperimentRow, storable(id_))) is None:
+            raise NotFound(_missing(session, id_))
+        study = session.get_one(StudyRow, one.study_id)
+    (found,) = of_studies(session, [study])
+    return found if one is None or len(found.experiments) == 1 else Members(study, (one,), one)
+
+
+def of_studies(session: Session, studies: Sequence[StudyRow]) -> list[Members]:
+    """Return studies with their experiments."""
+    by_study: dict[str, list[ExperimentRow]] = defaultdict(list)
+    for row in experiments_of(session, [study.id for study in studies]):
+        by_study[row.study_id].append(row)
+    return [Members(study, tuple(by_study[study.id])) for study in studies]
+
+
+def whole(session: Session, id_: str) -> Members:
+    """Return the experiments of a study, or of the only one of a study.
+
+    Raises:
+        NotFound: there is neither.
+        Conflict: it is one of several.
+    """
+    found = members(session, id_)
+    if found.one is not None:
+        msg = f"{id_!r} is one experiment of the study {found.study.id!r} ({found.study.name}), and this is about all"
+        raise Conflict(f"{msg} of it: use the id of the study")
+    return found
+
+
+def meant(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
+    """Return the experiments that the ids of studies and experiments mean, in their order, each once.
+
+    Raises:
+        NotFound: there is nothing with one of the ids.
+    """
+    row, named = ExperimentRow, [storable(each) for each in ids]
+    query = select(row).where(or_(row.id.in_(named), row.study_id.in_(named))).order_by(row.study_id, row.position)
+    alone: dict[str, ExperimentRow] = {}
+    together: dict[str, list[ExperimentRow]] = defaultdict(list)
+    for each in session.scalars(query):
+        alone[each.id] = each
+        together[each.study_id].append(each)
+    if missing := [each for each in named if each not in alone and each not in together]:
+        raise NotFound(_missing(session, missing[0]))
+    found = (together[each] if each in together else [alone[each]] for each in named)
+    return tuple({each.id: each for some in found for each in some}.values())
 
 
 def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
-    """Return the experiments with these ids, in the order of the ids.
-
-    Raises:
-        NotFound: an experiment does not exist.
-    """
-    named = ExperimentRow.id.in_([storable(each) for each in ids])
-    found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
-    if missing := [each for each in ids if each not in found]:
-        raise NotFound(
-            _of_another_kind(session, missing[0]) or f"there is no experiment {', '.join(map(repr, missing))}"
-        )
+    """Return the experiments with these ids, which exist, in the order of the ids."""
+    found = {row.id: row for row in session.scalars(select(ExperimentRow).where(ExperimentRow.id.in_(ids)))}
     return tuple(found[each] for each in ids)
-
-
-def get_study(session: Session, study_id: str) -> StudyRow:
-    """Return the study with this id.
-
-    Raises:
-        NotFound: there is none.
-    """
-    return _get(session, StudyRow, "study", study_id)
-
-
-def get(session: Session, noun: Noun, id_: str) -> ExperimentRow | StudyRow:
-    """Return the experiment or the study with this id.
-
-    Raises:
-        NotFound: there is none.
-    """
-    return get_study(session, id_) if noun == "study" else get_experiment(session, id_)
 
 
 def was_deleted(session: Session, id_: str) -> bool:
@@ -149,8 +204,7 @@ def experiments_of(session: Session, studies: Sequence[str]) -> tuple[Experiment
 def open_studies(session: Session, studies: Sequence[str]) -> frozenset[str]:
     """Return the ids of the studies in which an experiment has not ended."""
     row = ExperimentRow
-    found = session.scalars(select(row.study_id).where(row.study_id.in_(studies), row.state.in_(OPEN)).distinct())
-    return frozenset(each for each in found if each is not None)
+    return frozenset(session.scalars(select(row.study_id).where(row.study_id.in_(studies), row.state.in_(OPEN))))
 
 
 def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow, ...]:
@@ -176,22 +230,10 @@ def lock(session: Session, experiments: Sequence[str]) -> dict[str, State]:
     return dict(session.execute(locked).all())
 
 
-def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
-    if (found := session.get(table, storable(id_))) is not None:
-        return found
+def _missing(session: Session, id_: str) -> str:
     if deletion := session.get(DeletionRow, storable(id_)):
-        raise NotFound(f"{deletion.name!r} ({id_}) was deleted at {deletion.deleted_at:%Y-%m-%d %H:%M} UTC")
-    raise NotFound(_of_another_kind(session, id_) or f"there is no {noun} {id_!r}")
-
-
-def _of_another_kind(session: Session, id_: str) -> str | None:
-    """Return that an id is of a study and not of an experiment, or the reverse; None if it is of neither."""
-    if session.get(StudyRow, storable(id_)) is not None:
-        names = [f"{row.id} ({row.name})" for row in experiments_of(session, [id_])]
-        return f"{id_!r} is a study, and this needs an experiment: {', '.join(names) or 'it has none'}"
-    if session.get(ExperimentRow, storable(id_)) is not None:
-        return f"{id_!r} is an experiment, and this needs a study"
-    return None
+        return f"{deletion.name!r} ({id_}) was deleted at {deletion.deleted_at:%Y-%m-%d %H:%M} UTC"
+    return f"there is no study or experiment {id_!r}"
 
 
 @event.listens_for(ExperimentRow, "load")
