@@ -85,11 +85,11 @@ def found(store: Store, id_: str) -> dict[int, Found]:
 
 
 def _found(best: Sequence[BestSimulator], truth: FloatArray, extent: FloatArray) -> Found:
-    away = np.abs(np.array([simulator.parameters for simulator in best]) - truth) / extent
-    if any(simulator.lower is None for simulator in best):
+    away = np.abs(np.array([each.simulator.parameters for each in best]) - truth) / extent
+    intervals = [each.simulator.interval for each in best if each.simulator.interval is not None]
+    if len(intervals) < len(best):
         return Found(away)
-    lower = np.array([simulator.lower for simulator in best])
-    upper = np.array([simulator.upper for simulator in best])
+    lower, upper = np.moveaxis(np.array(intervals), -1, 0)
     return Found(away, (upper - lower) / extent, ((lower <= truth) & (truth <= upper)).astype(float))
 
 

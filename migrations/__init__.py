@@ -25,11 +25,12 @@ def configuration(connection: Connection | None = None) -> Config:
     return config
 
 
-def upgrade(url: str, *, only_new: bool = False) -> None:
-    """Bring the database to the latest revision, in one transaction; a second process waits for the first.
+def upgrade(url: str, *, only_new: bool = False, to: str = "head") -> None:
+    """Bring the database to a later revision, in one transaction; a second process waits for the first.
 
     Args:
         url: of the database.
+        to: the revision; left out: the latest.
         only_new: whether a database that has a revision already stays as it is.
 
     Raises:
@@ -38,7 +39,7 @@ def upgrade(url: str, *, only_new: bool = False) -> None:
             a migration failed; nothing was changed.
     """
     try:
-        _upgrade(url, only_new=only_new)
+        _upgrade(url, only_new=only_new, to=to)
     except StoreUnavailable:
         raise
     except Exception as error:  # each database driver has errors of its own
@@ -47,7 +48,7 @@ def upgrade(url: str, *, only_new: bool = False) -> None:
         raise StoreUnavailable(f"the database {url} cannot be migrated: {reason}") from error
 
 
-def _upgrade(url: str, *, only_new: bool) -> None:
+def _upgrade(url: str, *, only_new: bool, to: str) -> None:
     engine = open_engine(url, enforce_foreign_keys=False)
     try:
         if file := file_of(engine.url):
@@ -59,6 +60,6 @@ def _upgrade(url: str, *, only_new: bool) -> None:
             if is_later(found):
                 raise StoreUnavailable(other_schema(found))
             if not (found and only_new):
-                command.upgrade(configuration(connection), "head")
+                command.upgrade(configuration(connection), to)
     finally:
         engine.dispose()

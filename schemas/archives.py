@@ -1,37 +1,13 @@
-"""Archives: their manifest, the result of an import, and what is the same when they are computed again."""
+"""Archives: the result of an import, and what is the same when they are computed again."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Id, Name
 
-FORMAT = 1
-"""Version of the archive format: exports write it, and imports refuse a later one."""
-
 MOST_BYTES_OF_IMPORT = 2**30
 """Size of an archive that an import reads."""
-
-Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-Extent = Annotated[int, Field(strict=True, ge=0)]
-
-
-class Member(Frozen):
-    """A file in an archive."""
-
-    sha256: Digest
-    bytes: Extent
-    rows: Extent = Field(description="lines of JSON, or rows of Parquet")
-
-
-class Manifest(Frozen):
-    """`manifest.json`: origin and contents of an archive."""
-
-    format: Annotated[int, Field(strict=True, ge=1)]
-    gaplab: str = Field(max_length=100, description="version of gaplab that wrote the archive")
-    revision: str = Field(max_length=32, description="revision of the database that the archive was written from")
-    id: str = Field(max_length=32, description="id of the study")
-    members: dict[str, Member]
 
 
 class ImportRead(Frozen):

@@ -143,7 +143,7 @@ class Limits(_Environment):
     rollouts: PositiveInt = 1_000_000_000_000
     streams_per_token: PositiveInt = 20
     streams: PositiveInt = 200
-    imported_rows: PositiveInt = 250_000
+    imported_rows: PositiveInt = 50_000
     requests: PositiveInt = 1_000
     unnamed_attachment_bytes: PositiveInt = 1_000_000_000
 

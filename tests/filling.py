@@ -10,19 +10,19 @@ from sqlalchemy import insert
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts
 from gaplab.services.store.models import (
     Base,
     ExperimentRow,
-    IterationRow,
-    MeasurementRow,
     RepetitionRow,
-    SimulatorRow,
+    StepKind,
+    StepRow,
     StudyRow,
 )
+from gaplab.services.store.queries.logs import columns_of
 from gaplab.services.store.session import Store
 
 IN_A_STUDY = 7
@@ -64,11 +64,7 @@ def fill(store: Store, experiments: int) -> None:
             repetitions = [(experiment, number) for experiment in batch for number in range(REPETITIONS)]
             _insert(session, RepetitionRow, [_repetition(*each, rollouts) for each in repetitions])
             iterations = [(_id_of(*each), iteration) for each in repetitions for iteration in range(SAMPLES + 1)]
-            _insert(session, IterationRow, [_iteration(*each, rng.random(3)) for each in iterations])
-            _insert(
-                session, MeasurementRow, [row for each in iterations for row in _measurements(*each, rng.random(4))]
-            )
-            _insert(session, SimulatorRow, [_simulator(*each, rng.random(4)) for each in iterations])
+            _insert(session, StepRow, [row for each in iterations for row in _steps(*each, rng.random(9))])
     with store.transaction() as session:
         if session.get_bind().dialect.name == "postgresql":  # its sequence does not know the inserted ids
             session.connection().exec_driver_sql(
@@ -133,7 +129,6 @@ def _repetition(experiment: int, number: int, rollouts: int) -> Row:
         "epoch": 1,
         "attempts": 1,
         "steps": 5 * SAMPLES + 3,
-        "iterations_done": SAMPLES + 1,
         "rollouts_done": rollouts,
         "seconds": 20.0,
         "started_at": _moment(experiment),
@@ -141,47 +136,18 @@ def _repetition(experiment: int, number: int, rollouts: int) -> Row:
     }
 
 
-def _iteration(repetition: int, number: int, chance: np.ndarray) -> Row:
-    genome, fitness, recorded = chance.tolist()
-    counts = {f"{phase}_{count}": 0 for phase in ("tuning", "transfer") for count in ("failures", "saved")}
-    return counts | {
-        "repetition_id": repetition,
-        "number": number,
-        "selected_genome": [genome] if number else None,
-        "selection_rollouts": 20 if number else None,
-        "selection_failures": 0 if number else None,
-        "selection_saved": 0 if number else None,
-        "tuning_rollouts": 20 * number,
-        "transferred_genome": [genome],
-        "simulated_fitness": fitness,
-        "transfer_rollouts": 20,
-        "recorded_fitness": recorded,
-        "seconds": 2.0,
-        "ended_at": _moment(repetition),
-    }
-
-
-def _measurements(repetition: int, iteration: int, chance: np.ndarray) -> Iterator[Row]:
-    for kind in MeasurementKind:
-        if iteration or kind is MeasurementKind.PROBE:
-            genome, fitness = (chance[:2] if kind is MeasurementKind.PROBE else chance[2:]).tolist()
-            yield {
-                "repetition_id": repetition,
-                "iteration": iteration,
-                "kind": kind,
-                "genome": [genome],
-                "fitness": fitness,
-                "measured_by": "analytic",
-                "measured_at": _moment(repetition),
-            }
-
-
-def _simulator(repetition: int, iteration: int, chance: np.ndarray) -> Row:
-    *parameters, error = chance.tolist()
-    return {
-        "repetition_id": repetition,
-        "iteration": iteration,
-        "rank": 0,
-        "parameters": parameters,
-        "squared_error": error,
-    }
+def _steps(repetition: int, iteration: int, chance: np.ndarray) -> Iterator[Row]:
+    genome, fitness = chance[:1], chance[1:4].tolist()
+    cost = Cost(20)
+    steps = (
+        Selected(iteration, genome, cost),
+        Measured(iteration, Sample(genome, fitness[0])),
+        Tuned(iteration, (Simulator(chance[4:7], chance[7]),), Cost(20 * iteration)),
+        Transferred(iteration, genome, fitness[1], cost),
+        Probed(iteration, fitness[2], chance[8]),
+    )
+    for step in steps if iteration else steps[2:]:
+        columns = columns_of(step)
+        measured = "analytic" if columns["kind"] in (StepKind.MEASURED, StepKind.PROBED) else None
+        own = {"repetition_id": repetition, "measured_by": measured, "seconds": 0.4, "at": _moment(repetition)}
+        yield own | columns

@@ -28,7 +28,7 @@ def export(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Export a study, perhaps with one of its experiments alone, into one archive of JSON and Parquet."""
+    """Export a study, perhaps with one of its experiments alone, into one archive: a zipped SQLite database."""
     with connect(url) as client:
         file = to or Path(f"gaplab-{client.study(id).id}.zip")  # the service's id, never a path that was typed
         with appearing(file, PRIVATE) as part, part.open("wb") as target:

@@ -1,6 +1,5 @@
 """The resolved specs of a file: an archive, or a spec to submit."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +9,12 @@ from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.submission import read_spec
 from gaplab.schemas.mistakes import pointer_to, sentence
 from gaplab.schemas.spec import ExperimentSpec, StudySpec, kind_of
-from gaplab.services.archives.members import member_of
-from gaplab.services.archives.opening import readable_zip
+from gaplab.services.archives.reading import archived_specs
 from gaplab.services.core.errors import InvalidArchive, InvalidSpec
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins import folders
 from gaplab.services.specs.differences import SpecColumn
 from gaplab.services.specs.resolution import resolve
-
-MOST_BYTES = 50_000_000
-"""Size of the specs in an archive; a spec has about two thousand bytes."""
-
-_MEMBER = member_of("experiment")
 
 _BROKEN_SPECS = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 
@@ -50,19 +43,13 @@ def column_of(file: Path) -> SpecColumn:
 
 
 def _archived(file: Path) -> tuple[dict[str, Any], ...]:
-    with readable_zip(file) as archive:
-        if _MEMBER not in archive.namelist():
-            raise InvalidArchive(f"it has no {_MEMBER}")
-        with archive.open(_MEMBER) as rows:
-            text = rows.read(MOST_BYTES + 1)
-    if len(text) > MOST_BYTES:
-        raise InvalidArchive(f"its specs have more than {MOST_BYTES:,} bytes")
+    with file.open("rb") as source:
+        specs = archived_specs(source)
     try:
-        specs = tuple(json.loads(row)["spec"] for row in text.splitlines())
         for spec in specs:
             spec_of(spec)
     except _BROKEN_SPECS as error:
-        raise InvalidArchive(f"a spec in its {_MEMBER} is damaged") from error
+        raise InvalidArchive("a spec in it is damaged") from error
     return specs
 
 

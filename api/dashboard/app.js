@@ -2,8 +2,7 @@
 /** The page: a bar, and one view at a time, which the address after `#` chooses. */
 
 import { unreachable } from "./lib/api.js";
-import { linkBench } from "./lib/bench/link.js";
-import { keepSending } from "./lib/bench/sender.js";
+import { keepSending, linkBench } from "./lib/bench/sender.js";
 import { byId, h } from "./lib/dom.js";
 import { watchHealth } from "./lib/health.js";
 import { empty, failed, loading } from "./lib/placeholders.js";
@@ -17,8 +16,7 @@ const VIEWS = [
   [/^\/replay$/, "replay", []],
   [/^\/toy$/, "toy", []],
   [/^\/bench$/, "bench", []],
-  [/^\/studies\/([\w-]+)$/, "study", ["id"]],
-  [/^\/experiments\/([\w-]+)$/, "experiment", ["id"]],
+  [/^\/(?:studies|experiments)\/([\w-]+)$/, "study", ["id"]],
 ];
 const IDS = ["experiment", "request"];
 const ID = /^[\w-]*$/;  // dots and slashes would lead to another path of the service
@@ -54,7 +52,7 @@ async function showView() {
   byId("main").replaceChildren(root);
   const view = viewAtAddress();
   for (const link of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("nav [data-view]"))) {
-    if (link.dataset.view === view?.name) link.setAttribute("aria-current", "page");
+    if (view && link.dataset.view?.split(" ").includes(view.name)) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
   }
   try {
@@ -71,30 +69,19 @@ async function showView() {
   if (!signal.aborted) document.title = `${root.querySelector("h1")?.textContent ?? "gaplab"} · gaplab`;
 }
 
-/**
- * Say that there is no view at the address.
- *
- * @param {HTMLElement} root
- */
+/** Say that there is no view at the address. @param {HTMLElement} root */
 function showLost(root) {
-  const home = h("a", { class: "button quiet", href: "#/" }, "To the experiments");
+  const home = h("a", { class: "button quiet", href: "#/" }, "To the studies");
   root.replaceChildren(h("h1", {}, "There is no such page"), empty(`There is nothing at ${location.hash}.`, home));
 }
 
-/**
- * @param {() => void} retry
- * @param {AbortSignal} signal
- */
+/** @param {() => void} retry @param {AbortSignal} signal */
 function retryLater(retry, signal) {
   const timer = setTimeout(retry, RETRY_MS);
   signal.addEventListener("abort", () => clearTimeout(timer));
 }
 
-/**
- * Load the module of a view. A browser may remember that it failed, so once the service is back the page is loaded again.
- *
- * @param {string} name
- */
+/** Load the module of a view. A browser may remember that it failed, so once the service is back the page is loaded again. @param {string} name */
 async function loadView(name) {
   preload(name);
   try {
@@ -105,11 +92,7 @@ async function loadView(name) {
   }
 }
 
-/**
- * Ask for all modules of a view at once: each level of imports would wait for the level above.
- *
- * @param {string} name
- */
+/** Ask for all modules of a view at once: each level of imports would wait for the level above. @param {string} name */
 function preload(name) {
   for (const path of modules[name] ?? []) {
     document.head.append(h("link", { rel: "modulepreload", href: new URL(path, import.meta.url).href }));

@@ -22,7 +22,7 @@ _CHUNK = 2**16
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 _EXPORTED: Responses = {200: {"content": {MEDIA_TYPE: {**_BINARY, "example": "PK…"}}}, **documented(404, 429)}
 LineDep = Annotated[WaitingLine, of_app("exports")]
-_CONTENT = "A zip of JSON Lines and Parquet, one member for each table; `manifest.json` has their SHA-256"
+_CONTENT = "A zip of one SQLite database, `study.sqlite3`, with the tables of the service"
 
 
 @router.get(

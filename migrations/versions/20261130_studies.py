@@ -2,7 +2,7 @@
 
 An experiment without a study gets one with its id. Notes and tags of an experiment among others go to its study.
 
-Revision: 0005, after 0003.
+Revision: 0005, after 0004.
 """
 
 from typing import Any
@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "0005"
-down_revision = "0003"
+down_revision = "0004"
 branch_labels = None
 depends_on = None
 

@@ -1,8 +1,7 @@
 """Archives: one file with everything about a study, for backup, analysis elsewhere, and import.
 
-An archive is a zip with one member for each exported table: Parquet, or JSON Lines where values are nested. For readers
-without gaplab it has the curves as `curves.json`, and the spec to submit again as `spec.json`. `manifest.json` lists
-all members. The same content gives the same bytes.
+An archive is a zip of one SQLite database with the tables of the service and one study in it. `gaplab serve` opens the
+database, and other programs read it with SQL. The same content gives the same bytes.
 """
 
 from gaplab.services.archives.reading import import_archive as import_archive

@@ -1,11 +1,12 @@
-"""The tables and columns of an archive.
+"""The tables of an archive that have rows, and the columns of these that have values.
 
 Each table is exported, or left out for a reason; a column that is added to an exported table is exported from then on.
-Values that are valid in one database only are left out, or replaced by the values they stand for.
+Columns that are left out are null, or have the value of a database in which nothing runs.
 """
 
 from collections.abc import Mapping
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import cache
 
 from gaplab.services.store import tables
@@ -22,14 +23,12 @@ EXPORTED = (
     "experiment",
     "experiment_provenance",
     "repetition",
-    "iteration",
-    "measurement",
-    "simulator",
+    "branch",
+    "step",
     "attempt",
     "request",
     "attachment",
     "answer",
-    "branch",
 )
 """The exported tables, in the order of insertion: each after the tables that it refers to."""
 
@@ -78,16 +77,10 @@ COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
         "taken_until": "belongs to a take, and an archive has none",
         "lease_s": "belongs to a take, and an archive has none",
     },
-    "attachment": {
-        "content": "is a member of its own, which has the hash as its name",
-        "created_at": "says when one service got the file",
-    },
+    "attachment": {"created_at": "says when one service got the file"},
     "answer": {"token_id": "names a token of one service"},
 }
 """Columns of exported tables that are left out, each with the reason."""
-
-ADDED = {"answer": frozenset({"doubts"}), "simulator": frozenset({"fit"})}
-"""Columns that archives of earlier versions lack; they are null in their rows."""
 
 
 @cache
@@ -107,6 +100,16 @@ def _replaced(column: Column) -> tuple[Column, ...]:
     return replace(column, name=EXPERIMENT, kind=Kind.TEXT, longest=32), replace(column, name=REPETITION)
 
 
-def is_nested(table: str) -> bool:
-    """Return whether rows of the table have nested values, which suit JSON and not Parquet."""
-    return any(each.kind is Kind.NESTED for each in columns_of(table)) or table == "study"
+_EARLIEST = datetime(1980, 1, 1, tzinfo=UTC)
+
+
+def at_rest(table: str, row: Row) -> Row:
+    """Return values for the columns that are left out and may not be null."""
+    match table:
+        case "experiment":
+            return {"running": 0, "claimable": False, "turn_at": row["created_at"]}
+        case "repetition":
+            return {"checkpoints": 0}
+        case "robot" | "attachment":
+            return {"created_at": _EARLIEST}
+    return {}

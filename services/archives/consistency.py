@@ -1,6 +1,7 @@
 """Checks that the rows of an archive belong together, and that this installation can show its experiments."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TypeAlias
 
 from pydantic import ValidationError
 
@@ -8,8 +9,8 @@ from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
 from gaplab.schemas.spec import Schedule
-from gaplab.services.archives.columns import EXPERIMENT, REPETITION, Row
-from gaplab.services.archives.opening import OpenedArchive
+from gaplab.services.archives.columns import REPETITION, Row
+from gaplab.services.archives.resting import owner_of
 from gaplab.services.core import robot_library
 from gaplab.services.core.errors import InvalidArchive, InvalidSpec, Violation
 from gaplab.services.core.measured_values import genome_violations, readings_violations
@@ -21,42 +22,39 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.labels import plain_name
-from gaplab.services.core.types import Probed
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries import attachments, attempts, logs, provenance
-from gaplab.services.store.queries.experiments import get_experiments, repetitions_of
-from gaplab.services.store.queries.step_rows import position
+from gaplab.services.store.queries.experiments import members, repetitions_of
 from gaplab.services.store.session import Session
 from gaplab.services.store.texts import pack_tags, unpack_tags
 
 MOST_EXPERIMENTS = 1_000
 
+Rows: TypeAlias = Callable[[str], Iterator[Row]]
+"""Yields the checked rows of a table."""
 
-def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
-    """Return the rows of the experiments by their ids in the archive, with checked specs, and the robot of a bench.
+
+def checked_experiments(rows: Rows, study: str) -> dict[str, Row]:
+    """Return the rows of the experiments by their ids, with checked specs, and the robot of a bench.
 
     Raises:
-        InvalidArchive: a spec is invalid, or the archive has other experiments than its manifest states.
+        InvalidArchive: a spec is invalid, or an experiment belongs to another study.
     """
-    manifest, experiments = opened.manifest, dict[str, Row]()
-    _learn_robots(opened)
-    for row in opened.rows("experiment"):
-        if len(experiments) == MOST_EXPERIMENTS:
-            raise InvalidArchive(f"it has more than {MOST_EXPERIMENTS} experiments")
+    experiments = dict[str, Row]()
+    _learn_robots(rows)
+    for row in rows("experiment"):
+        if row["study_id"] != study:
+            raise InvalidArchive(f"the experiment {row['id']!r} belongs to another study than {study!r}")
         spec = _checked_spec(row)
         experiments[row["id"]] = row | {"spec": spec, "robot": _on_a_bench(row["id"], spec)}
-    studies = [row["id"] for row in opened.rows("study")]
-    if studies != [manifest.id] or {row["study_id"] for row in experiments.values()} != {manifest.id}:
-        raise InvalidArchive(f"it has other studies or experiments than the study {manifest.id!r} of its manifest")
-    if manifest.id in experiments and len(experiments) > 1:
-        raise InvalidArchive(f"an experiment among others has the id {manifest.id!r} of the study")
+    if study in experiments and len(experiments) > 1:
+        raise InvalidArchive(f"an experiment among others has the id {study!r} of the study")
     return experiments
 
 
-def _learn_robots(opened: OpenedArchive) -> None:
-    for row in opened.rows("robot"):
+def _learn_robots(rows: Rows) -> None:
+    for row in rows("robot"):
         try:
             file = read_robot_file(row["text"])
         except InvalidSpec as error:
@@ -81,12 +79,11 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
         return
     owner = experiments.get(owner_of(table, row))
     number = row.get(REPETITION, row["number"] if table == "repetition" else 0)
-    iteration = row.get("iteration", row["number"] if table == "iteration" else 0)
     if (
         owner is None
         or number >= owner["spec"]["repetitions"]
-        or iteration >= owner["iterations"]
-        or (table == "simulator" and len(row["parameters"]) != len(owner["spec"]["tunables"]))
+        or row.get("iteration", 0) >= owner["iterations"]
+        or any(len(each["parameters"]) != len(owner["spec"]["tunables"]) for each in _simulators(table, row))
     ):
         raise InvalidArchive(f"a row of {table} does not fit its experiment: {str(row)[:200]}")
     if owner["robot"] is not None and (wrong := [*_moves_it_wrongly(table, row, owner["robot"])]):
@@ -103,9 +100,9 @@ def _on_a_bench(id_: str, spec: Row) -> Robot | None:
 
 def _moves_it_wrongly(table: str, row: Row, robot: Robot) -> Iterator[Violation]:
     """Yield what could not have been sent to the robot, or measured of it."""
-    for name in ("genome", "selected_genome", "transferred_genome"):
-        if row.get(name) is not None:
-            yield from genome_violations(row[name], robot.label, robot.space)
+    genome = row["body"].get("genome") if table == "step" else row.get("genome")
+    if genome is not None:
+        yield from genome_violations(genome, robot.label, robot.space)
     if table == "answer":
         if row["readings"] is not None:
             yield from readings_violations(row["readings"], row["values"] and len(row["values"]), robot.sensors)
@@ -113,25 +110,18 @@ def _moves_it_wrongly(table: str, row: Row, robot: Robot) -> Iterator[Violation]
             yield Violation("/traces", None, "each trace must be among the attachments of its answer")
 
 
-def owner_of(table: str, row: Row) -> str:
-    """Return the id of the experiment that a row belongs to."""
-    owner: str = row["id"] if table == "experiment" else row.get(EXPERIMENT) or row["experiment_id"]
-    return owner
+def _simulators(table: str, row: Row) -> Sequence[Row]:
+    return row["body"].get("simulators") or () if table == "step" else ()
 
 
-def check_attachments(session: Session, opened: OpenedArchive) -> None:
-    """Refuse files without a row, rows without a file, and files that no answer names.
-
-    The session is of the private database, which has all rows.
+def check_attachments(session: Session) -> None:
+    """Refuse files that no answer names, and answers that name others; the session is of the archive.
 
     Raises:
         InvalidArchive: the message names the first of them.
     """
-    rows, files = {row["id"] for row in opened.rows("attachment")}, set(opened.attachments)
-    if unpaired := sorted(rows ^ files):
-        raise InvalidArchive(f"the attachment {unpaired[0]!r} has a row or a file, but not both")
-    if unnamed := sorted(files - attachments.named(session)):
-        raise InvalidArchive(f"no answer names the attachment {unnamed[0]!r}")
+    if unpaired := sorted(attachments.all_ids(session) ^ attachments.named(session)):
+        raise InvalidArchive(f"the attachment {unpaired[0]!r} is in the archive or named by an answer, but not both")
 
 
 def _check_tags(row: Row) -> None:
@@ -185,30 +175,22 @@ def _iterations(spec: ResolvedSpec) -> set[int]:
     return {1, several}
 
 
-def check_logs(session: Session, ids: Iterable[str]) -> None:
+def check_logs(session: Session, study: str, at_once: int) -> None:
     """Refuse experiments with missing repetitions, and repetitions whose rows contradict their counts.
 
     Raises:
         InvalidArchive: the message names the first of them.
     """
-    for experiment in get_experiments(session, list(ids)):
+    if unknown := logs.unknown_branch(session):
+        raise InvalidArchive(f"a step belongs to branch {unknown} of its repetition, which has no such branch")
+    for experiment in members(session, study).experiments:
         rows, expected = repetitions_of(session, experiment.id), experiment.spec["repetitions"]
         if [row.number for row in rows] != list(range(expected)):
             raise InvalidArchive(f"experiment {experiment.id!r} has {len(rows)} of its {expected} repetitions")
         latest = attempts.latest(session, experiment.id)
         for row in rows:
-            if not _is_whole(session, row):
+            if not logs.is_whole(session, row.id, row.steps, at_once):
                 msg = f"the rows of repetition {row.number} of {experiment.id!r} are not a log of {row.steps} steps"
                 raise InvalidArchive(msg)
             if latest.get(row.id, 0) > row.epoch:
                 raise InvalidArchive(f"repetition {row.number} of {experiment.id!r} has more attempts than leases")
-
-
-def _is_whole(session: Session, row: RepetitionRow) -> bool:
-    """Return whether the log has all steps and iterations that the repetition counts, in order."""
-    try:
-        (log,) = logs.logs(session, [row.id]).values()
-    except (ValueError, TypeError, AssertionError):  # steps check themselves
-        return False
-    done = sum(isinstance(step, Probed) for step in log)
-    return done == row.iterations_done and [position(step) for step in log] == list(range(row.steps))

@@ -1,94 +1,105 @@
-"""Unpacking of archives, within limits, and comparison with their manifest.
+"""Opening of archives: a zip with one SQLite database, whose rows are copied into a new database with our own tables.
 
-Nothing in them is trusted: members with unknown names are refused, sizes are counted while unpacking, and a subprocess
-reads Parquet.
+A member counts as it is unpacked. The stranger's schema is read, compared and then not used: no trigger, view, virtual
+table, index, CHECK, DEFAULT or computed column of it is ever evaluated. Keys and constraints are those of our tables.
+Source: https://sqlite.org/security.html.
 """
 
-import json
-import subprocess
-import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from errno import EINVAL
 from hashlib import sha256
 from pathlib import Path
-from subprocess import DEVNULL
-from typing import IO, TypeAlias
-from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile, ZipInfo
+from threading import Lock
+from time import monotonic
+from typing import IO, Any
+from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile
 from zlib import error as ZlibError  # noqa: N812 - it is an error
 
-from pydantic import ValidationError
-
-from gaplab.schemas.archives import FORMAT, Manifest, Member
-from gaplab.services.archives.checking import checked, first_error
-from gaplab.services.archives.columns import EXPORTED, Row
-from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, digest_of, member_of
-from gaplab.services.core.errors import InvalidArchive
+from gaplab.migrations import upgrade
+from gaplab.services.archives.columns import LEFT_OUT
+from gaplab.services.core.errors import InvalidArchive, StoreUnavailable
 from gaplab.services.settings import variable_of
+from gaplab.services.store.models.base import REVISION
 from gaplab.services.store.queries import attachments
+from gaplab.services.store.session import new_database
+from gaplab.services.store.sqlite_file import url_of
+
+DATABASE = "study.sqlite3"
+"""The only member of an archive."""
 
 MOST_BYTES = 512 * 2**20
-"""Size of all members, unpacked, without files; a study of the paper's size has about ten million bytes."""
+"""Size of the database without files; a study of the paper's size has about ten million bytes."""
 
 MOST_BYTES_OF_FILES = 2**30
-"""Size of all files beside measurements, unpacked."""
+"""Size of all files beside measurements."""
 
 MOST_FILES = 10_000
 """Files beside measurements."""
 
-MOST_BYTES_OF_MANIFEST = 4_000_000
-MOST_BYTES_OF_DIRECTORY = 4 * 2**20
-_MEMBERS = {MANIFEST, CURVES, SPEC, *map(member_of, EXPORTED)}
-_UNPACKING = Path(__file__).with_name("unpacking.py")
-_CHUNK = 2**16
+LONGEST_ROW = 8 * 2**20
+"""Most characters of one row."""
 
-ParquetConverter: TypeAlias = Callable[[Mapping[Path, int]], None]
-"""Writes the rows of each Parquet file, which has as many as stated, as JSON Lines into a file beside it."""
+MOST_BYTES_OF_DIRECTORY = 4 * 2**20
+
+MOST_SECONDS = 300.0
+"""Time that SQLite may take to read a database."""
+
+_LONGEST_STATEMENT = 100_000
+_STEPS_TO_READ_A_SCHEMA = 10_000
+"""Instructions of SQLite's machine; our schema takes some 2,000. One with a million tables would fill memory."""
+
+_STEPS_AT_ONCE = 100_000
+_CHUNK = 2**16
+_ROWS_IN_MEMORY, _CHARACTERS_IN_MEMORY = 500, 2**24
+
+_PLAIN = ("CREATE TABLE ", "CREATE INDEX ", "CREATE UNIQUE INDEX ")
+"""How SQLite stores the statements of tables and indices, and of nothing else."""
+
+_NOT_COPIED = {"alembic_version", *LEFT_OUT}
+
+_MIGRATING = Lock()
+"""Alembic's environment is one for the process."""
 
 
 @dataclass(frozen=True)
 class OpenedArchive:
-    """An archive that was unpacked.
+    """The rows of an archive in a database with our own tables, at the present revision. Their values are not checked.
 
     Attributes:
-        manifest: manifest of the archive.
-        files: files of the tables' rows, as JSON Lines.
-        attachments: files beside measurements, by their hashes.
+        database: the file of the database.
+        at_once: number of rows that fit in memory.
     """
 
-    manifest: Manifest
-    files: Mapping[str, Path]
-    attachments: Mapping[str, Path]
-
-    def rows(self, table: str) -> Iterator[Row]:
-        """Yield the rows of a table, checked.
-
-        Raises:
-            InvalidArchive: a row is invalid.
-        """
-        yield from checked(table, self.files[table], self.manifest.members[member_of(table)].rows)
+    database: Path
+    at_once: int
 
 
-def open_archive(file: IO[bytes], folder: Path, most_rows: int, convert: ParquetConverter) -> OpenedArchive:
-    """Unpack an archive into an empty folder; its tables have at most `most_rows` together.
+def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive:
+    """Unpack an archive into a folder; its tables have at most `most_rows` together.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, not an archive, or written by a later version.
     """
-    (folder / "attachments").mkdir()
+    given, database = folder / DATABASE, folder / "copied.sqlite3"
     with readable_zip(file) as archive:
-        members = _members(archive)
-        manifest = _manifest(archive, members)
-        _refuse_too_many_rows(manifest, most_rows)
-        files = {
-            name: _unpack(archive, info, manifest.members[name], folder / name)
-            for name, info in members.items()
-            if name != MANIFEST
-        }
-    convert({file: manifest.members[name].rows for name, file in files.items() if name.endswith(".parquet")})
-    tables = {table: json_lines_beside(files[member_of(table)]) for table in EXPORTED}
-    return OpenedArchive(manifest, tables, {hash_: file for name, file in files.items() if (hash_ := digest_of(name))})
+        _unpack(archive, given)
+    try:
+        with closing(sqlite3.connect(f"{given.as_uri()}?mode=ro&immutable=1", uri=True)) as source:
+            revision = _revision(source)
+            _make(database, revision)
+            with closing(sqlite3.connect(database)) as target:
+                longest = _copy(source, target, most_rows)
+    except sqlite3.IntegrityError as error:
+        raise InvalidArchive(f"its rows contradict each other: {error}"[:300]) from error
+    except sqlite3.Error as error:
+        raise InvalidArchive(f"its database cannot be read: {error}"[:300]) from error
+    given.unlink()
+    if revision != REVISION:
+        _migrate(database, "head", f"its database of revision {revision} cannot be read")
+    return OpenedArchive(database, max(1, min(_ROWS_IN_MEMORY, _CHARACTERS_IN_MEMORY // max(1, longest))))
 
 
 class _Bounded:
@@ -110,15 +121,15 @@ class _Bounded:
 
 
 @contextmanager
-def readable_zip(file: IO[bytes] | Path) -> Iterator[ZipFile]:
+def readable_zip(file: IO[bytes]) -> Iterator[ZipFile]:
     """Yield a zip that is open for reading.
 
     Raises:
-        InvalidArchive: it, or what is read of it meanwhile, is damaged, encrypted or no zip.
+        InvalidArchive: it, or what is read of it meanwhile, is damaged, encrypted or not a zip.
         OSError: the file cannot be read.
     """
     try:
-        with ZipFile(file if isinstance(file, Path) else _Bounded(file)) as archive:
+        with ZipFile(_Bounded(file)) as archive:
             yield archive
     except (BadZipFile, ZlibError, EOFError, NotImplementedError, RuntimeError, ValueError, OverflowError) as error:
         raise InvalidArchive(f"it is not a readable zip: {type(error).__name__}") from error
@@ -128,93 +139,136 @@ def readable_zip(file: IO[bytes] | Path) -> Iterator[ZipFile]:
         raise InvalidArchive("it is not a readable zip: its directory points outside of it") from error
 
 
-def _members(archive: ZipFile) -> dict[str, ZipInfo]:
-    found: dict[str, ZipInfo] = {}
-    for info in archive.infolist():
-        if info.filename not in _MEMBERS and digest_of(info.filename) is None:
-            raise InvalidArchive(
-                f"unknown member {info.filename[:64]!r}; permitted: {', '.join(sorted(_MEMBERS))}, attachments/SHA-256"
-            )
-        if info.filename in found:
-            raise InvalidArchive(f"it has {info.filename} twice")
-        if info.compress_type not in {ZIP_STORED, ZIP_DEFLATED} or info.flag_bits & 1:
-            raise InvalidArchive(f"{info.filename} is encrypted, or compressed by another method than deflate")
-        found[info.filename] = info
-    _refuse_too_large(found)
-    return found
-
-
-def _refuse_too_large(members: Mapping[str, ZipInfo]) -> None:
-    sizes = {name: info.file_size for name, info in members.items()}
-    files = {name: size for name, size in sizes.items() if digest_of(name)}
-    if (size := sum(sizes.values()) - sum(files.values())) > MOST_BYTES:
-        raise InvalidArchive(f"unpacked it has {size:,} bytes; {MOST_BYTES:,} are permitted")
-    less = "export its experiments one by one"
-    if len(files) > MOST_FILES:
-        raise InvalidArchive(f"it has {len(files):,} attachments; {MOST_FILES:,} are permitted: {less}")
-    if (size := sum(files.values())) > MOST_BYTES_OF_FILES:
-        raise InvalidArchive(f"its attachments have {size:,} bytes; {MOST_BYTES_OF_FILES:,} are permitted: {less}")
-    for name, size in files.items():
-        if not 0 < size <= attachments.MOST_BYTES:
-            raise InvalidArchive(f"{name} has {size:,} bytes; 1 to {attachments.MOST_BYTES:,} are permitted")
-
-
-def _manifest(archive: ZipFile, members: dict[str, ZipInfo]) -> Manifest:
-    if MANIFEST not in members or members[MANIFEST].file_size > MOST_BYTES_OF_MANIFEST:
-        raise InvalidArchive(f"it has no {MANIFEST}, or one that is too long: it is not an archive of gaplab")
-    with archive.open(members[MANIFEST]) as opened:
-        text = opened.read(MOST_BYTES_OF_MANIFEST + 1)
-    try:
-        manifest = Manifest.model_validate(json.loads(text))
-    except (ValidationError, ValueError, RecursionError) as error:
-        msg = f"{MANIFEST} is invalid: {first_error(error) if isinstance(error, ValidationError) else 'it is not JSON'}"
-        raise InvalidArchive(msg) from error
-    if manifest.format > FORMAT:
-        raise InvalidArchive(f"its format is {manifest.format}; this version of gaplab reads up to {FORMAT}")
-    if missing := set(manifest.members) ^ (set(members) - {MANIFEST}):
-        msg = f"{', '.join(sorted(missing)[:5])!r} is in the manifest or in the archive, but not in both"
-        raise InvalidArchive(msg)
-    if missing := _MEMBERS - members.keys():
-        raise InvalidArchive(f"it has no {', '.join(sorted(missing)[:5])}")
-    return manifest
-
-
-def _refuse_too_many_rows(manifest: Manifest, most: int) -> None:
-    rows = sum(member.rows for name, member in manifest.members.items() if name not in {CURVES, SPEC})
-    if rows > most:
-        permitted = f"{most:,} are permitted ({variable_of('imported_rows')})"
-        raise InvalidArchive(f"it has {rows:,} rows; {permitted}: export its experiments one by one")
-
-
-def _unpack(archive: ZipFile, info: ZipInfo, promised: Member, target: Path) -> Path:
-    """Unpack a member into a file, and check its size and digest against the manifest."""
-    hashed, size = sha256(), 0
+def _unpack(archive: ZipFile, target: Path) -> None:
+    names = [info.filename for info in archive.infolist()]
+    if names != [DATABASE]:
+        found = ", ".join(name[:64] for name in names[:5]) or "nothing"
+        raise InvalidArchive(f"it is not an archive of gaplab, which has {DATABASE} alone; it has {found}")
+    (info,) = archive.infolist()
+    if info.compress_type not in {ZIP_STORED, ZIP_DEFLATED} or info.flag_bits & 1:
+        raise InvalidArchive(f"{DATABASE} is encrypted, or compressed by another method than deflate")
+    size, most = 0, MOST_BYTES + MOST_BYTES_OF_FILES
     with archive.open(info) as opened, target.open("xb") as file:
-        while (chunk := opened.read(_CHUNK)) and (size := size + len(chunk)) <= promised.bytes:
-            hashed.update(chunk)
+        while (chunk := opened.read(_CHUNK)) and (size := size + len(chunk)) <= most:
             file.write(chunk)
-    if size != promised.bytes or hashed.hexdigest() != promised.sha256:
-        raise InvalidArchive(f"{info.filename} differs from the manifest: it was damaged or changed")
-    if digest_of(info.filename) not in (None, hashed.hexdigest()):
-        raise InvalidArchive(f"the content of {info.filename} has another hash than its name: it was changed")
-    return target
+    if size > most:
+        raise InvalidArchive(f"unpacked it has more than {most:,} bytes: export its experiments one by one")
 
 
-def convert_apart(files: Mapping[Path, int], program: Path = _UNPACKING) -> None:
-    """Convert Parquet in a subprocess, which has limits; each file must have its number of rows.
+def _revision(connection: sqlite3.Connection) -> str:
+    """Return the revision of the stranger's database, which may have nothing but tables and indices."""
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, attachments.MOST_BYTES + LONGEST_ROW)
+    connection.setlimit(sqlite3.SQLITE_LIMIT_SQL_LENGTH, _LONGEST_STATEMENT)
+    connection.execute("PRAGMA trusted_schema=OFF")
+    connection.execute("PRAGMA cell_size_check=ON")
+    connection.set_progress_handler(lambda: 1, _STEPS_TO_READ_A_SCHEMA)
+    for name, sql in connection.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"):
+        if not str(sql).startswith(_PLAIN):
+            raise InvalidArchive(f"its database has more than tables and indices: {str(name)[:64]!r}")
+    until = monotonic() + MOST_SECONDS
+    connection.set_progress_handler(lambda: monotonic() > until, _STEPS_AT_ONCE)
+    if _columns(connection, "alembic_version") != ["version_num"]:
+        raise InvalidArchive("its database is not one of gaplab: it does not say its revision")
+    found = [str(each) for (each,) in connection.execute("SELECT version_num FROM alembic_version LIMIT 2")]
+    if len(found) != 1 or not found[0].isascii() or not found[0].isdigit() or found[0] > REVISION:
+        told = ", ".join(found)[:100] or "none"
+        raise InvalidArchive(f"its database is at revision {told}; this version of gaplab reads up to {REVISION}")
+    return found[0]
 
-    Raises:
-        InvalidArchive: a file is not readable, or has other rows.
-    """
-    arguments = [str(each) for file, rows in files.items() for each in (file, json_lines_beside(file), rows)]
-    command = [sys.executable, "-I", str(program), *arguments]
-    ended = subprocess.run(command, stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, check=False)  # noqa: S603 - ours
-    if ended.returncode != 0:
-        which = [*files][ended.returncode - 1].name if 0 < ended.returncode <= len(files) else "a member"
-        msg = f"{which} is not readable Parquet, has other rows than the manifest states, or values that JSON has not"
-        raise InvalidArchive(msg)
+
+def _make(database: Path, revision: str) -> None:
+    """Make a database with the tables of a revision, without rows."""
+    if revision == REVISION:
+        new_database(database)
+    else:
+        _migrate(database, revision, f"its database is at revision {revision[:100]}, which is unknown")
 
 
-def json_lines_beside(file: Path) -> Path:
-    """Return the file that receives the rows of a Parquet file, in its folder."""
-    return file.with_suffix(".jsonl")
+def _migrate(database: Path, revision: str, problem: str) -> None:
+    try:
+        with _MIGRATING:
+            upgrade(url_of(database), to=revision)
+    except StoreUnavailable as error:
+        raise InvalidArchive(f"{problem}: {error}"[:300]) from error
+
+
+def _columns(connection: sqlite3.Connection, table: str) -> list[str]:
+    """Return the names of the columns of a table; that of a computed one says so."""
+    found = connection.execute(f"PRAGMA table_xinfo([{table}])")
+    return [f"{name} (computed)" if hidden else str(name) for _, name, _, _, _, _, hidden in found]
+
+
+def _copy(source: sqlite3.Connection, target: sqlite3.Connection, most_rows: int) -> int:
+    """Copy the tables that archives have, and return the characters of the longest row."""
+    target.execute("PRAGMA journal_mode=OFF")
+    target.execute("PRAGMA synchronous=OFF")
+    names = [name for (name,) in target.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+    tables = {
+        name: _columns(target, name) for name in names if name not in _NOT_COPIED and not name.startswith("sqlite_")
+    }
+    _check_tables(source, tables)
+    size = _Size(most_rows)
+    for table, columns in tables.items():
+        listed = ", ".join(f"[{each}]" for each in columns)
+        rows = source.execute(f"SELECT {listed} FROM [{table}] NOT INDEXED")  # noqa: S608 - our names
+        into = f"INSERT INTO [{table}] ({listed}) VALUES ({', '.join('?' * len(columns))})"  # noqa: S608
+        target.executemany(into, size.counted(table, columns, rows))
+    if orphan := target.execute("PRAGMA foreign_key_check").fetchone():
+        raise InvalidArchive(f"its rows contradict each other: one of {orphan[0]} belongs to a missing row")
+    target.commit()
+    return size.longest
+
+
+def _check_tables(source: sqlite3.Connection, tables: Mapping[str, Sequence[str]]) -> None:
+    """Refuse a database whose tables lack columns, or have others."""
+    for table, columns in tables.items():
+        found = _columns(source, table)
+        if not found:
+            raise InvalidArchive(f"its database has no table {table}")
+        if wrong := set(columns) ^ set(found):
+            raise InvalidArchive(f"its table {table} lacks columns, or has others: {', '.join(sorted(wrong))[:200]}")
+
+
+class _Size:
+    """The size of an archive, counted while its rows are copied, and compared with what is permitted."""
+
+    def __init__(self, most_rows: int) -> None:
+        self._most_rows = most_rows
+        self._rows = self._bytes = self._files = self._bytes_of_files = self.longest = 0
+
+    def counted(self, table: str, columns: Sequence[str], rows: Iterator[Any]) -> Iterator[Any]:
+        """Yield the rows of a table.
+
+        Raises:
+            InvalidArchive: there are too many, they are too long, or one has bytes and is not a file.
+        """
+        content = columns.index("content") if table == "attachment" else None
+        for number, row in enumerate(rows, 1):
+            self._rows += 1
+            if self._rows > self._most_rows:
+                self._refuse(f"it has more than {self._most_rows:,} rows ({variable_of('imported_rows')})")
+            if any(isinstance(each, bytes) and place != content for place, each in enumerate(row)):
+                raise InvalidArchive(f"{table}, row {number} has bytes where its column has another type")
+            if (length := sum(len(each) for each in row if isinstance(each, str))) > LONGEST_ROW:
+                raise InvalidArchive(f"{table}, row {number} has more than {LONGEST_ROW:,} characters")
+            self.longest, self._bytes = max(self.longest, length), self._bytes + length
+            if self._bytes > MOST_BYTES:
+                self._refuse(f"its rows have more than {MOST_BYTES:,} characters")
+            if content is not None:
+                self._count_file(row[columns.index("id")], row[content])
+            yield row
+
+    def _count_file(self, id_: Any, content: Any) -> None:  # noqa: ANN401 - a stranger's values
+        if not isinstance(content, bytes) or not 0 < len(content) <= attachments.MOST_BYTES:
+            raise InvalidArchive(f"the attachment {str(id_)[:64]!r} has not 1 to {attachments.MOST_BYTES:,} bytes")
+        if sha256(content).hexdigest() != id_:
+            raise InvalidArchive(f"the content of the attachment {id_[:64]!r} has another hash: it was changed")
+        self._files, self._bytes_of_files = self._files + 1, self._bytes_of_files + len(content)
+        if self._files > MOST_FILES:
+            self._refuse(f"it has more than {MOST_FILES:,} attachments")
+        if self._bytes_of_files > MOST_BYTES_OF_FILES:
+            self._refuse(f"its attachments have more than {MOST_BYTES_OF_FILES:,} bytes")
+
+    @staticmethod
+    def _refuse(what: str) -> None:
+        raise InvalidArchive(f"{what}: export its experiments one by one")

@@ -1,11 +1,9 @@
 """Import of archives. An archive is stored as a whole or not at all, and nothing in it is run.
 
-It is checked in a private database first, and then copied: SQLite has one writer, so the copy must be quick.
-
-An experiment that had not ended is CANCELLED on arrival, since its archive hides the parameters of reality. Where
-reality is a robot on a bench nothing is hidden: it is admitted like a submission, arrives PAUSED, and goes on when a
-person resumes it. What it asked the robot for is withdrawn, and computed and forecast again here. An experiment that
-had ended arrives unchanged, to the last bit, but without forecasts.
+It is checked where it was unpacked, and then copied: SQLite has one writer, so the copy must be quick. An experiment
+that had not ended is CANCELLED. On a bench it is admitted like a submission, arrives PAUSED, and goes on when a person
+resumes it. What it asked the robot for is withdrawn, and computed and forecast again here. An experiment that had ended
+arrives unchanged, to the last bit, but without forecasts.
 """
 
 import json
@@ -17,16 +15,23 @@ from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import BoundedSemaphore
-from typing import IO
+from typing import IO, Any
 
 from gaplab.schemas.archives import ImportRead
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.measurements import RequestState
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.archives.checking import checked, readable
 from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, Row, columns_of
-from gaplab.services.archives.consistency import check_attachments, check_logs, check_row, checked_experiments, owner_of
-from gaplab.services.archives.opening import OpenedArchive, ParquetConverter, convert_apart, open_archive
+from gaplab.services.archives.consistency import (
+    MOST_EXPERIMENTS,
+    check_attachments,
+    check_logs,
+    check_row,
+    checked_experiments,
+)
+from gaplab.services.archives.opening import open_archive
+from gaplab.services.archives.resting import is_over, resting
 from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.limits import FREELY, Admission
@@ -36,17 +41,17 @@ from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts, hardware_of
 from gaplab.services.store.clock import moment
+from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import new_id
 from gaplab.services.store.queries.request_states import PENDING
-from gaplab.services.store.session import Session, Store, private_store
+from gaplab.services.store.session import Session, Store
+from gaplab.services.store.sqlite_file import url_of
+from gaplab.services.store.tables import Kind
 
 _REQUEST_IDS = {"id", "request_id", "same_as", "replaces"}
 """Columns with the ids of requests and answers."""
-
-_OF_NO_EXPERIMENT = {"study", "provenance", "robot", "attachment"}
-"""Tables whose rows belong to no single experiment."""
 
 AT_ONCE = 4
 """Archives that one process reads at the same time: each takes a core, memory and disk."""
@@ -56,24 +61,37 @@ _SLOTS = BoundedSemaphore(AT_ONCE)
 
 @dataclass(frozen=True)
 class CheckedArchive:
-    """An archive in a private database, where every row has been checked.
+    """An archive in which every row has been checked.
 
     Attributes:
-        store: the private database.
-        study: id of the study in the archive.
-        experiments: the rows of the experiments in the archive, by their ids.
-        attachments: files beside measurements, by their hashes; the private database has them without content.
+        store: a database of our own with its rows.
+        at_once: number of rows that fit in memory.
+        study: id of the study in it.
+        experiments: the rows of the experiments in it, by their ids, with checked specs.
     """
 
     store: Store
+    at_once: int
     study: str
     experiments: Mapping[str, Row]
-    attachments: Mapping[str, Path]
+
+    @property
+    def on_bench(self) -> frozenset[str]:
+        """The experiments that had not ended and whose reality is a robot on a bench."""
+        return frozenset(id_ for id_, row in self.experiments.items() if row["robot"] is not None and not is_over(row))
+
+    @property
+    def called_off(self) -> list[str]:
+        """The other experiments that had not ended."""
+        return [id_ for id_, row in self.experiments.items() if id_ not in self.on_bench and not is_over(row)]
+
+    def rows(self, session: Session, table: str) -> Iterator[Row]:
+        """Yield the rows of a table; the session is of `store`."""
+        owners = [self.study] if table == "study" else list(self.experiments)
+        return _rows(session, table, owners, self.at_once)
 
 
-def import_archive(
-    store: Store, file: IO[bytes], admitted: Admission = FREELY, *, convert: ParquetConverter = convert_apart
-) -> ImportRead:
+def import_archive(store: Store, file: IO[bytes], admitted: Admission = FREELY) -> ImportRead:
     """Store the content of an archive, a seekable file at its beginning, under its own ids; taken ones are replaced.
 
     The limits are those of `admitted`; left out: those of rows and of the size of a spec, by default.
@@ -88,122 +106,129 @@ def import_archive(
     if not _SLOTS.acquire(blocking=False):
         raise Conflict(f"{AT_ONCE} archives are being imported already; try again when they are done")
     try:
-        with store.reading() as session:
-            now = moment(session)
         limits = admitted.limits or Limits()
-        with checked_archive(file, now, most_rows=limits.imported_rows, convert=convert) as checked:
-            return store.write(_copy, checked, _work_left(checked.experiments, limits), admitted)
+        with checked_archive(file, most_rows=limits.imported_rows) as found:
+            return store.write(_copy, found, _work_left(found, limits), admitted)
     finally:
         _SLOTS.release()
 
 
 @contextmanager
-def checked_archive(
-    file: IO[bytes], now: datetime, *, most_rows: int | None = None, convert: ParquetConverter = convert_apart
-) -> Iterator[CheckedArchive]:
-    """Yield the content of an archive, a seekable file at its beginning, in a private database, which is deleted then.
+def checked_archive(file: IO[bytes], *, most_rows: int | None = None) -> Iterator[CheckedArchive]:
+    """Yield the content of an archive, a seekable file at its beginning, in a temporary database.
 
-    Work that the archive shows under way counts as ended `now`. All tables together may have `most_rows`; left out: the
-    default of the setting.
+    All tables together may have `most_rows`; left out: the default of the setting.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, too large or not an archive.
     """
+    with _opened(file, most_rows) as (private, at_once):
+        with private.reading() as session, readable("it"):
+            found = _check(session, private, at_once)
+        yield found
+
+
+def archived_specs(file: IO[bytes]) -> tuple[Any, ...]:
+    """Return the specs in an archive, unchecked, whose plug-ins may be missing here.
+
+    Raises:
+        InvalidArchive: the file is damaged, harmful, too large or not an archive.
+    """
+    with _opened(file, None) as (private, at_once), private.reading() as session, readable("it"):
+        ids = archives.all_ids(session, ExperimentRow)
+        return tuple(row["spec"] for row in archives.read_rows(session, "experiment", ["spec"], ids, at_once))
+
+
+@contextmanager
+def _opened(file: IO[bytes], most_rows: int | None) -> Iterator[tuple[Store, int]]:
     with TemporaryDirectory(prefix="gaplab-import-") as folder:
-        opened = open_archive(file, Path(folder), most_rows or Limits().imported_rows, convert)
-        with private_store(Path(folder) / "checked.db") as private:
-            yield private.write(_check, private, opened, now)
+        opened = open_archive(file, Path(folder), most_rows or Limits().imported_rows)
+        with Store(url_of(opened.database)) as private:
+            yield private, opened.at_once
 
 
-def _check(session: Session, private: Store, opened: OpenedArchive, now: datetime) -> CheckedArchive:
-    """Store the rows of an archive in the private database, each as it will arrive except for its ids."""
-    experiments = checked_experiments(opened)
-    for table in EXPORTED:
-        _insert(session, table, (_arriving(table, row, experiments, now) for row in opened.rows(table)))
-    check_attachments(session, opened)
-    check_logs(session, experiments)
-    return CheckedArchive(private, opened.manifest.id, experiments, opened.attachments)
+def _rows(session: Session, table: str, owners: Sequence[str], at_once: int, *kinds: Kind) -> Iterator[Row]:
+    """Yield rows, without columns of these kinds."""
+    columns = [column.name for column in columns_of(table) if column.kind not in kinds]
+    return archives.read_rows(session, table, columns, owners, at_once)
 
 
-def _work_left(experiments: Mapping[str, Row], limits: Limits) -> list[ResolvedSpec]:
+def _check(session: Session, private: Store, at_once: int) -> CheckedArchive:
+    studies, ids = archives.all_ids(session, StudyRow), archives.all_ids(session, ExperimentRow)
+    if len(studies) != 1 or not 0 < len(ids) <= MOST_EXPERIMENTS:
+        few = f"not one study with 1 to {MOST_EXPERIMENTS:,} experiments"
+        raise InvalidArchive(f"it has {len(studies):,} studies and {len(ids):,} experiments, and {few}")
+
+    def rows(table: str) -> Iterator[Row]:
+        owners = studies if table == "study" else ids
+        return checked(table, _rows(session, table, owners, at_once, Kind.BINARY))
+
+    (study,) = studies
+    experiments = checked_experiments(rows, study)
+    for table in sorted(EXPORTED, key="attachment".__eq__):  # answers name the attachments, and are checked before
+        for row in rows(table):
+            check_row(table, row, experiments)
+    check_attachments(session)
+    check_logs(session, study, at_once)
+    return CheckedArchive(private, at_once, study, experiments)
+
+
+def _work_left(found: CheckedArchive, limits: Limits) -> list[ResolvedSpec]:
     """Return the specs of what goes on here, which could be submitted here; refuse one that is too long."""
     most = 2 * limits.body_bytes  # a resolved spec may be twice as long as what was sent
-    for id_, row in experiments.items():
+    for id_, row in found.experiments.items():
         if (size := len(json.dumps(row["spec"], separators=(",", ":")))) > most:
             permitted = f"{most:,} are permitted, twice {variable_of('body_bytes')}"
             raise InvalidArchive(f"the spec of experiment {id_!r} has {size:,} bytes; {permitted}")
-    return [resolve_experiment(spec_of(row["spec"])) for row in experiments.values() if _goes_on(row)]
+    going_on = [row for id_, row in found.experiments.items() if id_ in found.on_bench]
+    return [resolve_experiment(spec_of(row["spec"])) for row in going_on]
 
 
-def _copy(session: Session, checked: CheckedArchive, left: Sequence[ResolvedSpec], admitted: Admission) -> ImportRead:
-    """Copy the rows of the private database into the service's, and begin the life of the experiments there."""
+def _copy(session: Session, found: CheckedArchive, left: Sequence[ResolvedSpec], admitted: Admission) -> ImportRead:
+    """Copy the rows of the archive into the service's database, and begin the life of the experiments there."""
     if left:
         admit(session, left, admitted)
-    renamed = {old: new_id() for old in archives.taken_ids(session, {checked.study, *checked.experiments})}
-    ids = {old: renamed.get(old, old) for old in (checked.study, *checked.experiments)}
-    with checked.store.reading() as source:
+    now = moment(session)
+    renamed = {old: new_id() for old in archives.taken_ids(session, {found.study, *found.experiments})}
+    ids = {old: renamed.get(old, old) for old in (found.study, *found.experiments)}
+    sent = {"experiment": {"token_id": admitted.token}}
+    with found.store.reading() as source:
         for table in EXPORTED:
-            owners = [checked.study] if table == "study" else list(checked.experiments)
-            sent = {"token_id": admitted.token} if table == "experiment" else {}
-            rows = archives.read_rows(source, table, [column.name for column in columns_of(table)], owners)
-            _insert(session, table, (_renamed(checked, table, row, ids) | sent for row in rows))
+            arriving = (_renamed(table, _arriving(found, table, row, now), ids) for row in found.rows(source, table))
+            _insert(session, table, (row | sent.get(table, {}) for row in arriving), found.at_once)
     archives.forget_deletions(session, ids.values())
-    arrived = tuple(ids[old] for old in checked.experiments)
-    for id_ in arrived:
+    experiments = tuple(ids[old] for old in found.experiments)
+    for id_ in experiments:
         note(session, EventKind.IMPORTED, id_)
-    settle(session, arrived)
-    return ImportRead(
-        study=ids[checked.study],
-        experiments=arrived,
-        renamed=renamed,
-        called_off=tuple(
-            ids[old] for old, row in checked.experiments.items() if not (State(row["state"]).ended or _goes_on(row))
-        ),
-    )
+    settle(session, experiments)
+    called_off = tuple(ids[old] for old in found.called_off)
+    return ImportRead(study=ids[found.study], experiments=experiments, renamed=renamed, called_off=called_off)
 
 
-def _insert(session: Session, table: str, rows: Iterable[Row]) -> None:
+def _insert(session: Session, table: str, rows: Iterable[Row], at_once: int) -> None:
     try:
-        archives.insert_rows(session, table, rows)
+        archives.insert_rows(session, table, rows, at_once)
     except (*archives.Refused, KeyError) as error:
         raise InvalidArchive("its rows contradict each other: one occurs twice, or belongs to a missing row") from error
 
 
-def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetime) -> Row:
-    """Check a row; return it with the checked spec, and without the state of work that another service had begun."""
-    check_row(table, row, experiments)
-    row = dict(row)
-    if table == "experiment":
-        row["spec"] = experiments[row["id"]]["spec"]
-    if table == "attachment":
-        row["content"] = b""
-    goes_on = table not in _OF_NO_EXPERIMENT and _goes_on(experiments[owner_of(table, row)])
-    if table in {"experiment", "repetition"} and not State(row["state"]).ended:
-        resting = {"state": State.PAUSED if table == "experiment" else State.QUEUED}
-        row |= resting if goes_on else {"state": State.CANCELLED, "ended_at": now}
-    if table == "attempt" and row["ended_at"] is None:
-        row |= {"ending": Ending.HANDED_BACK if goes_on else Ending.CANCELLED, "ended_at": now}
+def _arriving(found: CheckedArchive, table: str, row: Row, now: datetime) -> Row:
+    """Return a row with what this service says about it: the checked spec, no forecasts, nothing that is under way."""
     if table == "request":
-        row |= {"safety": None}
-        row |= {"state": RequestState.WITHDRAWN, "ended_at": now} if row["state"] in PENDING else {}
-    return row
-
-
-def _goes_on(experiment: Row) -> bool:
-    return experiment["robot"] is not None and not State(experiment["state"]).ended
-
-
-def _renamed(checked: CheckedArchive, table: str, row: Row, ids: Mapping[str, str]) -> Row:
-    """Return a row under its ids here, that of a file with its content."""
-    if table == "attachment":
-        return row | {"content": checked.attachments[row["id"]].read_bytes()}
-    if table == "study":
-        return row | {"id": ids[row["id"]]}
+        withdrawn = {"state": RequestState.WITHDRAWN, "ended_at": now} if row["state"] in PENDING else {}
+        return row | {"safety": None} | withdrawn
     if table == "experiment":
-        row |= {"id": ids[row["id"]], "study_id": ids[row["study_id"]]}
-        spec, ended = spec_of(row["spec"]), State(row["state"]).ended
-        row |= {"hardware": hardware_of(spec), "paused_because": None if ended else "it was imported"}
-        row |= {} if ended else {"rollouts": expected_rollouts(spec)}
+        spec = found.experiments[row["id"]]["spec"]
+        known, over = spec_of(spec), is_over(row)
+        row |= {"spec": spec, "hardware": hardware_of(known), "paused_because": None if over else "it was imported"}
+        row |= {} if over else {"rollouts": expected_rollouts(known)}
+    return resting(table, row, found.on_bench, now)
+
+
+def _renamed(table: str, row: Row, ids: Mapping[str, str]) -> Row:
+    """Return a row under its ids here."""
+    if table in {"study", "experiment"}:
+        return row | {"id": ids[row["id"]]} | ({"study_id": ids[row["study_id"]]} if table == "experiment" else {})
     for name in {EXPERIMENT, "experiment_id"} & set(row):
         before, row[name] = row[name], ids[row[name]]
         if table in {"request", "answer"} and before != row[name]:

@@ -7,7 +7,6 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from itertools import groupby
 from math import inf
 from multiprocessing import get_context
@@ -65,7 +64,7 @@ def submitted_spec(file: IO[bytes]) -> dict[str, Any]:
         InvalidArchive: the file is damaged, or not an archive.
         Conflict: no single spec gives all experiments, or parameters of reality are hidden.
     """
-    with checked_archive(file, datetime.now(UTC)) as checked, checked.store.reading() as session:
+    with checked_archive(file) as checked, checked.store.reading() as session:
         whole = experiments.members(session, checked.study)
         specs = [row.spec for row in whole.experiments]
         found = shortest(whole.study.name, specs)
@@ -97,7 +96,7 @@ def verify(
         InvalidArchive: the file is damaged, or not an archive.
         NotFound: it has no such experiment or repetition.
     """
-    with checked_archive(file, datetime.now(UTC)) as checked, checked.store.reading() as session:
+    with checked_archive(file) as checked, checked.store.reading() as session:
         recorded = list(_recorded(session, checked, part))
         versions = _other_versions(session, checked)
     results: list[RepetitionRerun] = []

@@ -15,7 +15,7 @@ from sqlalchemy import select
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import AnswerState, DoubtsRead, MeasurementSpec, RequestState
 from gaplab.services.store.clock import moment
-from gaplab.services.store.models import AnswerRow, IterationRow, MeasurementRow, RepetitionRow, RequestRow
+from gaplab.services.store.models import LOG, AnswerRow, RepetitionRow, RequestRow, StepRow
 from gaplab.services.store.queries.benches import spellings
 from gaplab.services.store.queries.repetition_rows import of_experiments
 from gaplab.services.store.queries.requests import get, note_take
@@ -94,9 +94,7 @@ def _beside_known(values: Sequence[float], known: float) -> Iterator[str]:
 
 def _largest_known(session: Session, repetition: RepetitionRow, request: RequestRow) -> float:
     """Return the largest size of a fitness that is known from other requests of the experiment; 0 without any."""
-    row, measured = IterationRow, MeasurementRow
-    own = (measured.repetition_id == repetition.id) & (measured.iteration == request.iteration)
-    seen = of_experiments(measured, [repetition.experiment_id], measured.fitness).where(~own)
-    simulated = of_experiments(row, [repetition.experiment_id], row.simulated_fitness)
-    values = [*session.scalars(seen), *session.scalars(simulated)]
-    return max((abs(each) for each in values if each is not None), default=0.0)
+    row = StepRow
+    own = (row.repetition_id == repetition.id) & (row.iteration == request.iteration) & row.measured_by.is_not(None)
+    known = of_experiments(row, [repetition.experiment_id], row.fitness).where(row.branch == LOG, ~own)
+    return max(map(abs, session.scalars(known.where(row.fitness.is_not(None)))), default=0.0)

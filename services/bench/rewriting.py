@@ -1,34 +1,25 @@
 """Logs with a corrected measurement: its steps are rewritten, what follows is closed, and the repetition goes on."""
 
-from sqlalchemy import update
+from dataclasses import replace
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.measurements import RequestState
 from gaplab.services.bench import branches
 from gaplab.services.bench.consequences import recorded, samples_among
-from gaplab.services.core.arrays import known
 from gaplab.services.core.history import History
 from gaplab.services.core.probes import recorded_fitness
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.core.types import Measured, Probed
+from gaplab.services.core.types import Probed
 from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.running.waiting import step_of
 from gaplab.services.specs.measured import samples_of
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.store.models import (
-    AnswerRow,
-    ExperimentRow,
-    IterationRow,
-    MeasurementRow,
-    RepetitionRow,
-    RequestRow,
-)
-from gaplab.services.store.queries import requests
+from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
+from gaplab.services.store.queries import requests, steps
 from gaplab.services.store.queries.experiments import repetitions_of
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.queries.request_states import become
-from gaplab.services.store.queries.step_rows import measurement_columns
 from gaplab.services.store.session import Session
 
 
@@ -39,34 +30,23 @@ def apply(
     branch = None
     if samples := samples_among(recorded(session, request, repetition)):
         branch = branches.close(session, repetition, samples[0].place + 1, samples[0].iteration, reason)
+    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
     for each in recorded(session, request, repetition):
-        _rewrite(session, each, repetition, answer)
+        steps.rewrite(session, repetition.id, step_of(session, experiment, each, answer), answer.operator)
     _rewrite_records(session, repetition)
     _continue(session, repetition, closed=branch is not None)
     return branch
 
 
-def _rewrite(session: Session, request: RequestRow, repetition: RepetitionRow, answer: AnswerRow) -> None:
-    """Write an answer into the measurement of a step."""
-    experiment, row = session.get_one(ExperimentRow, repetition.experiment_id), MeasurementRow
-    step = step_of(session, experiment, request, answer)
-    assert isinstance(step, Measured | Probed)
-    of_it = (row.repetition_id == repetition.id) & (row.iteration == request.iteration) & (row.kind == request.kind)
-    columns = measurement_columns(step, answer.operator)
-    columns.pop("genome", None)
-    session.execute(update(row).where(of_it).values(columns))
-
-
 def _rewrite_records(session: Session, repetition: RepetitionRow) -> None:
     """Compute the recorded fitness of every iteration again from its probe and the samples so far."""
-    experiment, row = session.get_one(ExperimentRow, repetition.experiment_id), IterationRow
+    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
     history = History(samples=samples_of(spec_of(experiment.spec)))
     (log,) = logs(session, [repetition.id]).values()
     for step in log:
         if isinstance(step, Probed):
-            fitness = known(recorded_fitness(step.fitness, history.samples))
-            of_it = (row.repetition_id == repetition.id) & (row.number == step.iteration)
-            session.execute(update(row).where(of_it).values(recorded_fitness=fitness))
+            recorded = recorded_fitness(step.fitness, history.samples)
+            steps.rewrite(session, repetition.id, replace(step, recorded=recorded))
         history = history.after(step)
 
 

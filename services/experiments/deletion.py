@@ -23,11 +23,9 @@ from gaplab.services.store.models import (
     DeletionRow,
     ExperimentProvenanceRow,
     ExperimentRow,
-    IterationRow,
-    MeasurementRow,
     RepetitionRow,
     RequestRow,
-    SimulatorRow,
+    StepRow,
     StudyRow,
 )
 from gaplab.services.store.queries import attachments
@@ -40,9 +38,7 @@ _OF_REPETITIONS: tuple[type[Base], ...] = (
     AnswerRow,
     RequestRow,
     BranchRow,
-    MeasurementRow,
-    SimulatorRow,
-    IterationRow,
+    StepRow,
     CheckpointRow,
     AttemptRow,
 )

@@ -34,7 +34,9 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
     space = parameters_of(spec.tunables)
     discrepancy = discrepancy_of(row.spec)
     errors = tuple(
-        tunings.per_sample(each.squared_error, measured.tuned_until(each.repetition, each.iteration), discrepancy)
+        tunings.per_sample(
+            each.simulator.squared_error, measured.tuned_until(each.repetition, each.iteration), discrepancy
+        )
         for each in found
     )
     axes = [
@@ -42,7 +44,7 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
         *(
             Coordinate(
                 with_unit(spoken(tunable.name), [unit_of(tunable.name)]),
-                tuple(each.parameters[at] for each in found),
+                tuple(float(each.simulator.parameters[at]) for each in found),
                 float(space.lower[at]),
                 float(space.upper[at]),
             )

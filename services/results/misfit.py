@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from math import inf, nan
+from math import nan
 from statistics import fmean
 from typing import Any
 
@@ -107,19 +107,19 @@ def _tuning(
     tunables: Sequence[Mapping[str, Any]],
     discrepancy: Discrepancy,
 ) -> Tuning:
-    place = best.repetition, best.iteration
+    place, simulator = (best.repetition, best.iteration), best.simulator
     return Tuning(
-        parameters=frozen(best.parameters),
-        squared_error=inf if best.squared_error is None else best.squared_error,
+        parameters=simulator.parameters,
+        squared_error=simulator.squared_error,
         samples=measured.tuned_until(*place),
         simulated=nan if best.simulated is None else best.simulated,
         real=nan if best.real is None else best.real,
-        held_out_error=nan if best.held_out_error is None else best.held_out_error,
+        held_out_error=nan if simulator.held_out_error is None else simulator.held_out_error,
         held_out=measured.tested_until(*place),
-        interval=tunings.intervals(best.parameters, best.lower, best.upper, best.fit, tunables),
+        interval=tunings.intervals(simulator, tunables),
         posterior=posteriors.get(place),
         discrepancy=discrepancy,
-        fit=best.fit,
+        fit=simulator.fit,
     )
 
 

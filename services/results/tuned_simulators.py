@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.arrays import known
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.experiments import hiding
@@ -55,12 +56,12 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
     errors: dict[int, dict[int, float | None]] = defaultdict(dict)
     samples: dict[int, dict[int, int]] = defaultdict(dict)
-    for simulator in simulators:
-        at = simulator.iteration
-        count = measured.tuned_until(simulator.repetition, at)
+    for best in simulators:
+        at = best.iteration
+        count = measured.tuned_until(best.repetition, at)
         if at or count:
-            errors[at][simulator.repetition] = simulator.squared_error
-            samples[at][simulator.repetition] = count
+            errors[at][best.repetition] = known(best.simulator.squared_error)
+            samples[at][best.repetition] = count
     real = spec.reality.engine
     elsewhere = real is None or real.name != spec.engine.name
     return TunedSimulators(
@@ -70,7 +71,8 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
         ),
         dimensions=_dimensions(spec),
         simulators=tuple(
-            SimulatorPoint(each.repetition, each.iteration, tuple(each.parameters)) for each in simulators
+            SimulatorPoint(each.repetition, each.iteration, tuple(each.simulator.parameters.tolist()))
+            for each in simulators
         ),
         errors=errors,
         samples=samples,

@@ -32,7 +32,17 @@ def next_cursor(rows: Sequence[R], limit: int, cursor_of: Callable[[R], str]) ->
 
 
 def decode(cursor: str, columns: Sequence[Column], bound_to: str = "") -> Tuple:
-    """Return the key of a cursor, to compare with the columns that it was encoded from.
+    """Return the key of a cursor as SQL, to compare with the columns that it was encoded from.
+
+    Raises:
+        InvalidSpec: no page of this list gave the cursor; its pointer is `cursor`.
+    """
+    key = key_of(cursor, columns, bound_to)
+    return tuple_(*(literal(part, column.type) for part, column in zip(key, columns, strict=True)))
+
+
+def key_of(cursor: str, columns: Sequence[Column], bound_to: str = "") -> tuple[Any, ...]:
+    """Return the key of a cursor.
 
     Raises:
         InvalidSpec: no page of this list gave the cursor; its pointer is `cursor`.
@@ -42,17 +52,17 @@ def decode(cursor: str, columns: Sequence[Column], bound_to: str = "") -> Tuple:
         if bound != bound_to:
             message = "this cursor belongs to a list with other filters or order; leave it out for the first page"
             raise InvalidSpec([Violation("cursor", cursor, message)])
-        return tuple_(*(_part(part, column) for part, column in zip(parts, columns, strict=True)))
+        return tuple(_part(part, column) for part, column in zip(parts, columns, strict=True))
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
         message = "this is not a cursor of this service; leave it out for the first page"
         raise InvalidSpec([Violation("cursor", cursor, message)]) from error
 
 
-def _part(part: object, column: Column) -> ColumnElement[Any]:
+def _part(part: object, column: Column) -> object:
     kind = column.type.python_type
     value = datetime.fromisoformat(str(part)).astimezone(UTC) if kind is datetime else part
     if type(value) is not kind:
         raise TypeError(part)
     if (isinstance(value, int) and abs(value) >= 2**31) or (isinstance(value, str) and storable(value) != value):
         raise ValueError(part)
-    return literal(value, column.type)
+    return value

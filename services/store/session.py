@@ -8,10 +8,12 @@ from functools import cache, wraps
 from pathlib import Path
 from typing import Concatenate, ParamSpec, Self, TypeVar
 
-from sqlalchemy import StaticPool, create_engine, event, text
+from sqlalchemy import event, text
+from sqlalchemy.dialects import sqlite as sqlite_dialect
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session as Session
 from sqlalchemy.orm import sessionmaker
+from sqlalchemy.schema import CreateIndex, CreateTable, DDLElement
 
 from gaplab.services.core import robot_library
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
@@ -21,7 +23,7 @@ from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION, Base
 from gaplab.services.store.models.base import other_schema
 from gaplab.services.store.queries import events, robots
-from gaplab.services.store.sqlite_file import create, file_of, url_of
+from gaplab.services.store.sqlite_file import create, file_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -163,20 +165,26 @@ class Store:
         self._engine.dispose()
 
 
-@contextmanager
-def private_store(file: Path) -> Iterator[Store]:
-    """Open a new SQLite database in a file that the caller deletes, with the present tables, to compute privately."""
+def new_database(file: Path) -> None:
+    """Make a SQLite database in a new file, with the present tables."""
     create(file)
     file.write_bytes(_without_rows())
-    with Store(url_of(file)) as store:
-        yield store
 
 
 @cache
 def _without_rows() -> bytes:
-    """Return a SQLite database with the present tables, which are made once."""
+    """Return a SQLite database with the present tables, which are made once, and are the same bytes in any process."""
     with closing(sqlite3.connect(":memory:")) as connection:
-        Base.metadata.create_all(create_engine("sqlite://", creator=lambda: connection, poolclass=StaticPool))
+        for table in Base.metadata.sorted_tables:
+            indices = sorted(table.indexes, key=lambda index: str(index.name))
+            made: list[DDLElement] = [CreateTable(table), *map(CreateIndex, indices)]
+            for each in made:
+                connection.execute(str(each.compile(dialect=sqlite_dialect.dialect())))
+        connection.execute("CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)")
+        connection.execute("INSERT INTO alembic_version VALUES (?)", (REVISION,))
+        connection.execute("INSERT INTO event_counter (id, latest) VALUES (1, 0)")
+        connection.execute("INSERT INTO notifier (id) VALUES (1)")
+        connection.commit()
         return connection.serialize()
 
 

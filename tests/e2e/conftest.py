@@ -33,7 +33,7 @@ _CHROMIUM = pytest.StashKey[Chromium]()
 
 
 class Known(NamedTuple):
-    """What is in the database of `api` from the beginning, besides seventy made-up experiments in ten studies.
+    """What is in the database of `api` from the beginning, besides thirty made-up studies.
 
     Attributes:
         study: the id of a study that has ended, of the strategies of `CURVES`.
@@ -98,7 +98,7 @@ def known(written_file: Path, plugins: Path) -> Known:
     before = external_plugins.folders()
     external_plugins.set_folders((*before, plugins))
     store = Store(f"sqlite:///{written_file}")
-    fill(store, 70)
+    fill(store, 210)
     study = make(store, "a study", Study(CURVES, repetitions=4))
     strider = strode(store, iterations=2)
     cancel(store, submit_one(store, toy(name="given up")).id)
@@ -128,11 +128,11 @@ def written(written_file: Any) -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def archive(folder: Path, sqlite_template: Path) -> Iterator[Any]:
-    """The API on a database with seventy made-up experiments, a published study and a cancelled experiment."""
+    """The API on a database with thirty made-up studies, a published one and a cancelled experiment."""
     file = folder / "archive.db"
     shutil.copy(sqlite_template, file)
     store = Store(f"sqlite:///{file}")
-    fill(store, 70)
+    fill(store, 210)
     with STUDY.open("rb") as archived:
         import_archive(store, archived)
     cancel(store, submit_one(store, toy(name="given up")).id)

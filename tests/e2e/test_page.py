@@ -96,7 +96,7 @@ def test_killed_and_started_again_the_service_is_followed_by_pages_that_stayed_o
 def test_a_page_that_is_opened_before_its_service_answers_comes_by_itself(visit: Any, shared_service: Any) -> None:
     visit.forgive(*AWAY)
     page = visit(shared_service.url)
-    page.get_by_role("heading", name="Studies and experiments").wait_for()
+    page.get_by_role("heading", name="Studies", exact=True).wait_for()
     shared_service.stop()
     page.get_by_role("link", name="New study").first.click()
     page.get_by_role("heading", name="The service does not answer").wait_for()

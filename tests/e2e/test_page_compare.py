@@ -117,7 +117,7 @@ def test_what_differs_is_what_the_service_found(api: Any, known: Any, visit: Any
     page = visit(address(api, *known.ids, to="1"))
     matrix = page.locator("table.matrix")
     expect(page.get_by_text("The row against the column")).to_contain_text("after 1 real-world evaluation")
-    found = api.get("/comparisons", experiment=known.ids, **{"from": 1, "to": 1})
+    found = api.get("/comparisons", study=known.ids, **{"from": 1, "to": 1})
     for pair in found:
         row, column = known.ids.index(pair["first"]), known.ids.index(pair["second"])
         here = matrix.locator("tbody tr").nth(row).locator("td").nth(column)
@@ -169,9 +169,8 @@ def test_a_pair_that_shares_random_streams_is_marked_and_a_margin_is_judged(
 
 @pytest.mark.release
 def test_what_should_not_be_compared_is_warned_of(archive: Any, ids: Any, visit: Any) -> None:
-    toys = archive.get("/experiments", text="experiment", limit=10)["items"]
-    other = next(each for each in toys if each["spec"]["robot"]["name"] == "toy_function")
-    page = visit(address(archive, ids[0], other["id"]))
+    (toys,) = archive.get("/studies", q="robot = toy_function", limit=1)["items"]
+    page = visit(address(archive, ids[0], toys["experiments"][0]["id"]))
     warned = page.locator(".remark.warned")
     expect(warned).to_contain_text("Different robots: A: quadruped; B: toy_function")
     expect(warned).to_contain_text("Different realities")
@@ -190,7 +189,8 @@ def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api: Any, written: S
 
 @pytest.mark.release
 def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive: Any, visit: Any) -> None:
-    many = [each["id"] for each in archive.get("/experiments", limit=60)["items"]]
+    studies = archive.get("/studies", limit=30)["items"]
+    many = [each["id"] for study in studies for each in study["experiments"]][:60]
     page = visit(address(archive, *many))
     expect(page.locator(".chosen li")).to_have_count(60)
     page.locator(".large").scroll_into_view_if_needed()  # what is out of sight is loaded once it is seen

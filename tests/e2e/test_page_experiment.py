@@ -21,8 +21,8 @@ NAME = "simulated_fit"
 @pytest.fixture
 def ended(archive: Any) -> Any:
     """The address of an experiment that has everything."""
-    found = archive.get("/experiments", text=NAME, strategy=NAME, limit=500)["items"]
-    return next(each for each in found if each["spec"]["robot"]["name"] == "quadruped")
+    (study,) = archive.get("/studies", q=f"robot = quadruped and strategy = {NAME}")["items"]
+    return next(each for each in study["experiments"] if each["strategy"] == NAME)
 
 
 def address(api: Any, experiment: Any, **query: Any) -> str:

@@ -36,7 +36,7 @@ def test_every_view_can_be_used_in_light_in_dark_and_on_a_phone(
     page = visit(api.url, width=1440)
     for view, ready in {
         "": ".list tbody tr",
-        "#/?show=experiments&state=CANCELLED": ".list tbody tr",
+        "#/?state=CANCELLED": ".list tbody tr",
         f"#/studies/{known.study}": ".plot .scatterlayer .trace",
         f"#/experiments/{known.ids[0]}": ".figure-curves .point",
         f"#/compare?experiments={','.join(known.ids)}": ".large .scatterlayer .trace",
@@ -85,17 +85,16 @@ def test_studies_are_found_opened_ticked_and_compared(visit: Any, api: Any, know
     assert page.locator("tr.study").count() == 1
 
 
-def test_experiments_are_filtered_sorted_and_shown_page_by_page(visit: Any, api: Any) -> None:
+def test_studies_are_filtered_sorted_and_shown_page_by_page(visit: Any, api: Any) -> None:
     page = visit(api.url)
-    page.get_by_role("button", name="Experiments", exact=True).click()
-    page.locator("tr.experiment").nth(19).wait_for()
-    assert page.locator("tr.experiment").count() == 20
+    page.locator("tr.study").nth(19).wait_for()
+    assert page.locator("tr.study").count() == 20
 
     page.get_by_role("button", name="Show more").click()
-    page.locator("tr.experiment").nth(59).wait_for()
+    page.locator("tr.study").nth(29).wait_for()
     page.get_by_label("State").select_option("CANCELLED")
-    page.locator("tr.experiment", has_text="completed").first.wait_for(state="detached")
-    assert page.locator("tr.experiment").count() == page.locator("tr.experiment .cancelled").count() > 0
+    page.locator("tr.study", has_text="completed").first.wait_for(state="detached")
+    assert page.locator("tr.study").count() == page.locator("tr.study .cancelled").count() > 0
     page.get_by_label("State").select_option("PAUSED")
     page.get_by_label("Strategy").select_option("known_fit")
     page.get_by_text("Nothing fits these filters").wait_for()
@@ -104,7 +103,7 @@ def test_experiments_are_filtered_sorted_and_shown_page_by_page(visit: Any, api:
     page.locator(".list tbody tr").nth(5).wait_for()
 
 
-def test_what_is_submitted_and_cancelled_elsewhere_is_seen_also_without_a_study(
+def test_what_is_submitted_and_cancelled_elsewhere_is_seen_also_a_single_experiment(
     visit: Any, api: Any, written: Store
 ) -> None:
     page = visit(f"{api.url}/#/nowhere")
@@ -116,9 +115,9 @@ def test_what_is_submitted_and_cancelled_elsewhere_is_seen_also_without_a_study(
     submit_one(written, toy(name="all alone"))
     row = page.locator("tr.study", has_text="from elsewhere")
     row.locator(".queued").wait_for()
-    alone = page.locator("tr.experiment", has=page.get_by_role("link", name="all alone"))
-    alone.get_by_text("Single experiment").wait_for()
-    assert page.get_by_role("button", name="All", exact=True).get_attribute("aria-pressed") == "true"
+    alone = page.locator("tr.study", has=page.get_by_role("link", name="all alone"))
+    alone.get_by_text("Simulated fit").wait_for()
+    assert alone.get_by_role("button").count() == 0
     api.http.post(f"/studies/{made}/cancel")
 
     row.locator(".cancelled").wait_for()
@@ -264,7 +263,7 @@ def test_the_line_for_curl_is_one_that_every_shell_takes(visit: Any, api: Any, k
 
     call = page.locator(".calls code").first.text_content()
 
-    assert call == f"curl '{api.url}/studies/{known.study}/curves?format=csv'"
+    assert call == f"curl '{api.url}/curves?study={known.study}&format=csv'"
 
 
 @pytest.mark.release

@@ -43,28 +43,28 @@ def test_what_was_typed_just_before_one_left_does_not_change_the_address_of_anot
 
 @pytest.mark.release
 def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit: Any, archive: Any) -> None:
-    page = visit(f"{archive.url}/#/?show=experiments")
-    page.locator("tr.experiment").nth(19).wait_for()
+    page = visit(archive.url)
+    page.locator("tr.study").nth(19).wait_for()
     late = []
-    page.route("**/experiments?*cursor=*", lambda route: late.append(route))
+    page.route("**/studies?*cursor=*", lambda route: late.append(route))
 
     page.get_by_role("button", name="Show more").click()
     page.get_by_label("Search by words or a query").fill("nothing is called so")
     page.get_by_text("Nothing fits these filters.").wait_for()
     (asked,) = late
-    with page.expect_response("**/experiments?*cursor=*"):
+    with page.expect_response("**/studies?*cursor=*"):
         asked.continue_()
     page.wait_for_timeout(200)
 
-    assert page.locator("tr.experiment").count() == 0
+    assert page.locator("tr.study").count() == 0
 
 
 @pytest.mark.release
 def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_presses(
     visit: Any, archive: Any
 ) -> None:
-    found = archive.get("/experiments", text="simulated_fit", strategy="simulated_fit", limit=500)["items"]
-    ended = next(each["id"] for each in found if each["spec"]["robot"]["name"] == "quadruped")
+    (study,) = archive.get("/studies", q="robot = quadruped and strategy = simulated_fit")["items"]
+    ended = next(each["id"] for each in study["experiments"] if each["strategy"] == "simulated_fit")
     page = visit(f"{archive.url}/#/experiments/{ended}?tab=samples")
     more, events = page.get_by_role("button", name="Earlier"), page.locator(".events li")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
@@ -154,35 +154,35 @@ def test_a_page_that_no_longer_holds_is_loaded_again(visit: Any, api: Any, statu
 @pytest.mark.release
 def test_a_list_that_did_not_come_is_not_said_to_be_empty_and_comes_by_itself(visit: Any, archive: Any) -> None:
     visit.forgive("ERR_FAILED")
-    page = visit(f"{archive.url}/#/?show=experiments")
-    page.locator("tr.experiment").nth(19).wait_for()
+    page = visit(archive.url)
+    page.locator("tr.study").nth(19).wait_for()
 
-    page.route("**/experiments?*", lambda route: route.abort())
+    page.route("**/studies?*", lambda route: route.abort())
     page.get_by_label("State").select_option("CANCELLED")
     page.get_by_role("heading", name="The service does not answer").wait_for()
-    assert page.locator("tr.experiment").count() == 0
+    assert page.locator("tr.study").count() == 0
     assert page.get_by_text("Nothing fits these filters").count() == 0
-    page.unroute("**/experiments?*")
+    page.unroute("**/studies?*")
 
-    page.locator("tr.experiment").first.wait_for()
+    page.locator("tr.study").first.wait_for()
     page.get_by_role("heading", name="The service does not answer").wait_for(state="detached")
 
 
 @pytest.mark.release
 def test_more_of_a_list_that_does_not_come_is_said_and_asked_for_again(visit: Any, archive: Any) -> None:
     visit.forgive("500")
-    page = visit(f"{archive.url}/#/?show=experiments")
-    page.locator("tr.experiment").nth(19).wait_for()
+    page = visit(archive.url)
+    page.locator("tr.study").nth(19).wait_for()
 
     busy = {"status": 500, "title": "Busy"}
-    page.route("**/experiments?*cursor=*", lambda route: route.fulfill(status=500, json=busy))
+    page.route("**/studies?*cursor=*", lambda route: route.fulfill(status=500, json=busy))
     page.get_by_role("button", name="Show more").click()
     page.get_by_role("heading", name="Busy").wait_for()
-    assert page.locator("tr.experiment").count() == 20
-    page.unroute("**/experiments?*cursor=*")
+    assert page.locator("tr.study").count() == 20
+    page.unroute("**/studies?*cursor=*")
     page.get_by_role("button", name="Try again").click()
 
-    page.locator("tr.experiment").nth(59).wait_for()
+    page.locator("tr.study").nth(29).wait_for()
     page.get_by_role("heading", name="Busy").wait_for(state="detached")
 
 

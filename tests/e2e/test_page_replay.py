@@ -34,14 +34,14 @@ def walker(archive: Any) -> Any:
 @pytest.fixture(scope="module")
 def function(archive: Any) -> Any:
     """The id of an experiment on the toy function."""
-    found = archive.get("/experiments", strategy="simulated_fit", state="COMPLETED", limit=500)["items"]
-    return next(each["id"] for each in found if each["spec"]["robot"]["name"] == "toy_function")
+    (study,) = archive.get("/studies", q="robot = toy_function and experiment_state = COMPLETED", limit=1)["items"]
+    return study["experiments"][0]["id"]
 
 
 def of_the_study(archive: Any, strategy: Any) -> Any:
     """The experiment of the walking robot, whatever other tests have stored beside it."""
-    found = archive.get("/experiments", strategy=strategy, limit=500)["items"]
-    return next(each["id"] for each in found if each["spec"]["robot"]["name"] == "quadruped")
+    (study,) = archive.get("/studies", q=f"robot = quadruped and strategy = {strategy}")["items"]
+    return next(each["id"] for each in study["experiments"] if each["strategy"] == strategy)
 
 
 def replay(

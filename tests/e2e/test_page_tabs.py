@@ -33,7 +33,7 @@ def test_however_many_tabs_are_open_each_shows_its_list(visit: Any, archive: Any
 def test_a_tab_that_nobody_sees_lets_go_of_its_stream_and_catches_up_when_somebody_does(visit: Any, api: Any) -> None:
     page = visit(f"{api.url}/#/toy")
     with page.expect_response(lambda answer: is_stream(answer.request)):
-        page.get_by_role("link", name="Experiments").first.click()
+        page.get_by_role("link", name="Studies").first.click()
     page.locator("tr.study").first.wait_for()
     with page.expect_event("requestfailed", is_stream):
         page.evaluate(SEEN, False)

@@ -20,7 +20,7 @@ def address(api: Any, experiment: Any) -> str:
 def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api: Any, written: Store, visit: Any) -> None:
     submitted = submit_one(written, toy())
     page = visit(address(api, submitted.id))
-    verbs = page.get_by_role("group", name="Actions on this experiment")
+    verbs = page.get_by_role("group", name="Actions")
     state = page.locator(".state-now")
     verbs.get_by_role("button", name="Resume").press("Enter")
     expect(page.locator(".life-cycle .outcome").first).to_contain_text(

@@ -2,9 +2,8 @@
 
 import json
 import re
-import zipfile
+import sqlite3
 from hashlib import sha256
-from io import BytesIO
 from typing import Any
 
 import pytest
@@ -22,9 +21,8 @@ from gaplab.services.experiments.submission import submit
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.session import Store
-from tests.archiving import exported, imported
+from tests.archiving import changed, exported, imported, loose, rows
 from tests.experiments import listed, submit_one
-from tests.integration.test_archives_bad import packed, set_in, with_table
 from tests.integration.test_bench import bench, compute, measure, pending
 
 PHOTO, TRACE = b"\xff\xd8 a photograph" * 9_000, b"time_s,x\n0,1\n"
@@ -50,11 +48,6 @@ def measured(store: Store) -> Any:
     return experiment.id, files
 
 
-def members_of(archive: bytes) -> dict[str, bytes]:
-    with zipfile.ZipFile(BytesIO(archive)) as opened:
-        return {name: opened.read(name) for name in opened.namelist()}
-
-
 @pytest.mark.dialects
 def test_what_was_exported_and_deleted_comes_back_with_its_files(store: Store, other: Store) -> None:
     experiment, files = measured(store)
@@ -69,11 +62,8 @@ def test_what_was_exported_and_deleted_comes_back_with_its_files(store: Store, o
         assert [attachments.read_attachment(place, each) for each in files] == before
         assert exported(export(place, experiment)) == archive
 
-    manifest = json.loads(members_of(archive)["manifest.json"])["members"]
-    named = {name for name in manifest if name.startswith("attachments/")}
-    assert named == {f"attachments/{each}" for each in files}
-    assert all(manifest[f"attachments/{each}"]["sha256"] == each for each in files)
-    assert manifest["attachment.parquet"]["rows"] == 2
+    content = rows(archive, "SELECT id, content FROM attachment")
+    assert {each["id"]: sha256(each["content"]).hexdigest() for each in content} == {each: each for each in files}
     delete(other, experiment, Deleter(None))
     assert stored(other) == set()
 
@@ -102,30 +92,34 @@ def test_a_study_has_the_files_of_all_its_experiments_once(sqlite_store: Store) 
 
     archive = exported(export(sqlite_store, study.id))
 
-    assert [name for name in members_of(archive) if name.startswith("attachments/")] == [
-        f"attachments/{each}" for each in sorted([shared, *own])
-    ]
+    assert [each["id"] for each in rows(archive, "SELECT id FROM attachment")] == sorted([shared, *own])
     assert imported(sqlite_store, archive).study != study.id
 
 
 @pytest.fixture
-def good(sqlite_store: Store) -> dict[str, bytes]:
-    """The members of an archive with files; the database has it no more."""
+def good(sqlite_store: Store) -> bytes:
+    """An archive with files, in tables that any value can be written into; the database has it no more."""
     experiment, _ = measured(sqlite_store)
     archive = exported(export(sqlite_store, experiment))
     delete(sqlite_store, experiment, Deleter(None))
-    return members_of(archive)
+    return loose(archive)
 
 
-def with_file(members: dict[str, bytes], name: str, content: bytes | None) -> bytes:
-    """An archive with another content of a member, whose manifest is true; without the member if there is none."""
-    manifest = json.loads(members["manifest.json"])
-    changed = {each: old for each, old in members.items() if each != name}
-    manifest["members"].pop(name, None)
-    if content is not None:
-        changed[name] = content
-        manifest["members"][name] = {"sha256": sha256(content).hexdigest(), "bytes": len(content), "rows": 0}
-    return packed(changed | {"manifest.json": json.dumps(manifest).encode()}, honest=False)  # type: ignore[no-any-return]
+def with_file(archive: bytes, id_: str, content: object) -> bytes:
+    """An archive with another content of a file."""
+
+    def change(connection: sqlite3.Connection) -> None:
+        connection.execute("DELETE FROM attachment WHERE id = ?", (id_,))
+        row = {
+            "id": id_,
+            "name": "x",
+            "media_type": "x/y",
+            "content": content,
+            "created_at": "2026-01-01 00:00:00.000000",
+        }
+        connection.execute("INSERT INTO attachment VALUES (:id, :name, :media_type, :content, :created_at)", row)
+
+    return changed(archive, change)
 
 
 def refused(store: Store, archive: bytes, what: str) -> None:
@@ -136,48 +130,47 @@ def refused(store: Store, archive: bytes, what: str) -> None:
 
 
 def of(content: bytes) -> str:
-    return f"attachments/{sha256(content).hexdigest()}"
+    return sha256(content).hexdigest()
 
 
-def test_a_file_that_does_not_fit_its_hash_is_refused(sqlite_store: Store, good: dict[str, bytes]) -> None:
-    refused(sqlite_store, with_file(good, of(PHOTO), b"forged"), f"content of {of(PHOTO)} has another hash")
-    refused(sqlite_store, packed(good | {of(TRACE): b"forged"}, honest=False), "differs from the manifest")
+def test_a_file_that_does_not_fit_its_hash_is_refused(sqlite_store: Store, good: bytes) -> None:
+    for content in (b"forged", PHOTO[:-1], PHOTO + b" "):
+        refused(
+            sqlite_store, with_file(good, of(PHOTO), content), f"content of the attachment '{of(PHOTO)}' has another"
+        )
+    for value in (5, "text", b"", bytes(20_000_001), None):
+        refused(sqlite_store, with_file(good, of(PHOTO), value), "has not 1 to 20,000,000 bytes")
 
 
-def test_a_file_without_a_row_or_a_row_without_a_file_is_refused(sqlite_store: Store, good: dict[str, bytes]) -> None:
-    refused(sqlite_store, with_file(good, of(PHOTO), None), "has a row or a file, but not both")
-    refused(sqlite_store, with_file(good, of(b"more"), b"more"), "has a row or a file, but not both")
-    refused(sqlite_store, with_file(good, "attachments/../x", b"x"), "unknown member")
+def test_a_file_that_no_answer_names_or_that_is_missing_is_refused(sqlite_store: Store, good: bytes) -> None:
+    names = "UPDATE answer SET attachments = '{}'"
 
-
-def test_a_file_that_no_answer_names_is_refused(sqlite_store: Store, good: dict[str, bytes]) -> None:
-    (answer,) = map(json.loads, good["answer.jsonl"].splitlines())
-
-    for names, what in (
-        ([sha256(TRACE).hexdigest()], "no answer names"),
-        ([{}], "answer, row 1, attachments/0: item 0 of attachments must be text"),
+    for archive, what in (
+        (
+            changed(good, f"DELETE FROM attachment WHERE id = '{of(PHOTO)}'"),
+            f"'{of(PHOTO)}' is in the archive or named",
+        ),
+        (
+            with_file(good, of(b"more"), b"more"),
+            f"'{of(b'more')}' is in the archive or named by an answer, but not both",
+        ),
+        (changed(good, names.format(json.dumps([of(TRACE)]))), "is in the archive or named by an answer, but not both"),
+        (changed(good, names.format("[{}]")), "attachments/0: item 0 of attachments must be text"),
+        (changed(good, names.format("[5]")), "attachments/0: item 0 of attachments must be text"),
+        (changed(good, names.format("7")), "attachments: attachments must be a list"),
+        (changed(good, names.format("{}")), "attachments: attachments must be a list"),
     ):
-        changed = json.dumps(answer | {"attachments": names}).encode() + b"\n"
-        refused(sqlite_store, packed(good | {"answer.jsonl": changed}), what)
+        refused(sqlite_store, archive, re.escape(what))
 
 
-def test_more_files_than_are_permitted(
-    sqlite_store: Store, good: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_more_files_than_are_permitted(sqlite_store: Store, good: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     for limit, most, what in (
-        ("MOST_BYTES_OF_FILES", 100_000, "its attachments have 135,013 bytes; 100,000 are permitted"),
-        ("MOST_FILES", 1, "it has 2 attachments; 1 are permitted: export its experiments one by one"),
-        ("MOST_BYTES_OF_DIRECTORY", 100, "its directory has .* bytes; 100 are permitted"),
+        ("MOST_BYTES_OF_FILES", 100_000, "its attachments have more than 100,000 bytes"),
+        ("MOST_FILES", 1, "it has more than 1 attachments: export its experiments one by one"),
+        ("MOST_BYTES_OF_DIRECTORY", 50, "its directory has .* bytes; 50 are permitted"),
     ):  # each is looked at before those above it
         monkeypatch.setattr(opening, limit, most)
-        refused(sqlite_store, packed(good), what)
-
-
-def test_a_file_larger_than_one_that_is_stored(sqlite_store: Store, good: dict[str, bytes]) -> None:
-    large = bytes(20_000_001)
-
-    refused(sqlite_store, with_file(good, of(large), large), "has 20,000,001 bytes; 1 to 20,000,000 are permitted")
-    refused(sqlite_store, with_file(good, of(b""), b""), "has 0 bytes")
+        refused(sqlite_store, good, what)
 
 
 def test_an_archive_with_photographs_is_let_in_over_http(store: Store) -> None:
@@ -193,13 +186,15 @@ def test_an_archive_with_photographs_is_let_in_over_http(store: Store) -> None:
         assert api.get(f"/attachments/{photo}").content == PHOTO
 
 
-def changed(members: dict[str, bytes], table: str, **values: Any) -> bytes:
-    """An archive with other values in the first row of a table."""
-    if f"{table}.parquet" in members:
-        return packed(with_table(members, table, lambda rows: set_in(rows, 0, **values)))  # type: ignore[no-any-return]
-    first, *others = members[f"{table}.jsonl"].splitlines()
-    lines = [json.dumps(json.loads(first) | values).encode(), *others, b""]
-    return packed(members | {f"{table}.jsonl": b"\n".join(lines)})  # type: ignore[no-any-return]
+def with_values(archive: bytes, table: str, **values: Any) -> bytes:
+    """An archive with other values in a table, lists and objects as JSON."""
+
+    def change(connection: sqlite3.Connection) -> None:
+        for name, value in values.items():
+            stored = json.dumps(value) if isinstance(value, dict | list) else value
+            assert connection.execute(f"UPDATE [{table}] SET [{name}] = ?", (stored,)).rowcount
+
+    return changed(archive, change)
 
 
 BAD: list[tuple[str, dict[str, Any], str]] = [
@@ -207,8 +202,10 @@ BAD: list[tuple[str, dict[str, Any], str]] = [
     ("request", {"safety": {"failed": 0}}, "request, row 1, safety/simulators: simulators is missing"),
     ("request", {"genome": [0.5, 0.5]}, "/genome: a controller of the toy_function has 1 genes, not 2"),
     ("request", {"genome": [500.0]}, "/genome/0: gene 0 must be from 0 to 1, not 500"),
-    ("measurement", {"genome": [500.0]}, "/genome/0: gene 0 must be from 0 to 1, not 500"),
-    ("iteration", {"transferred_genome": [-0.1]}, "/genome/0: gene 0 must be from 0 to 1, not -0.1"),
+    ("step", {"body": {"genome": [500.0]}}, "/genome/0: gene 0 must be from 0 to 1, not 500"),
+    ("step", {"body": {"genome": [-0.1]}}, "/genome/0: gene 0 must be from 0 to 1, not -0.1"),
+    ("request", {"genome": "{}"}, "genome: genome must be a list"),
+    ("request", {"created_at": "x"}, "request, row 1 has a value that its column does not permit"),
     ("answer", {"values": []}, "answer, row 1, values: values must have at least 1 item"),
     ("answer", {"readings": [[0.1]]}, "answer, row 1, readings/0/0: item 0 of readings must be a list"),
     ("answer", {"readings": [[[0.1]]]}, "/readings/0: repeat 0 has 1 rows, and the sensors are read at 0 times"),
@@ -220,15 +217,14 @@ BAD: list[tuple[str, dict[str, Any], str]] = [
 ]
 
 
-def test_whatever_a_request_later_reads_is_checked_when_it_arrives(sqlite_store: Store, good: dict[str, bytes]) -> None:
+def test_whatever_a_request_later_reads_is_checked_when_it_arrives(sqlite_store: Store, good: bytes) -> None:
     for table, values, what in BAD:
-        refused(sqlite_store, changed(good, table, **values), re.escape(what))
+        refused(sqlite_store, with_values(good, table, **values), re.escape(what))
 
 
 def test_what_goes_on_here_stays_within_the_limits_of_a_submission(sqlite_store: Store, other: Store) -> None:
     experiment = submit_one(sqlite_store, bench(repetitions=2, budget={"controller_evaluations": 10**7})).id
-    members = members_of(exported(export(sqlite_store, experiment)))
-    archive = changed(members, "experiment", rollouts=2**47)
+    archive = with_values(exported(export(sqlite_store, experiment)), "experiment", rollouts=2**47)
     expected = read_experiment(sqlite_store, experiment).progress.rollouts
 
     refused = {

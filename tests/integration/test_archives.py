@@ -1,29 +1,30 @@
 """Out of one database and into another: the same to the last bit, whatever the databases and the numbers."""
 
 import json
+import sqlite3
 import tracemalloc
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from math import copysign, inf, nan
+from pathlib import Path
 from threading import Barrier
 from types import SimpleNamespace
 from typing import Any
-from zipfile import ZipFile
 
 import numpy as np
-import pyarrow.parquet
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import insert
 
+from gaplab import migrations
 from gaplab.schemas.lifecycle import Ending, ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export, import_archive
 from gaplab.services.archives import reading as importing
-from gaplab.services.archives.columns import EXPORTED
 from gaplab.services.archives.consistency import check_logs
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
@@ -34,10 +35,10 @@ from gaplab.services.results import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, StepRow
 from gaplab.services.store.queries.attempts import attempts_of
 from gaplab.services.store.session import Store
-from tests.archiving import exported, imported
+from tests.archiving import database_of, dump, exported, imported, packed, rows
 from tests.experiments import AWKWARD, cancel, listed, run, some_log, submit_one, toy
 
 EVERY = settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -253,9 +254,7 @@ def test_reality_is_hidden_until_its_study_has_ended(store: Store, other: Any, e
     archives = [exported(export(store, study.id)), exported(export(store, study.experiments[0].id))]
 
     for archive in archives:
-        with ZipFile(BytesIO(archive)) as opened:
-            everything = b"".join(opened.read(name) for name in opened.namelist())
-        assert (b"0.98765" in everything) is ended
+        assert ("0.98765" in dump(archive)) is ended
         stored = imported(other, archive)
         first = stored.experiments[0]
         found = reading.read_experiment(other, first).spec["reality"]["parameters"]["static_friction"]
@@ -276,24 +275,65 @@ def test_an_export_is_of_one_moment_while_a_supervisor_writes(store: Store, othe
         archive.file.close()
 
 
-def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store: Store) -> None:
+def test_whoever_opens_an_archive_finds_tables_and_specs(sqlite_store: Store) -> None:
     submitted = finished(sqlite_store)
+    archive = exported(export(sqlite_store, submitted))
 
-    with ZipFile(BytesIO(exported(export(sqlite_store, submitted)))) as opened:
-        measurements = pyarrow.parquet.read_table(BytesIO(opened.read("measurement.parquet"))).to_pylist()
-        (curve,) = json.loads(opened.read("curves.json"))
-        (row,) = map(json.loads, opened.read("experiment.jsonl").splitlines())
-        manifest = json.loads(opened.read("manifest.json"))
+    (row,) = rows(archive, "SELECT * FROM experiment")
+    measured = rows(archive, "SELECT * FROM step WHERE kind IN ('measured', 'probed')")
 
-    samples = reading.list_samples(sqlite_store, submitted).items
-    assert len(measurements) == len(samples)
-    sample = next(each for each in measurements if each["kind"] == "sample")
-    assert np.array_equal(sample["genome"], AWKWARD)
-    assert copysign(1, sample["genome"][6]) == -1  # that zero is negative
-    assert curve["points"][0]["n"] == 3
-    assert row["spec"]["strategy"]["name"] == "simulated_fit"
-    assert {"owner", "heartbeat_at"}.isdisjoint(row)
-    assert {name.partition(".")[0] for name in manifest["members"]} == {*EXPORTED, "curves", "spec"}
+    assert len(measured) == len(reading.list_samples(sqlite_store, submitted).items)
+    genome = next(json.loads(each["body"])["genome"] for each in measured if each["kind"] == "measured")
+    assert np.array_equal(genome, AWKWARD)
+    assert copysign(1, genome[6]) == -1  # that zero is negative
+    assert json.loads(row["spec"])["strategy"]["name"] == "simulated_fit"
+    assert {each["owner"] for each in rows(archive, "SELECT owner FROM repetition")} == {None}
+
+
+def test_the_database_of_an_archive_is_the_same_in_any_process(sqlite_store: Store) -> None:
+    """SQLAlchemy has the indices of a table in a set, and so in any order."""
+    archive = exported(export(sqlite_store, finished(sqlite_store)))
+
+    made = rows(archive, "SELECT tbl_name, name FROM sqlite_master WHERE type = 'index' AND sql IS NOT NULL")
+
+    for table in {each["tbl_name"] for each in made}:
+        names = [each["name"] for each in made if each["tbl_name"] == table]
+        assert names == sorted(names)
+
+
+def test_a_service_opens_the_database_of_an_archive(sqlite_store: Store, tmp_path: Path) -> None:
+    submitted = finished(sqlite_store)
+    archive = exported(export(sqlite_store, submitted))
+    (tmp_path / "study.sqlite3").write_bytes(database_of(archive))
+
+    migrations.upgrade(f"sqlite:///{tmp_path / 'study.sqlite3'}")
+    with Store(f"sqlite:///{tmp_path / 'study.sqlite3'}") as opened:
+        opened.check()
+        assert shown(opened, submitted) == shown(sqlite_store, submitted)
+        assert exported(export(opened, submitted)) == archive
+        assert submission.submit(opened, toy()).id != submitted
+
+
+def test_an_archive_of_an_earlier_version_is_migrated(store: Store, other: Store, tmp_path: Path) -> None:
+    """At revision 0004 this experiment had no study."""
+    submitted = finished(store)
+    (tmp_path / "now.db").write_bytes(database_of(exported(export(store, submitted))))
+    migrations.upgrade(f"sqlite:///{tmp_path / 'earlier.db'}", to="0004")
+    with closing(sqlite3.connect(tmp_path / "earlier.db")) as earlier:
+        earlier.execute("ATTACH ? AS now", (str(tmp_path / "now.db"),))
+        for table in ("provenance", "experiment", "experiment_provenance", "repetition", "step", "attempt"):
+            known = [
+                {name for _, name, *_ in earlier.execute(f"PRAGMA {of}.table_info({table})")} for of in ("main", "now")
+            ]
+            columns = ", ".join(f"[{name}]" for name in known[0] & known[1])
+            earlier.execute(f"INSERT INTO main.{table} ({columns}) SELECT {columns} FROM now.{table}")
+        earlier.execute("UPDATE main.experiment SET study_id = NULL")
+        earlier.commit()
+
+    stored = imported(other, packed((tmp_path / "earlier.db").read_bytes()))
+
+    assert (stored.study, stored.experiments) == (submitted, (submitted,))
+    assert shown(other, submitted) == shown(store, submitted)
 
 
 def test_attempts_go_with_it_and_none_goes_on(store: Store, other: Any) -> None:
@@ -394,11 +434,12 @@ def test_memory_does_not_grow_with_what_is_exported(sqlite_store: Store) -> None
     submitted = finished(sqlite_store, repetitions=1)
     with sqlite_store.transaction() as session:
         (repetition,) = session.query(RepetitionRow).all()
+        body = {"simulators": [{"parameters": [0.5] * 20, "squared_error": 1.0}]}
         many = [
-            {"repetition_id": repetition.id, "iteration": 0, "rank": rank, "parameters": [0.5] * 20}
-            for rank in range(10, 12_010)
+            {"repetition_id": repetition.id, "kind": "tuned", "iteration": at, "place": 5 * at, "body": body}
+            for at in range(10, 12_010)
         ]
-        session.execute(insert(SimulatorRow), many)
+        session.execute(insert(StepRow), many)
     export(sqlite_store, submitted).file.close()
     del many
 

@@ -1,12 +1,17 @@
 """Commands that read specs and archives from files, without a service: what a wrong file is answered with."""
 
 import json
+import sqlite3
 import zipfile
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from gaplab.api.commands.exit_codes import Exit
+from gaplab.services.archives.opening import DATABASE
+from gaplab.services.store.session import new_database
+from tests.archiving import packed
 from tests.commands import Gaplab
 
 GOOD = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
@@ -19,7 +24,7 @@ def good(tmp_path: Path) -> str:
     return str(file)
 
 
-def zipped(file: Path, text: str, member: str = "experiment.jsonl") -> bytearray:
+def zipped(file: Path, text: str, member: str = DATABASE) -> bytearray:
     """Write a zip with a member of this text, and return its bytes."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(member, text)
@@ -61,29 +66,48 @@ def test_a_damaged_an_encrypted_and_a_foreign_zip_are_sentences(gaplab: Gaplab, 
     file = tmp_path / "a.zip"
     content = zipped(file, "x" * 1000)
     damaged, encrypted, truncated = content.copy(), content.copy(), content.copy()
-    damaged[30 + len("experiment.jsonl")] = 0xFF
+    damaged[30 + len(DATABASE)] = 0xFF
     for header, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
         encrypted[encrypted.index(header) + flags] |= 1
     del truncated[-30:]
 
-    for bytes_, reason in ((damaged, "error"), (encrypted, "RuntimeError"), (truncated, "BadZipFile")):
+    for bytes_, reason in ((damaged, "error"), (truncated, "BadZipFile")):
         file.write_bytes(bytes_)
         said = gaplab("diff", str(file), good)
         assert said.code == Exit.INVALID
         assert said.err == f"gaplab: {file} is not an archive of gaplab: it is not a readable zip: {reason}\n"
-    zipped(file, "{}", "other.jsonl")
-    assert "it has no experiment.jsonl" in gaplab("diff", str(file), good).err
+    file.write_bytes(encrypted)
+    assert "study.sqlite3 is encrypted" in gaplab("diff", str(file), good).err
+    zipped(file, "{}", "other")
+    assert "it has other\n" in gaplab("diff", str(file), good).err
 
 
 def test_an_archive_with_a_spec_that_is_none_is_a_sentence(gaplab: Gaplab, good: str, tmp_path: Path) -> None:
     file = tmp_path / "a.zip"
-    for row in ('{"spec": 3}', '{"spec": {}}', "{}", "[1]", "{", '{"spec": {"reality": 1}}'):
-        zipped(file, row)
+    for spec in ("3", "{}", "[1]", "{", '{"reality": 1}', '"NaN"', "NaN"):
+        file.write_bytes(archive_of(tmp_path / "study.sqlite3", spec))
 
         said = gaplab("diff", str(file), good)
 
         assert said.code == Exit.INVALID
-        assert said.err == f"gaplab: {file} is not an archive of gaplab: a spec in its experiment.jsonl is damaged\n"
+        assert said.err.startswith(f"gaplab: {file} is not an archive of gaplab: ")
+        assert said.err.count("\n") == 1
+
+
+def archive_of(database: Path, spec: str) -> bytes:
+    """An archive with an experiment whose spec is this text."""
+    new_database(database)
+    study = {"id": "a", "name": "a", "edits": 0, "created_at": "2026-01-01 00:00:00.000000"}
+    experiment = {"id": "a", "study_id": "a", "position": 0, "name": "a", "strategy": "random", "state": "COMPLETED"}
+    experiment |= {"spec": spec, "spec_version": 1, "iterations": 1, "rollouts": 1, "precedence": 0, "running": 0}
+    experiment |= {"claimable": 0, **dict.fromkeys(("turn_at", "created_at"), study["created_at"])}
+    with closing(sqlite3.connect(database)) as connection:
+        for table, row in (("study", study), ("experiment", experiment)):
+            connection.execute(
+                f"INSERT INTO {table} ({', '.join(row)}) VALUES ({', '.join('?' * len(row))})", [*row.values()]
+            )
+        connection.commit()
+    return packed(database.read_bytes())
 
 
 def test_a_file_that_is_no_archive_cannot_be_computed_again(gaplab: Gaplab, tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from zipfile import ZipFile
 import pytest
 from fastapi.testclient import TestClient
 from httpx2 import Response
-from pyarrow import parquet
 
 from gaplab.api.app import create_app
 from gaplab.schemas.access import Role
@@ -20,6 +19,7 @@ from gaplab.schemas.robots import EXAMPLE
 from gaplab.schemas.spec import StudySpec
 from gaplab.schemas.views import ViewSpec
 from gaplab.services.access import create_token
+from gaplab.services.archives.opening import DATABASE
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import saved_views, stored_robots, submission
 from gaplab.services.running import execution
@@ -27,6 +27,7 @@ from gaplab.services.settings import Limits
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
+from tests.archiving import dump
 
 HIDDEN = {"static_friction": 0.7319462853, "dynamic_friction": 0.2846190537}
 STUDY = {
@@ -104,15 +105,13 @@ def addresses(document: dict[str, Any], ids: dict[str, str]) -> Iterator[str]:
 
 
 def text_of(answer: Response) -> str:
-    """All that it says; of an archive, all that its members say."""
+    """All that it says; of an archive, all that its database says; of another zip, all that its members say."""
     if answer.headers["content-type"] != "application/zip":
         return answer.text
-    with ZipFile(BytesIO(answer.content)) as archive:
-        members = {name: archive.read(name) for name in archive.namelist()}
-    return "".join(
-        str(parquet.read_table(BytesIO(content)).to_pylist()) if name.endswith(".parquet") else content.decode()
-        for name, content in members.items()
-    )
+    with ZipFile(BytesIO(answer.content)) as opened:
+        if opened.namelist() == [DATABASE]:
+            return dump(answer.content)
+        return "".join(opened.read(name).decode() for name in opened.namelist())
 
 
 @pytest.mark.release

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,28 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, MetaData, inspect, select
+from sqlalchemy import Connection, MetaData, insert, inspect, select
 
 from gaplab import migrations
+from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.core.types import (
+    Cost,
+    Fit,
+    Measured,
+    Probed,
+    Sample,
+    Selected,
+    Simulator,
+    Step,
+    Transferred,
+    Tuned,
+)
 from gaplab.services.store.engine import WRITES, open_engine
-from gaplab.services.store.models import REVISION, Base, ExperimentRow, NotificationRow, StudyRow, ViewRow
+from gaplab.services.store.models import REVISION, Base, ExperimentRow, NotificationRow, StepRow, StudyRow, ViewRow
+from gaplab.services.store.queries.logs import is_whole, logs, unknown_branch
 from gaplab.services.store.session import Store
+from tests.experiments import same
 
 pytestmark = pytest.mark.dialects
 
@@ -56,11 +72,11 @@ def test_the_schema_goes_up_to_what_the_models_say_and_down_to_nothing(database_
         "ck_answer_state",
         "ck_attempt_ending",
         "ck_experiment_state",
-        "ck_measurement_kind",
         "ck_repetition_state",
         "ck_request_kind",
         "ck_request_state",
         "ck_sensitivity_state",
+        "ck_step_kind",
         "ck_token_role",
     ]
 
@@ -206,3 +222,119 @@ def test_a_store_at_another_revision_is_unavailable(store_url: str) -> None:
         store.check()
 
     store.dispose()
+
+
+MOMENT = datetime(2026, 11, 30, 12, tzinfo=UTC)
+SEEN = {"genome": [0.5], "fitness": 0.25, "readings": [0.1, None], "repeats": [0.2, 0.3], "measured_by": "Ada"}
+POSTERIOR = {"parameters": [0.1], "lower": [0.0], "upper": [0.2], "weight": 0.75, "held_out_error": 1.5}
+SELECTED = {"selected_genome": [-0.0], "selection_rollouts": 30, "selection_failures": 1, "selection_saved": 2}
+TUNED = {"tuning_rollouts": 60, "tuning_failures": 0, "tuning_saved": 4}
+TRANSFERRED = {"transferred_genome": [0.75], "simulated_fitness": 0.5}
+TRANSFERRED |= {"transfer_rollouts": 10, "transfer_failures": 3, "transfer_saved": 0}
+ITERATIONS: list[dict[str, Any]] = [
+    {"number": 0, **TUNED, **TRANSFERRED, "recorded_fitness": 0.3, "seconds": 7.0, "ended_at": MOMENT},
+    {"number": 1, **SELECTED, **TUNED, **TRANSFERRED, "recorded_fitness": 0.4, "seconds": 10.0, "ended_at": MOMENT},
+    {"number": 2, **SELECTED, "seconds": 3.0},
+]
+MEASUREMENTS: list[dict[str, Any]] = [
+    SEEN | {"iteration": 0, "kind": "probe", "genome": [0.75]},
+    SEEN | {"iteration": 1, "kind": "sample"},
+    {"iteration": 1, "kind": "probe", "genome": [0.75], "left_out": True, "measured_by": "nobody"},
+    SEEN | {"iteration": 2, "kind": "sample", "fitness": None, "repeats": None},
+]
+SIMULATORS: list[dict[str, Any]] = [
+    {"iteration": 0, "rank": 0, "parameters": [0.3], "squared_error": 0.0},
+    {"iteration": 1, "rank": 1, "parameters": [0.2], "squared_error": None},
+    {"iteration": 1, "rank": 0, "squared_error": 1e-300, **POSTERIOR, "fit": [1.0, 2.0, 3.0, None]},
+]
+CLOSED = [
+    {"kind": "transferred", "iteration": 1, "genome": [0.9], "simulated_fitness": None},
+    {"kind": "probed", "iteration": 1, "fitness": 0.1, "recorded_fitness": 0.2, "repeats": [0.1, 0.1]},
+    {"kind": "selected", "iteration": 2, "genome": [0.4]},
+    {"kind": "measured", "iteration": 2, "genome": [0.4], "fitness": None, "repeats": []},
+    {"kind": "tuned", "iteration": 2, "simulators": [{"parameters": [0.1], "squared_error": None}]},
+]
+LOG: list[Step] = [
+    Tuned(0, (Simulator(frozen([0.3]), 0.0),), Cost(60, 0, 4)),
+    Transferred(0, frozen([0.75]), 0.5, Cost(10, 3, 0)),
+    Probed(0, 0.25, 0.3, frozen([0.1, nan]), frozen([0.2, 0.3])),
+    Selected(1, frozen([-0.0]), Cost(30, 1, 2)),
+    Measured(1, Sample(frozen([0.5]), 0.25, frozen([0.1, nan]), frozen([0.2, 0.3]))),
+    Tuned(
+        1,
+        (
+            Simulator(frozen([0.1]), 1e-300, frozen([[0.0, 0.2]]), 0.75, 1.5, fit=Fit(1.0, 2.0, 3.0, frozen([nan]))),
+            Simulator(frozen([0.2]), inf),
+        ),
+        Cost(60, 0, 4),
+    ),
+    Transferred(1, frozen([0.75]), 0.5, Cost(10, 3, 0)),
+    Probed(1, nan, 0.4, left_out=True),
+    Selected(2, frozen([-0.0]), Cost(30, 1, 2)),
+    Measured(2, Sample(frozen([0.5]), nan, frozen([0.1, nan]))),
+]
+
+
+def fill_with_iterations(connection: Connection) -> None:
+    """Store an experiment without a study at revision 0003, whose only repetition has rows of each kind."""
+    found = MetaData()
+    found.reflect(connection)
+    experiment = {"id": "alone", "position": 0, "name": "alone", "strategy": "random", "state": "CANCELLED", "spec": {}}
+    experiment |= {"spec_version": 1, "iterations": 3, "rollouts": 1, "precedence": 0, "running": 0, "claimable": False}
+    experiment |= {"created_at": MOMENT, "turn_at": MOMENT}
+    repetition = {"id": 1, "experiment_id": "alone", "number": 0, "state": "CANCELLED", "steps": len(LOG), "epoch": 1}
+    repetition |= {"attempts": 1, "losses": 0, "iterations_done": 2, "rollouts_done": 1, "rollouts_failed": 0}
+    repetition |= {"rollouts_saved": 0, "seconds": 20.0}
+    branch = {"number": 1, "iteration": 1, "reason": "typed wrongly", "steps": CLOSED, "closed_at": MOMENT}
+    rows = {
+        "experiment": [experiment],
+        "repetition": [repetition],
+        "iteration": ITERATIONS,
+        "measurement": [{"measured_at": MOMENT, "left_out": False} | each for each in MEASUREMENTS],
+        "simulator": SIMULATORS,
+        "branch": [branch],
+    }
+    for name, some in rows.items():
+        of_it = {} if name in {"experiment", "repetition"} else {"repetition_id": 1}
+        for each in some:
+            connection.execute(insert(found.tables[name]).values(each | of_it))
+
+
+def test_iterations_become_a_log_of_steps(database_url: str) -> None:
+    migrations.upgrade(database_url, to="0003")
+    engine = open_engine(database_url).execution_options(**{WRITES: True})
+    with engine.begin() as connection:
+        fill_with_iterations(connection)
+    engine.dispose()
+
+    migrations.upgrade(database_url)
+
+    with Store(database_url) as store, store.reading() as session:
+        (log,) = logs(session, [1]).values()
+        rows = session.scalars(select(StepRow).order_by(StepRow.branch, StepRow.place)).all()
+        assert all(map(same, log, LOG))
+        assert len(log) == len(LOG)
+        assert is_whole(session, 1, len(LOG), 10)
+        assert unknown_branch(session) is None
+        assert [sum(each.seconds for each in rows if each.iteration == at) for at in range(3)] == pytest.approx(
+            [7, 10, 3]
+        )
+        assert [each.measured_by for each in rows if each.branch == 0 and each.measured_by] == ["Ada"] * 3
+        assert {each.at for each in rows if each.iteration < 2} == {MOMENT}
+        assert [(each.kind, each.iteration) for each in rows if each.branch == 1] == [
+            (each["kind"], each["iteration"]) for each in CLOSED
+        ]
+        assert [(each.fitness, each.recorded) for each in rows if each.branch == 1][:2] == [(None, None), (0.1, 0.2)]
+
+
+def test_a_log_of_steps_is_not_taken_back(store_url: str) -> None:
+    engine = open_engine(store_url, enforce_foreign_keys=False).execution_options(**{WRITES: True})
+    with engine.begin() as connection:
+        row = {"repetition_id": 1, "branch": 0, "kind": "tuned", "iteration": 0, "place": 0, "body": {}, "rollouts": 0}
+        row |= {"failures": 0, "saved": 0, "seconds": 0.0, "at": MOMENT}
+        if connection.dialect.name == "postgresql":
+            connection.exec_driver_sql("SET session_replication_role = replica")  # without its repetition
+        connection.execute(insert(StepRow).values(row))
+    with engine.connect() as connection, pytest.raises(ValueError, match="restore a backup"):
+        command.downgrade(migrations.configuration(connection), "0003")
+    engine.dispose()

@@ -16,6 +16,7 @@ from gaplab import migrations
 from gaplab.services.archives import export
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import submission
+from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint, TimedStep
 from gaplab.services.specs.assembly import setting
@@ -23,7 +24,7 @@ from gaplab.services.store.lease import Pulse
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
 from tests.experiments import submit_one
-from tests.numbers.kept_numbers import FOLDER, HALF_WAY, MACHINE, machine
+from tests.numbers.kept_numbers import CURVES, FOLDER, HALF_WAY, MACHINE, machine
 from tests.numbers.specs import HALF_WAY as HALF_WAY_SPEC
 from tests.numbers.specs import STUDIES
 
@@ -33,11 +34,14 @@ STEPS, CHECKPOINTS = 6, 3
 
 
 def keep(folder: Path) -> None:
-    """Compute all studies and write their archives, a database that is half-way, and the machine into the folder."""
+    """Compute all studies and write their archives and curves, a database that is half-way, and the machine."""
     folder.mkdir(exist_ok=True)
+    shown = {}
     for name, spec in STUDIES.items():
         with TemporaryDirectory() as place:
-            (folder / f"{name}.zip").write_bytes(computed(new_store(Path(place) / "kept.db"), spec))
+            data, shown[name] = computed(new_store(Path(place) / "kept.db"), spec)
+            (folder / f"{name}.zip").write_bytes(data)
+    (folder / CURVES.name).write_text(json.dumps(shown) + "\n")
     with TemporaryDirectory() as place:
         database = Path(place) / "kept.db"
         interrupt(new_store(database))
@@ -52,7 +56,7 @@ def new_store(file: Any) -> Any:
 
 
 def computed(store: Store, spec: Any) -> Any:
-    """The archive of a study, computed by the pure loop."""
+    """The archive of a study, computed by the pure loop, and its curves."""
     study = submission.submit(store, spec).id
     while claims := execution.claim(store, OWNER, 100):
         for claim in claims:
@@ -61,8 +65,9 @@ def computed(store: Store, spec: Any) -> Any:
             assert execution.complete(store, claim)
     with export(store, study).file as file:
         data = file.read()
+    shown = [each.model_dump(mode="json") for each in curves.curves(store, [study])]
     store.dispose()
-    return data
+    return data, shown
 
 
 def interrupt(store: Store) -> None:

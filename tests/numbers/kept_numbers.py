@@ -2,6 +2,8 @@
 
 import json
 import platform
+import sqlite3
+from contextlib import closing
 from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
 from pathlib import Path
@@ -9,26 +11,26 @@ from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
-import pyarrow.parquet
 
 FOLDER = Path(__file__).parent / "kept"
 MACHINE = FOLDER / "machine.json"
 HALF_WAY = FOLDER / "half-way.db.xz"
+CURVES = FOLDER / "curves.json"
+"""The curves of each archive."""
 
-ITERATION = (
-    *("selected_genome", "selection_rollouts", "selection_failures", "selection_saved"),
-    *("tuning_rollouts", "tuning_failures", "tuning_saved"),
-    *("transferred_genome", "simulated_fitness"),
-    *("transfer_rollouts", "transfer_failures", "transfer_saved"),
-    "recorded_fitness",
-)
-NUMBERS = {
-    "repetition": ("steps", "iterations_done", "rollouts_done", "rollouts_failed", "rollouts_saved"),
-    "iteration": ("number", *ITERATION),
-    "measurement": ("iteration", "kind", "genome", "fitness"),
-    "simulator": ("iteration", "rank", "parameters", "squared_error"),
+TALLY = ("steps", "rollouts_done", "rollouts_failed", "rollouts_saved")
+STEP = ("kind", "iteration", "place", "fitness", "recorded", "body", "rollouts", "failures", "saved")
+"""Columns that follow from the spec; times, owners and attempts do not."""
+
+QUERIES = {
+    "study": "SELECT * FROM study",
+    "experiment": "SELECT * FROM experiment ORDER BY position",
+    "provenance": "SELECT * FROM provenance",
+    "repetition": "SELECT * FROM repetition ORDER BY experiment_id, number",
+    "step": "SELECT r.experiment_id, r.number AS repetition, s.* FROM step s JOIN repetition r ON r.id = repetition_id"
+    " WHERE branch = 0 ORDER BY r.experiment_id, r.number, place",
 }
-"""Tables of an archive, with the columns that follow from the spec; times, owners and attempts do not."""
+JSON = {"spec", "facts", "body"}
 
 
 def archive(name: Any) -> Any:
@@ -36,18 +38,16 @@ def archive(name: Any) -> Any:
     return (FOLDER / f"{name}.zip").read_bytes()
 
 
-def members(data: Any) -> Any:
-    """The members of an archive, by their names without ending: rows as dictionaries; JSON as it is."""
-    with ZipFile(BytesIO(data)) as opened:
-        return {each.partition(".")[0]: _content(each, opened.read(each)) for each in opened.namelist()}
+def tables(data: Any) -> Any:
+    """The rows of an archive, by table, as dictionaries."""
+    with ZipFile(BytesIO(data)) as opened, closing(sqlite3.connect(":memory:")) as connection:
+        connection.deserialize(opened.read("study.sqlite3"))
+        connection.row_factory = sqlite3.Row
+        return {name: [_plain(row) for row in connection.execute(query)] for name, query in QUERIES.items()}
 
 
-def _content(name: Any, data: Any) -> Any:
-    if name.endswith(".parquet"):
-        return pyarrow.parquet.read_table(BytesIO(data)).to_pylist()
-    if name.endswith(".jsonl"):
-        return [json.loads(line) for line in data.splitlines()]
-    return json.loads(data)
+def _plain(row: Any) -> Any:
+    return {name: json.loads(row[name]) if name in JSON else row[name] for name in row.keys()}  # noqa: SIM118 - a row
 
 
 def exact(value: Any) -> Any:
@@ -62,17 +62,18 @@ def exact(value: Any) -> Any:
 
 
 def numbers(found: Any) -> Any:
-    """The numbers of an archive: for each experiment, for each repetition, for each table its rows, in exact floats."""
-    experiments = found["experiment"]
-    repetitions: dict[str, list[dict[str, Any]]] = {
-        each["id"]: [{} for _ in range(each["spec"]["repetitions"])] for each in experiments
+    """The numbers of an archive: for each experiment, for each repetition, its tally and steps, in exact floats."""
+    steps: dict[Any, Any] = {}
+    for row in found["step"]:
+        own = {name: exact(row[name]) for name in STEP}
+        steps.setdefault((row["experiment_id"], row["repetition"]), []).append(own)
+    tallies = {
+        (row["experiment_id"], row["number"]): {name: row[name] for name in TALLY} for row in found["repetition"]
     }
-    for table, columns in NUMBERS.items():
-        for row in found[table]:
-            owner = row["experiment_id" if table == "repetition" else "experiment"]
-            number = row["number" if table == "repetition" else "repetition"]
-            repetitions[owner][number].setdefault(table, []).append({each: exact(row[each]) for each in columns})
-    return [repetitions[each["id"]] for each in experiments]
+    return [
+        [(tallies[each["id"], number], steps[each["id"], number]) for number in range(each["spec"]["repetitions"])]
+        for each in found["experiment"]
+    ]
 
 
 def machine() -> Any:

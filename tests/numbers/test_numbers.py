@@ -3,8 +3,8 @@
 Only a change whose CHANGELOG entry announces other numbers may write the archives again: `tests/numbers/keep.py`.
 """
 
+import json
 from io import BytesIO
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -13,22 +13,13 @@ import pytest
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives import export, import_archive
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.types import Measured, Probed, Selected, Transferred, Tuned
 from gaplab.services.experiments import reading
 from gaplab.services.results import curves
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve
+from gaplab.services.store.queries.logs import columns_of
 from gaplab.services.store.session import Store
-from tests.numbers.kept_numbers import (
-    FOLDER,
-    ITERATION,
-    archive,
-    exact,
-    members,
-    numbers,
-    other_machine,
-    other_versions,
-)
+from tests.numbers.kept_numbers import CURVES, FOLDER, archive, exact, numbers, other_machine, other_versions, tables
 from tests.numbers.specs import STUDIES
 from tests.parameters import few
 
@@ -38,57 +29,20 @@ KEPT = sorted(file.stem for file in FOLDER.glob("*.zip"))
 
 
 def rows(steps: Any) -> Any:
-    """The rows that an archive has of the steps of one repetition, in exact floats."""
-    iterations, samples, simulators = {}, [], []  # type: ignore[var-annotated]
-    for step in steps:
-        row = iterations.setdefault(step.iteration, {"number": step.iteration, **dict.fromkeys(ITERATION)})
-        match step:
-            case Selected():
-                row |= {"selected_genome": vector(step.genome), **cost("selection", step)}
-            case Measured():
-                samples.append((step.iteration, "sample", vector(step.sample.genome), number(step.sample.fitness)))
-            case Tuned():
-                row |= cost("tuning", step)
-                simulators += [
-                    (step.iteration, rank, vector(each.parameters), number(each.squared_error))
-                    for rank, each in enumerate(step.simulators)
-                ]
-            case Transferred():
-                row |= {"transferred_genome": vector(step.genome), "simulated_fitness": number(step.fitness)}
-                row |= cost("transfer", step)
-            case Probed():
-                samples.append((step.iteration, "probe", row["transferred_genome"], number(step.fitness)))
-                row["recorded_fitness"] = number(step.recorded)
+    """The tally and the steps that an archive has of one repetition, in exact floats."""
     costs = [step.cost for step in steps if hasattr(step, "cost")]
     tally = {
         "steps": len(steps),
-        "iterations_done": len(iterations),
         "rollouts_done": sum(each.rollouts for each in costs),
         "rollouts_failed": sum(each.failures for each in costs),
         "rollouts_saved": sum(each.saved for each in costs),
     }
-    return {
-        "repetition": [tally],
-        "iteration": list(iterations.values()),
-        "measurement": [dict(zip(("iteration", "kind", "genome", "fitness"), each, strict=True))
-                        for each in sorted(samples, key=lambda sample: sample[:2])],
-        "simulator": [dict(zip(("iteration", "rank", "parameters", "squared_error"), each, strict=True))
-                      for each in simulators],
-    }  # fmt: skip
+    return tally, [exact(unsigned(columns_of(step))) for step in steps]
 
 
-def vector(values: Any) -> Any:
-    assert values.dtype == np.float64
-    return exact(values.tolist())
-
-
-def number(value: Any) -> Any:
-    """As a database has it: without nan, infinities, and the sign of a zero."""
-    return exact(float(value) + 0.0) if isfinite(value) else None
-
-
-def cost(phase: Any, step: Any) -> Any:
-    return {f"{phase}_{name}": getattr(step.cost, name) for name in ("rollouts", "failures", "saved")}
+def unsigned(columns: Any) -> Any:
+    """As a database has it: without the sign of a zero."""
+    return columns | {name: columns[name] + 0.0 for name in ("fitness", "recorded") if columns[name] is not None}
 
 
 WITH_BODIES = {"mujoco", "physx", "pybullet"}
@@ -103,7 +57,7 @@ def in_part(name: Any, spec: Any) -> Any:
 @pytest.mark.parametrize("name", KEPT)
 @pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.release)], ids=["part", "whole"])
 def test_the_pure_loop_computes_the_kept_numbers(name: Any, whole: Any) -> None:
-    found = members(archive(name))
+    found = tables(archive(name))
     specs = [ResolvedSpec.model_validate(each["spec"]) for each in found["experiment"]]
     kept = [(spec, each) for spec, each in zip(specs, numbers(found), strict=True) if whole or in_part(name, spec)]
 
@@ -122,7 +76,7 @@ def computed_from(specs: Any) -> Any:
 @pytest.mark.parametrize("name", ["analytic", "cma_es", "options"])
 @pytest.mark.release
 def test_explicit_old_options_give_the_kept_numbers(name: Any) -> None:
-    kept = numbers(members(archive(name)))
+    kept = numbers(tables(archive(name)))
 
     computed = computed_from(resolve(STUDIES[name]))
 
@@ -133,7 +87,7 @@ def test_explicit_old_options_give_the_kept_numbers(name: Any) -> None:
 
 def test_every_kept_spec_has_the_options_of_its_study() -> None:
     for name, study in STUDIES.items():
-        stored = [ResolvedSpec.model_validate(each["spec"]) for each in members(archive(name))["experiment"]]
+        stored = [ResolvedSpec.model_validate(each["spec"]) for each in tables(archive(name))["experiment"]]
         for old, new in zip(stored, resolve(study), strict=True):
             assert old.budget == new.budget
             assert old.strategy == new.strategy
@@ -141,7 +95,7 @@ def test_every_kept_spec_has_the_options_of_its_study() -> None:
 
 def test_a_search_of_its_own_gives_simulated_fit_other_numbers() -> None:
     (fit, *_) = resolve(STUDIES["analytic"])
-    (kept, *_) = numbers(members(archive("analytic")))
+    (kept, *_) = numbers(tables(archive("analytic")))
     budget = fit.budget.model_copy(update={"reuse_transfer": False})
 
     (computed,) = computed_from([fit.model_copy(update={"budget": budget})])
@@ -151,25 +105,28 @@ def test_a_search_of_its_own_gives_simulated_fit_other_numbers() -> None:
 
 @pytest.fixture(scope="module", params=few(KEPT, {"analytic", "mujoco"}.__contains__))
 def kept(request: pytest.FixtureRequest) -> Any:
-    """A kept archive: its bytes, and what is in it."""
+    """A kept archive: its bytes, what is in it, and its curves."""
     data = archive(request.param)
-    return data, members(data)
+    return data, tables(data), json.loads(CURVES.read_text())[request.param]
 
 
 def test_an_import_shows_and_exports_the_kept_numbers(kept: Any, store: Store) -> None:
-    data, found = kept
+    data, found, expected = kept
 
     imported = import_archive(store, BytesIO(data))
 
     assert imported.experiments == tuple(each["id"] for each in found["experiment"])
     assert not imported.called_off
-    assert_shown(store, found)
+    assert_shown(store, found, expected)
     with export(store, imported.study).file as file:
-        assert_exported(members(file.read()), found)
+        exported = tables(file.read())
+    for table in found:
+        pairs = zip(exported[table], found[table], strict=True)
+        assert [chosen(row, old) for row, old in pairs] == exact(found[table])
 
 
-def assert_shown(store: Store, found: Any) -> None:
-    for experiment, curve in zip(found["experiment"], found["curves"], strict=True):
+def assert_shown(store: Store, found: Any, expected: Any) -> None:
+    for experiment, curve in zip(found["experiment"], expected, strict=True):
         id_ = experiment["id"]
         assert reading.read_experiment(store, id_).spec == experiment["spec"]
         assert pages(reading.list_samples, store, id_, SAMPLE) == kept_samples(found, id_)
@@ -177,13 +134,6 @@ def assert_shown(store: Store, found: Any) -> None:
         shown = curves.curve(store, id_)
         assert chosen(shown.model_dump(mode="json"), curve) == exact(curve)
         assert points(shown) == kept_points(found, id_)
-
-
-def assert_exported(exported: Any, found: Any) -> None:
-    assert exported["spec"] == found["spec"]
-    for table in set(found) - {"manifest", "spec"}:
-        pairs = zip(exported[table], found[table], strict=True)
-        assert [chosen(row, old) for row, old in pairs] == exact(found[table])
 
 
 def chosen(row: Any, columns: Any) -> Any:
@@ -201,18 +151,35 @@ def pages(read: Any, store: Store, experiment: Any, columns: Any) -> Any:
             return items
 
 
+def own(found: Any, experiment: Any, *kinds: Any) -> Any:
+    """The steps of these kinds of an experiment, by repetition and place."""
+    return [row for row in found["step"] if row["experiment_id"] == experiment and row["kind"] in kinds]
+
+
 def kept_samples(found: Any, experiment: Any) -> Any:
     """In the order of the log: the sample of an iteration before its probe."""
-    own = [row for row in found["measurement"] if row["experiment"] == experiment]
-    own.sort(key=lambda row: (row["repetition"], row["iteration"], row["kind"] == "probe"))
-    return [chosen(row, SAMPLE) for row in own]
+    genomes = {
+        (row["repetition"], row["iteration"]): row["body"]["genome"] for row in own(found, experiment, "transferred")
+    }
+    samples = [
+        row
+        | {"kind": "sample" if row["kind"] == "measured" else "probe"}
+        | {"genome": row["body"].get("genome") or genomes[row["repetition"], row["iteration"]]}
+        for row in own(found, experiment, "measured", "probed")
+    ]
+    return [chosen(row, SAMPLE) for row in samples]
 
 
 def kept_simulators(found: Any, experiment: Any) -> Any:
     names = [each["name"] for each in experiment["spec"]["tunables"]]
-    own = [row for row in found["simulator"] if row["experiment"] == experiment["id"]]
-    named = [row | {"parameters": dict(zip(names, row["parameters"], strict=True))} for row in own]
-    return [chosen(row, SIMULATOR) for row in named]
+    return [
+        chosen(
+            row | {"rank": rank, "parameters": dict(zip(names, each["parameters"], strict=True))} | errors, SIMULATOR
+        )
+        for row in own(found, experiment["id"], "tuned")
+        for rank, each in enumerate(row["body"]["simulators"])
+        for errors in [{"squared_error": each["squared_error"]}]
+    ]
 
 
 def points(curve: Any) -> Any:
@@ -221,8 +188,7 @@ def points(curve: Any) -> Any:
 
 
 def kept_points(found: Any, experiment: Any) -> Any:
-    own = [row for row in found["iteration"] if row["experiment"] == experiment]
-    return exact({(row["number"], row["repetition"]): row["recorded_fitness"] for row in own})
+    return exact({(row["iteration"], row["repetition"]): row["recorded"] for row in own(found, experiment, "probed")})
 
 
 def test_every_study_is_kept_and_small() -> None:
@@ -230,12 +196,14 @@ def test_every_study_is_kept_and_small() -> None:
     assert sum(file.stat().st_size for file in FOLDER.iterdir()) < 1_000_000
 
 
-@pytest.mark.parametrize("table", ["iteration", "measurement", "simulator"])
-def test_the_last_bit_of_a_float_makes_a_difference(table: Any) -> None:
-    found = members(archive("options"))
+@pytest.mark.parametrize("kind", ["measured", "tuned", "transferred", "probed"])
+def test_the_last_bit_of_a_float_makes_a_difference(kind: Any) -> None:
+    found = tables(archive("options"))
     before = numbers(found)
-    row, column = next((row, name) for row in found[table] for name in row if isinstance(row[name], float))
+    row = next(row for row in found["step"] if row["kind"] == kind)
+    place = row if row["fitness"] is not None else row["body"]["simulators"][0]
+    column = "fitness" if place is row else "squared_error"
 
-    row[column] = float(np.nextafter(row[column], 1e9))
+    place[column] = float(np.nextafter(place[column], 1e9))
 
     assert numbers(found) != before

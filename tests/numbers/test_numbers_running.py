@@ -20,7 +20,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import listed, submit_one
 from tests.numbers.keep import CHECKPOINTS
-from tests.numbers.kept_numbers import HALF_WAY, archive, members, numbers, other_machine
+from tests.numbers.kept_numbers import HALF_WAY, archive, numbers, other_machine, tables
 from tests.processes import processes_of_ray
 from tests.waiting import wait_until
 
@@ -43,7 +43,7 @@ def stored(store: Store, ids: Any) -> Any:
     found = []
     for each in ids:
         with export(store, each).file as file:
-            found += numbers(members(file.read()))
+            found += numbers(tables(file.read()))
     return found
 
 
@@ -56,7 +56,7 @@ def assert_kept(computed: Any, kept: Any) -> None:
 @pytest.mark.release
 def test_any_number_of_workers_computes_the_kept_numbers(store: Store, store_url: str) -> None:
     at_once = 2 if store_url.startswith("sqlite") else 1
-    studies = [members(archive(name)) for name in ("analytic", "cma_es", "options")]
+    studies = [tables(archive(name)) for name in ("analytic", "cma_es", "options")]
     ids = [submit(store, found) for found in studies]
 
     run(Supervisor(store, lambda: at_once), store, [each for own in ids for each in own])
@@ -68,7 +68,7 @@ def test_any_number_of_workers_computes_the_kept_numbers(store: Store, store_url
 
 @pytest.mark.release
 def test_a_robot_among_idle_workers_has_the_kept_numbers(sqlite_store: Store) -> None:
-    found = members(archive("elsewhere"))
+    found = tables(archive("elsewhere"))
     ids = submit(sqlite_store, found)
 
     run(Supervisor(sqlite_store, lambda: 1), sqlite_store, ids)
@@ -77,7 +77,7 @@ def test_a_robot_among_idle_workers_has_the_kept_numbers(sqlite_store: Store) ->
 
 
 def test_workers_killed_in_the_middle_of_a_step_cost_no_number(store: Store) -> None:
-    found = members(archive("long"))
+    found = tables(archive("long"))
     ids = submit(store, found)
     supervisor = Supervisor(store, lambda: 2, checkpoint_s=0.01)
     run(supervisor, store, ids, until=lambda: in_the_middle(store))
@@ -110,5 +110,5 @@ def test_a_database_of_a_killed_supervisor_ends_with_the_kept_numbers(tmp_path: 
 
     run(Supervisor(store, lambda: 2), store, ids)
 
-    assert_kept(stored(store, ids), numbers(members(archive("long"))))
+    assert_kept(stored(store, ids), numbers(tables(archive("long"))))
     store.dispose()

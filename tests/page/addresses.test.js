@@ -21,25 +21,19 @@ test("what is wrong in an address of a comparison is as if it were left out", ()
 
 test("the figure is asked only for what differs from its defaults", () => {
   const choice = comparisonOf(new URLSearchParams("experiments=a"));
-  assert.deepEqual(figureQuery(choice), { experiment: ["a"], x: null, cost_s: null, band: "", fitness: "", each: null });
-  assert.deepEqual(figureQuery({ ...choice, x: "time", each: true }), { experiment: ["a"], x: "time", cost_s: 60, band: "", fitness: "", each: true });
+  assert.deepEqual(figureQuery(choice), { study: ["a"], x: null, cost_s: null, band: "", fitness: "", each: null });
+  assert.deepEqual(figureQuery({ ...choice, x: "time", each: true }), { study: ["a"], x: "time", cost_s: 60, band: "", fitness: "", each: true });
   assert.deepEqual([wholeNumber("0"), wholeNumber(""), wholeNumber(null), wholeNumber("1.5")], [0, null, null, null]);
 });
 
 test("an address of the list holds its filters, and nothing that is usual", () => {
-  const address = "#/?state=FAILED&strategy=random&text=a+b&show=experiments&sort=name";
+  const address = "#/?state=FAILED&strategy=random&text=a+b&sort=name";
   assert.equal(listAddress(filtersOf(parametersOf(address))), address);
   assert.equal(listAddress(filtersOf(new URLSearchParams())), "#/");
-  assert.equal(filtersOf(new URLSearchParams()).show, "all");
-  assert.equal(listAddress(filtersOf(parametersOf("#/?show=studies"))), "#/?show=studies");
-});
-
-test("a list of studies is not sorted by what only experiments have", () => {
   assert.equal(filtersOf(new URLSearchParams("sort=strategy")).sort, "-created_at");
-  assert.equal(filtersOf(new URLSearchParams("sort=strategy&show=experiments")).sort, "strategy");
 });
 
 test("a list is filtered by state, strategy or words, and not by its order", () => {
-  assert.equal(isFiltered(filtersOf(new URLSearchParams("sort=name&show=experiments"))), false);
+  assert.equal(isFiltered(filtersOf(new URLSearchParams("sort=name"))), false);
   for (const filter of ["state=FAILED", "strategy=random", "text=a"]) assert.ok(isFiltered(filtersOf(new URLSearchParams(filter))));
 });

@@ -1,17 +1,15 @@
 import { FakeNode, FakeStorage } from "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browserStore } from "../../api/dashboard/lib/bench/browser_store.js";
-import { backoffMs, isMine, nextRequest } from "../../api/dashboard/lib/bench/choosing.js";
-import { isTemporary, outbox } from "../../api/dashboard/lib/bench/outbox.js";
-import { keyed, newKey } from "../../api/dashboard/lib/keyed.js";
-import { answerText, requestWords, typedNumber, typedValues, withOtherSign } from "../../api/dashboard/lib/bench/values.js";
+import { keyed, newKey } from "../../api/dashboard/lib/api.js";
+import { browserStore, isTemporary, outbox } from "../../api/dashboard/lib/bench/outbox.js";
+import { answerText, isMine, nextRequest, requestWords, stateText, typedNumber, typedValues, withOtherSign } from "../../api/dashboard/lib/bench/requests.js";
+import { backoffMs } from "../../api/dashboard/lib/waiting.js";
 
 globalThis.localStorage = new FakeStorage();
 const { sentList, summaryOf } = await import("../../api/dashboard/views/bench/sent.js");
 const { answers: sentAnswers } = await import("../../api/dashboard/lib/bench/sender.js");
 const { withChosen } = await import("../../api/dashboard/views/bench.js");
-const { stateText } = await import("../../api/dashboard/views/bench/others.js");
 const { correctionOf, undoButtons } = await import("../../api/dashboard/lib/bench/corrections.js");
 
 const ANSWER = { request: "r1", words: "sample of iteration 1", body: { values: [0.5] } };

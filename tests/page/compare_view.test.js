@@ -16,10 +16,11 @@ document.head = { append: (script) => script.dispatchEvent(new Event("load")) };
 const { plot } = await import("../../api/dashboard/lib/plot.js");
 const { chooser } = await import("../../api/dashboard/views/compare/chooser.js");
 const { figure } = await import("../../api/dashboard/views/compare/figure.js");
-const { curve, otherFigures } = await import("../../api/dashboard/views/experiment/figures.js");
-const { misfit } = await import("../../api/dashboard/views/experiment/misfit.js");
+const { curves, otherFigures } = await import("../../api/dashboard/views/study/figures.js");
+const { misfit } = await import("../../api/dashboard/views/study/misfit.js");
 const { significance } = await import("../../api/dashboard/views/compare/significance.js");
-const { CURVE_KINDS, FIGURE_KINDS, KINDS } = await import("../../api/dashboard/views/experiment/event_words.js");
+const { CURVE_KINDS, FIGURE_KINDS } = await import("../../api/dashboard/lib/event_kinds.js");
+const { KINDS } = await import("../../api/dashboard/lib/event_words.js");
 
 const settled = () => new Promise((resume) => { setTimeout(resume, 5); });
 
@@ -80,7 +81,7 @@ test("one range is asked for, and the others once their table is unfolded", asyn
   const { part, loading } = comparing();
   const paths = serving(() => [200, [PAIR]]);
   await loading.load();
-  assert.deepEqual(paths, ["comparisons?experiment=a&experiment=b&from=10&to=10"]);
+  assert.deepEqual(paths, ["comparisons?study=a&study=b&from=10&to=10"]);
   const every = part.element.querySelector("details.every");
   const before = loading.now;
   every.setAttribute("open", "");
@@ -140,10 +141,11 @@ test("tests that come late are shown unless the reader has chosen others, and an
 /** Return the field of a chooser with its list of three matches, and what was chosen. */
 async function choosing() {
   const chosen = [];
-  const study = (name) => ({ id: name, name, experiments: [{ id: `${name}1` }], state: "RUNNING", created_at: "2026-01-01T00:00:00Z" });
-  const cache = { addStudy() {}, addExperiment() {} };
+  const experiment = (name) => ({ id: name, name, state: "RUNNING", created_at: "2026-01-01T00:00:00Z" });
+  const study = (name) => ({ ...experiment(name), experiments: [experiment(name)] });
+  const cache = { addStudy() {}, studyName: () => null };
   const view = { cache, signal: new AbortController().signal, choice: { experiments: [] }, change: ({ experiments }) => chosen.push(...experiments) };
-  serving((path) => [200, { items: path.startsWith("studies") ? ["a", "b", "c"].map(study) : [] }]);
+  serving(() => [200, { items: ["a", "b", "c"].map(study) }]);
   const { element } = chooser(view);
   const [field, options] = [element.querySelector("input"), element.querySelector("ul")];
   const press = (key) => field.dispatchEvent(Object.assign(new Event("keydown"), { key }));
@@ -184,12 +186,12 @@ test("the figure of a comparison is loaded at once for a choice, and with its se
   part.update();
   const paths = serving(() => [200, { empty: true, caption: "", table: null }]);
   assert.equal(await asked[1](), undefined);
-  assert.deepEqual([loads.length, paths], [2, ["figures/curves?experiment=a&x=rollouts&format=json"]]);
+  assert.deepEqual([loads.length, paths], [2, ["figures/curves?study=a&x=rollouts&format=json"]]);
 });
 
 test("the misfit is saved below a prefix too", async () => {
   let load;
-  const [place] = misfit({ id: "e", sections: { add: (_element, _kinds, given) => { load = given; } }, signal: new AbortController().signal });
+  const [place] = misfit({ experiment: { id: "e" }, sections: { add: (_element, _kinds, given) => { load = given; } }, signal: new AbortController().signal });
   const distribution = { mean: 1, sd: null, n: 1 };
   serving(() => [200, { points: [{ iteration: 1, error: distribution, held_out_error: distribution, gap: distribution, tunables: [] }], remarks: [], unit: "m/s", error_unit: "m/s", verdicts: [], held_out: 0 }]);
   await load();
@@ -199,8 +201,8 @@ test("the misfit is saved below a prefix too", async () => {
 test("every figure of an experiment is a section, and its options load it at once", () => {
   const [added, loads] = [[], []];
   const sections = { add: (_element, kinds) => { added.push(kinds); return () => loads.push("now"); } };
-  const page = { id: "e", sections, signal: new AbortController().signal, experiment: { level: false } };
-  const card = curve(page);
+  const page = { id: "e", sections, signal: new AbortController().signal, experiment: { id: "e", level: false } };
+  const card = curves(page);
   otherFigures(page);
   assert.equal(added.length, 5);
   assert.deepEqual(added[0], CURVE_KINDS);

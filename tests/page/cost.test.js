@@ -2,7 +2,7 @@ import { FakeNode } from "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Problem } from "../../api/dashboard/lib/api.js";
-import { confirmingCost } from "../../api/dashboard/lib/cost.js";
+import { confirmingCost } from "../../api/dashboard/lib/dialog.js";
 
 const REFUSED = new Problem({ status: 422, errors: [{ pointer: "confirm_cost", message: "this takes about 1,229 core-hours" }] });
 const { signal } = new AbortController();

@@ -1,12 +1,12 @@
-import "./fakes.js";
+import { FakeElement, FakeParent } from "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-const { List } = await import("../../api/dashboard/views/list.js");
+const { keyedRows } = await import("../../api/dashboard/lib/dom.js");
+const { List, restOfList } = await import("../../api/dashboard/views/list.js");
 const { addressOf, filtersOf } = await import("../../api/dashboard/views/list/filters.js");
-const { merged } = await import("../../api/dashboard/views/list/sources.js");
 
-const FILTERS = { show: "studies", sort: "-created_at", state: "", strategy: "", text: "", q: "" };
+const FILTERS = { sort: "-created_at", state: "", strategy: "", text: "", q: "" };
 const PROGRESS = { rollouts: 0, repetitions: 0, completed: 0 };
 const study = (name) => ({ id: name, name, state: "RUNNING", caveat: "", tags: [], experiments: [], progress: PROGRESS, created_at: "2026-01-01T00:00:00Z", best: null });
 const pageOf = (names, next = null) => ({ items: [...names].map(study), next });
@@ -97,19 +97,40 @@ test("a view that begins with half a query does not say that it is loading", asy
 });
 
 test("an address keeps every order that a saved view can have", () => {
-  const ofStudies = ["created_at", "name", "-name"];
-  const orders = { all: ofStudies, studies: ofStudies, experiments: [...ofStudies, "strategy", "-strategy", "state", "-state"] };
-  for (const [show, sorts] of Object.entries(orders)) {
-    for (const sort of sorts) {
-      const address = addressOf({ ...FILTERS, show, sort });
-      assert.equal(filtersOf(new URLSearchParams(address.split("?")[1])).sort, sort);
-    }
+  for (const sort of ["created_at", "-created_at", "name", "-name"]) {
+    const address = addressOf({ ...FILTERS, sort });
+    assert.equal(filtersOf(new URLSearchParams(address.split("?")[1])).sort, sort);
   }
 });
 
-test("studies and experiments are merged by name in either direction", () => {
-  const sources = (...lists) => lists.map((names) => ({ items: [...names].map((name) => ({ name, created_at: "2026-01-01T00:00:00Z" })), cursor: null }));
-  const names = (given, sort) => merged(given, sort).items.map(({ name }) => name).join("");
-  assert.equal(names(sources("ace", "bd"), "name"), "abcde");
-  assert.equal(names(sources("eca", "db"), "-name"), "edcba");
+test("a study of one is its experiment, and one of several unfolds", async () => {
+  const { list, answer } = listing();
+  const experiment = (id) => ({ ...study(id), experiments: undefined, strategy: "some_fit", spec: { robot: { name: "legs" }, engine: { name: "fast" }, reality: { engine: { name: "fast" } } }, fitness: null });
+  const of = (...ids) => ({ ...study(ids[0]), experiments: ids.map(experiment).map(({ experiments: _, ...each }) => each) });
+  list.change({ ...FILTERS });
+  await answer({ items: [of("one"), of("two", "three")], next: null });
+  const rows = () => list.table.querySelector("tbody").children.map((row) => [row.querySelector("a").href, row.querySelector("span.sub").textContent]);
+  assert.deepEqual(rows(), [["#/studies/one", "Some fit · Legs · Fast"], ["#/studies/two", "2 experiments · Legs · Fast"]]);
+  list.table.querySelector("button.toggle").click();
+  assert.deepEqual(rows().slice(2), [["#/experiments/two", ""], ["#/experiments/three", ""]]);
+});
+
+test("the parts of a long list meet, whatever came, went or moved", () => {
+  const items = (ids) => [...ids].map((id) => ({ id }));
+  const rest = (firstPart) => restOfList(items(firstPart), items("abcdef")).map(({ id }) => id).join("");
+  assert.deepEqual(["abcd", "nabc", "bcde", "aben", "fabc", "cdn", "xyz", ""].map(rest), ["ef", "def", "f", "f", "de", "ef", "", ""]);
+});
+
+test("rows stay the same elements while items come, go and move", () => {
+  const body = new FakeParent();
+  const updates = [];
+  const show = keyedRows(body, (item) => item[0], () => ({ element: new FakeElement(), update: (item) => updates.push(item) }));
+  show(["a", "b", "c"]);
+  const [a, b, c] = body.children;
+  show(["c1", "d1", "a1"]);
+  assert.deepEqual([body.children[0], body.children[2], body.children.length], [c, a, 3]);
+  assert.ok(!body.children.includes(b));
+  assert.deepEqual(updates, ["a", "b", "c", "c1", "d1", "a1"]);
+  show(["b", "c"]);
+  assert.notEqual(body.children[0], b);
 });

@@ -3,10 +3,10 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 Object.assign(globalThis.document, { addEventListener() {}, getElementById: () => new FakeNode("p") });
-const { ageOf, keepAges } = await import("../../api/dashboard/lib/ages.js");
-const { follow, latestAnswers, reloadEvery } = await import("../../api/dashboard/lib/live.js");
-const { rest } = await import("../../api/dashboard/lib/rest.js");
-const { newFromThis } = await import("../../api/dashboard/lib/new_from_this.js");
+const { ageOf, follow, keepAges, latestAnswers } = await import("../../api/dashboard/lib/live.js");
+const { rest } = await import("../../api/dashboard/lib/waiting.js");
+const { keepUp } = await import("../../api/dashboard/views/study.js");
+const { editing } = await import("../../api/dashboard/views/study/actions.js");
 
 const real = { setInterval: globalThis.setInterval };
 
@@ -55,13 +55,13 @@ test("of two answers the one that was asked for later stays, and a saved change 
 
 test("a page that nobody sees, or that has ended, is not loaded again and again", () => {
   const done = [];
-  const page = { signal: new AbortController().signal, hasEnded: () => false, update: () => done.push("update"), reload: () => Promise.resolve(done.push("reload")) };
-  const tick = ticking(() => reloadEvery(page, 1));
+  const page = { signal: new AbortController().signal, study: { experiments: [{ state: "RUNNING" }] }, update: () => done.push("update"), reload: () => Promise.resolve(done.push("reload")) };
+  const tick = ticking(() => keepUp(page));
   tick();
   document.hidden = true;
   tick();
   document.hidden = false;
-  page.hasEnded = () => true;
+  page.study.experiments[0].state = "COMPLETED";
   tick();
   assert.deepEqual(done, ["reload", "update"]);
 });
@@ -80,7 +80,7 @@ test("an age goes on while the page is open", () => {
 test("a new study has the seed of the old one to the last digit", async () => {
   globalThis.location = { hash: "" };
   globalThis.fetch = () => Promise.resolve(new Response('{"spec": {"seed": 18446744073709551615}, "remarks": []}'));
-  newFromThis("/studies/s").querySelector("button").click();
+  editing({ id: "s", study: { id: "s", experiments: [{ study: "s" }] } })[1].click();
   while (!location.hash) await new Promise((resume) => { setTimeout(resume); });
   assert.equal(new URLSearchParams(location.hash.split("?")[1]).get("spec"), '{"seed":18446744073709551615}');
 });

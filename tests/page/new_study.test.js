@@ -2,9 +2,9 @@ import "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { addTunable, draftOf, followRobot, plainName, specOf, ticked } from "../../api/dashboard/views/new/draft.js";
-import { specIn, studyOf } from "../../api/dashboard/views/new/paste.js";
+import { specIn, studyOf } from "../../api/dashboard/views/new.js";
 import { nearestPlace } from "../../api/dashboard/views/new/fields.js";
-import { exampleOf, hintOf, keptText } from "../../api/dashboard/views/new/samples_field.js";
+import { exampleOf, hintOf, keptText } from "../../api/dashboard/views/new/reality_part.js";
 import { curlLines, pythonLines } from "../../api/dashboard/views/new/panel.js";
 
 const CATALOGUE = {

@@ -11,11 +11,10 @@ from sqlalchemy import select
 
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.types import Measured, Probed, Step, Tuned
+from gaplab.services.core.types import Measured, Probed, Step
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow, SensitivityRow, StudyRow
-from gaplab.services.store.queries import step_rows as mapping
-from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.queries.logs import columns_of, logs, position
 from gaplab.services.store.session import Store
 from tests.soak import witness
 from tests.soak.hardware_faults import Command, commands
@@ -124,7 +123,7 @@ def _experiment(session: Any, row: Any) -> Any:
             steps=each.steps,
             iterations_done=each.iterations_done,
             log=tuple(digest(step, measured=on_a_bench(row.spec)) for step in steps[each.id]),
-            places=tuple(map(mapping.position, steps[each.id])),
+            places=tuple(map(position, steps[each.id])),
             error=each.error,
         )
         for each in rows
@@ -158,9 +157,7 @@ def _undisturbed(spec: str, number: int, measured: bool) -> tuple[str, ...]:
 
 def digest(step: Step, *, measured: bool) -> str:
     """A hash of all that the store keeps of a step; floats to the last bit. Those who measure give no readings."""
-    kept = {"kind": type(step).__name__, "iteration": step.iteration, "columns": mapping.iteration_columns(step)}
-    if isinstance(step, Tuned):
-        kept["simulators"] = mapping.simulator_columns(step)
-    if isinstance(step, Measured | Probed):
-        kept["measurement"] = mapping.measurement_columns(step, "reality") | ({"readings": None} if measured else {})
+    kept = columns_of(step)
+    if measured and isinstance(step, Measured | Probed):
+        kept["body"].pop("readings", None)
     return sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()

@@ -1,15 +1,15 @@
 """The fault of hostile imports: archives of the service's own, changed to harm it. Each is refused, and lists go on."""
 
 import json
+import sqlite3
 import zipfile
 from collections.abc import Callable, Iterator
-from io import BytesIO
 from typing import Any
 from urllib.parse import quote
 
 import httpx2
 
-from tests.integration.test_archives_bad import packed
+from tests.archiving import changed, database_of, loose, packed, rows
 from tests.soak.bench_faults import WAIT_S
 from tests.soak.stage import until
 
@@ -18,32 +18,38 @@ LISTS = ("/requests?limit=500&pending=false", "/studies?limit=500")
 DEEP = json.loads("[" * 900 + "]" * 900)
 
 
-def _in(table: str, change: Callable[[Any], Any]) -> Callable[[Any], bytes]:
-    """The archive with a change of the first row of a table."""
+def _put(table: str, column: str, value: Any) -> Callable[[bytes], bytes]:
+    """The archive with another value in all rows of a table; a callable changes the JSON that is there."""
 
-    def changed(members: Any) -> bytes:
-        first, *others = members[f"{table}.jsonl"].splitlines()
-        row = json.loads(first)
-        change(row)
-        return bytes(packed({**members, f"{table}.jsonl": b"\n".join([json.dumps(row).encode(), *others, b""])}))
+    def change(connection: sqlite3.Connection) -> None:
+        (stored,) = connection.execute(f"SELECT {column} FROM {table}").fetchone()
+        new = json.dumps(value(json.loads(stored)) if callable(value) else value)
+        connection.execute(f"UPDATE {table} SET {column} = ?", (new,))
 
-    return changed
+    return lambda archive: changed(loose(archive), change)
 
 
-HOSTILE: dict[str, Callable[[Any], bytes]] = {
-    "a forecast that is a list": _in("request", lambda row: row.update(safety=[1, 2])),
-    "traces of nothing": _in("answer", lambda row: row.update(traces=[{"x": 1}])),
-    "a genome of three genes": _in("request", lambda row: row.update(genome=[0.5, 0.5, 0.5])),
-    "genes of 500": _in("request", lambda row: row.update(genome=[500.0] * len(row["genome"]))),
-    "a robot of the machine": _in("experiment", lambda row: row["spec"].update(robot={"name": "/etc/passwd"})),
-    "an extreme priority": _in("experiment", lambda row: row["spec"].update(priority=-(2**30))),
-    "options of 7 MB": _in("experiment", lambda row: row["spec"]["strategy"].update(options={"x": "y" * 7_000_000})),
-    "nested 900 deep": _in("experiment", lambda row: row["spec"]["strategy"].update(options={"x": DEEP})),
-    "a file elsewhere": lambda members: bytes(packed({**members, "../../x": b"x"})),
-    "no Parquet": lambda members: bytes(packed({**members, "measurement.parquet": b"PAR1" * 100})),
-    "half a file": lambda members: bytes(packed(members)[:5000]),
-    "another sum": lambda members: bytes(packed({**members, "answer.jsonl": b"{}\n"}, honest=False)),
+HOSTILE: dict[str, Callable[[bytes], bytes]] = {
+    "a forecast that is a list": _put("request", "safety", [1, 2]),
+    "traces of nothing": _put("answer", "traces", [{"x": 1}]),
+    "a genome of three genes": _put("request", "genome", [0.5, 0.5, 0.5]),
+    "genes of 500": _put("request", "genome", lambda genome: [500.0] * len(genome)),
+    "a robot of the machine": _put("experiment", "spec", lambda spec: spec | {"robot": {"name": "/etc/passwd"}}),
+    "an extreme priority": _put("experiment", "precedence", -(2**30)),
+    "options of 7 MB": _put("experiment", "spec", lambda spec: _with_options(spec, "y" * 7_000_000)),
+    "nested 900 deep": _put("experiment", "spec", lambda spec: _with_options(spec, DEEP)),
+    "a state that none has": _put("experiment", "turn_at", "never"),
+    "a trigger": lambda archive: changed(archive, "CREATE TRIGGER t AFTER INSERT ON step BEGIN SELECT 1; END"),
+    "rows twice": lambda archive: changed(loose(archive), "INSERT INTO step SELECT * FROM step"),
+    "a file elsewhere": lambda archive: packed(database_of(archive), {"../../x": b"x"}),
+    "no database": lambda _: packed(b"SQLite format 3\0" * 999),
+    "half a database": lambda archive: packed(database_of(archive)[:50_000]),
+    "half a file": lambda archive: archive[:5_000],
 }
+
+
+def _with_options(spec: Any, value: Any) -> Any:
+    return spec | {"strategy": spec["strategy"] | {"options": {"x": value}}}
 
 
 def hostile(stage: Any) -> bool:
@@ -58,15 +64,13 @@ def hostile(stage: Any) -> bool:
     return True
 
 
-def _exported(stage: Any) -> Any:
-    """The members of the archive of an experiment with an answer; nothing, if there is none, or nobody answers."""
+def _exported(stage: Any) -> list[bytes]:
+    """The archive of an experiment with an answer; none, if there is none, or nobody answers."""
     try:
         requests = stage.http.get(LISTS[0]).json()["items"]
         (experiment, *_) = [each["experiment"] for each in requests if each["answers"]]
         archive = stage.http.get(f"/studies/{experiment}/export").content
-        with zipfile.ZipFile(BytesIO(archive)) as opened:
-            members = {name: opened.read(name) for name in opened.namelist()}
-        return [members] if members["answer.jsonl"] else []
+        return [archive] if rows(archive, "SELECT id FROM answer") else []
     except (httpx2.HTTPError, ValueError, KeyError, zipfile.BadZipFile):
         return []
 

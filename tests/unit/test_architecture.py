@@ -44,7 +44,7 @@ ROOMS = {
     "notifications": (("core", "store", "experiments", "settings"), {"sqlalchemy", "httpx2"}),
     "archives": (
         ("core", "engines", "store", "specs", "plugins", "experiments", "running", "results", "settings"),
-        {"numpy", "pydantic", "pyarrow"},
+        {"numpy", "pydantic"},
     ),
     "reports": (
         ("core", "engines", "store", "figures", "specs", "experiments", "running", "bench", "results", "replay"),
@@ -56,11 +56,17 @@ ROOMS = {
 TOOLS = {"settings", "waiting_line"}
 """Modules of services, besides rooms, that rooms may import."""
 
+MIGRATES = {"archives": ("migrations",)}
+"""The room of services that migrates what it reads."""
+
 # code in -> what of ours it may import, and what of others; the first prefix that fits counts
 ARROWS = {
     "schemas": (("schemas",), {"pydantic", "pydantic_core"}),
     **{
-        f"services/{room}": (("schemas", *(f"services.{each}" for each in (room, *below))), others)
+        f"services/{room}": (
+            ("schemas", *MIGRATES.get(room, ()), *(f"services.{each}" for each in (room, *below))),
+            others,
+        )
         for room, (below, others) in ROOMS.items()
     },
     "services": (

@@ -1,12 +1,6 @@
 """The tables and columns of an archive: everything, or a reason why not."""
 
-from io import BytesIO
-
-import numpy as np
-from pyarrow import parquet
-
 from gaplab.services.archives.columns import COLUMNS_LEFT_OUT, EXPORTED, LEFT_OUT, columns_of
-from gaplab.services.archives.members import write
 from gaplab.services.store.models import Base
 from gaplab.services.store.tables import Kind
 
@@ -63,15 +57,5 @@ def test_every_exported_table_belongs_to_an_experiment_or_is_its_study() -> None
 def test_lists_of_numbers_are_told_from_nested_json() -> None:
     kinds = {(name, each.name): each.kind for name in EXPORTED for each in columns_of(name)}
 
-    assert kinds["measurement", "genome"] is kinds["iteration", "selected_genome"] is Kind.VECTOR
-    assert kinds["experiment", "spec"] is Kind.NESTED
-
-
-def test_doubles_of_any_size_take_less_space_than_in_memory() -> None:
-    genomes = np.random.default_rng(1).uniform(-1, 1, (1_000, 15))
-    file = BytesIO()
-
-    write("measurement", [{"genome": genome.tolist()} for genome in genomes], file)
-
-    assert len(file.getvalue()) < genomes.nbytes
-    assert np.array_equal(np.stack(parquet.read_table(file)["genome"].to_pylist()), genomes)
+    assert kinds["request", "genome"] is kinds["answer", "values"] is Kind.VECTOR
+    assert kinds["experiment", "spec"] is kinds["step", "body"] is Kind.NESTED

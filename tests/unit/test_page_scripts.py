@@ -86,7 +86,7 @@ def test_scripts_import_each_other_in_no_circle() -> None:
 
 
 def test_the_page_permits_the_actions_that_the_service_permits(tmp_path: Path) -> None:
-    permitted = exported(tmp_path, "lib/life_cycle.js", "PERMITTED")
+    permitted = exported(tmp_path, "views/study/actions.js", "PERMITTED")
 
     assert isinstance(permitted, dict)
     assert {action: set(states) for action, states in permitted.items()} == {
@@ -100,7 +100,7 @@ def test_the_page_knows_every_state(tmp_path: Path) -> None:
 
 
 def test_the_page_has_words_for_every_event(tmp_path: Path) -> None:
-    kinds = exported(tmp_path, "views/experiment/event_words.js", "KINDS")
+    kinds = exported(tmp_path, "lib/event_words.js", "KINDS")
 
     assert isinstance(kinds, list)
     assert set(kinds) == {kind.value for kind in EventKind}

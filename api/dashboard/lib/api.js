@@ -1,14 +1,19 @@
 // @ts-check
-/** Requests to the service, and the stream of its events. */
+/** Requests to the service, with the token of a guarded one, and the stream of its events. */
 
 import { parse, stringify } from "./json.js";
-import { rest } from "./rest.js";
-import { token } from "./token.js";
-import { abortWhenHidden, untilVisible } from "./visibility.js";
+import { abortWhenHidden, rest, untilVisible } from "./waiting.js";
 
 const RECONNECT_MS = 1500;
 const MOST_TRIES = 10;
 const OVER = new Set([401, 403, 409]);  // statuses of a stream that cannot be resumed
+const TOKEN = "gaplab-token";
+
+/** Return the token, or null. It is kept while the tab is open, and sent to this service only. */
+export const token = () => sessionStorage.getItem(TOKEN);
+
+/** @param {string} secret */
+export const keepToken = (secret) => sessionStorage.setItem(TOKEN, secret);
 
 /** A problem that the service answered with; status 0 means that it did not answer. */
 export class Problem extends Error {
@@ -25,7 +30,6 @@ export class Problem extends Error {
 
 /**
  * Return the JSON at a path.
- *
  * @param {string} path
  * @param {Page.Query} [query] may hold lists; what is null or empty is left out
  * @param {AbortSignal} [signal]
@@ -33,25 +37,14 @@ export class Problem extends Error {
  */
 export const get = async (path, query = {}, signal = undefined) => (await requestPatiently(path + queryString(query), { signal })).json();
 
-/**
- * Return the JSON at a path, with its tag.
- *
- * @param {string} path
- * @param {AbortSignal} [signal]
- */
+/** Return the JSON at a path, with its tag. @param {string} path @param {AbortSignal} [signal] */
 export const getTagged = async (path, signal = undefined) => tagged(await request(path, { signal }));
 
-/**
- * Return the file at a path.
- *
- * @param {string} path
- * @param {Page.Query} [query]
- */
+/** Return the file at a path. @param {string} path @param {Page.Query} [query] */
 export const getFile = async (path, query = {}) => (await requestPatiently(path + queryString(query), {})).blob();
 
 /**
  * Send a POST, and return the JSON of the answer.
- *
  * @param {string} path
  * @param {unknown} [body]
  * @param {Record<string, string>} [headers]
@@ -60,9 +53,25 @@ export const getFile = async (path, query = {}) => (await requestPatiently(path 
  */
 export const post = async (path, body = undefined, headers = {}, signal = undefined) => (await send("POST", path, body, headers, signal)).json();
 
+/** Return a new idempotency key; `crypto.randomUUID` exists on loopback and HTTPS only. */
+export const newKey = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (part) => part.toString(16).padStart(8, "0")).join("");
+
+/**
+ * Return a function that posts, under the same key for the same body: a second press after a lost answer does nothing twice.
+ * It may add a query to the path.
+ * @param {string} path
+ */
+export function keyed(path) {
+  let last = { text: "", key: "" };
+  return (/** @type {unknown} */ body, query = "") => {
+    const text = stringify(body);
+    if (last.text !== text) last = { text, key: newKey() };
+    return post(path + query, body, { "Idempotency-Key": last.key });
+  };
+}
+
 /**
  * Send a file in a POST, and return the JSON of the answer.
- *
  * @param {string} path
  * @param {Page.Query} query
  * @param {BodyInit} content
@@ -74,45 +83,26 @@ export const postFile = async (path, query, content, mediaType) =>
 
 /**
  * Send a PATCH, and return the JSON of the answer with its tag.
- *
  * @param {string} path
  * @param {unknown} body
  * @param {Record<string, string>} [headers]
  */
 export const patch = async (path, body, headers = {}) => tagged(await send("PATCH", path, body, headers));
 
-/**
- * Send a PUT, and return the JSON of the answer.
- *
- * @param {string} path
- * @param {unknown} body
- * @returns {Promise<any>}
- */
+/** Send a PUT, and return the JSON of the answer. @param {string} path @param {unknown} body @returns {Promise<any>} */
 export const put = async (path, body) => (await send("PUT", path, body, {})).json();
 
-/**
- * Send a DELETE, and return the JSON of the answer.
- *
- * @param {string} path
- * @returns {Promise<any>}
- */
+/** Send a DELETE, and return the JSON of the answer. @param {string} path @returns {Promise<any>} */
 export const remove = async (path) => (await send("DELETE", path, undefined, {})).json();
 
-/**
- * Return a query as it stands in an address: `?a=1&a=2`, or nothing.
- *
- * @param {Page.Query} query
- */
+/** Return a query as it stands in an address: `?a=1&a=2`, or nothing. @param {Page.Query} query */
 export function queryString(query) {
   const pairs = Object.entries(query).flatMap(([key, value]) =>
     [value].flat().filter((item) => item !== null && item !== undefined && item !== "").map((item) => [key, String(item)]));
   return pairs.length ? `?${new URLSearchParams(pairs)}` : "";
 }
 
-/**
- * @param {Response} answer
- * @returns {Promise<Page.Tagged<any>>}
- */
+/** @param {Response} answer @returns {Promise<Page.Tagged<any>>} */
 const tagged = async (answer) => ({ value: parse(await answer.text()), tag: answer.headers.get("ETag") });
 
 /**
@@ -129,7 +119,6 @@ function send(method, path, body, headers, signal = undefined) {
 
 /**
  * Send a request that only reads. While the service is busy with others, wait as long as it says, and ask again.
- *
  * @param {string} path
  * @param {RequestInit} options
  */
@@ -146,7 +135,6 @@ async function requestPatiently(path, options) {
 
 /**
  * Send a request, and throw a Problem unless it succeeds. Addresses are relative, so that the service may live below a prefix.
- *
  * @param {string} path
  * @param {RequestInit} options
  */
@@ -164,11 +152,7 @@ async function request(path, options) {
   throw new Problem({ ...problem, retryAfterS: Number(answer.headers.get("Retry-After")) || 0 });
 }
 
-/**
- * Return the problem of a service that does not answer.
- *
- * @param {() => void} [retry]
- */
+/** Return the problem of a service that does not answer. @param {() => void} [retry] */
 export const unreachable = (retry = undefined) =>
   new Problem({ detail: "It may be down, or the network is. What it has stored is safe.", retry });
 
@@ -177,7 +161,6 @@ export const unreachable = (retry = undefined) =>
  *
  * A stream that breaks off is resumed without a gap. While the page is hidden the stream is closed, and `connected` is not told.
  * A Problem is thrown when what the page shows no longer holds: the token is not valid, or the database was replaced.
- *
  * @param {Page.Query} query
  * @param {(event: Page.ServerEvent) => void} handler
  * @param {(isConnected: boolean, reason?: string) => void} connected learns why the service refused the stream
@@ -213,11 +196,7 @@ export async function streamEvents(query, handler, connected, signal) {
   }
 }
 
-/**
- * Yield the events of a stream, by the grammar of the HTML standard.
- *
- * @param {ReadableStream<Uint8Array<ArrayBuffer>>} stream
- */
+/** Yield the events of a stream, by the grammar of the HTML standard. @param {ReadableStream<Uint8Array<ArrayBuffer>>} stream */
 export async function* eventsOf(stream) {
   const reader = stream.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";

@@ -7,7 +7,6 @@ const SHOWN_MS = 2000;
 
 /**
  * Return a button that copies what `text()` returns, and says whether it could.
- *
  * @param {string} label
  * @param {() => string | Promise<string>} text
  */
@@ -24,11 +23,7 @@ export function copyButton(label, text) {
   return button;
 }
 
-/**
- * Copy a text, and return whether that worked. Pages that are not on loopback or HTTPS have the older command only.
- *
- * @param {string} text
- */
+/** Copy a text, and return whether that worked. Pages that are not on loopback or HTTPS have the older command only. @param {string} text */
 async function copy(text) {
   if (navigator.clipboard) return await navigator.clipboard.writeText(text).then(() => true, () => false);
   const area = h("textarea", { class: "away" });

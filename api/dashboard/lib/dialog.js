@@ -16,7 +16,6 @@ import { h } from "./dom.js";
 
 /**
  * Open a dialog until `act` succeeds or the reader goes back; an error of `act` is shown in it.
- *
  * @param {Question} question
  * @param {AbortSignal} signal
  */
@@ -55,13 +54,33 @@ function labelledField({ name, label, value, hint, multiline = false, ...attribu
     hint ? h("small", { id: `${id}-hint` }, hint) : null);
 }
 
-/**
- * Return an error as paragraphs: one for each value that it names, else its message.
- *
- * @param {any} error
- */
+/** Return an error as paragraphs: one for each value that it names, else its message. @param {any} error */
 export function errorParagraphs(error) {
   const named = /** @type {Api.SpecError[]} */ (error.errors ?? []);
   const lines = named.map(({ pointer, message }) => h("p", {}, h("code", {}, pointer || "the whole request"), ` ${message}`));
   return lines.length ? lines : [h("p", {}, error.message)];
+}
+
+/**
+ * Send a request; if the service wants it confirmed, ask the reader, and send it again.
+ *
+ * @template T
+ * @param {(query: string) => Promise<T>} send adds a query to the address
+ * @param {AbortSignal} signal
+ * @returns {Promise<T | null>} the answer; null if the reader went back
+ */
+export async function confirmingCost(send, signal) {
+  try {
+    return await send("");
+  } catch (error) {
+    const refused = /** @type {Api.SpecError[]} */ (error.errors ?? []).find(({ pointer }) => pointer === "confirm_cost");
+    if (!refused) throw error;
+    return new Promise((resolve) => {
+      const dialog = openDialog({
+        title: "Is that right?", text: `The service says: ${refused.message}.`, action: "Do it all the same",
+        act: async () => { resolve(await send("?confirm_cost=true")); },
+      }, signal);
+      dialog.addEventListener("close", () => { resolve(null); });  // after an answer, this does nothing
+    });
+  }
 }

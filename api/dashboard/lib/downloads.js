@@ -1,9 +1,8 @@
 // @ts-check
 /** Links to files of the service. With a token, the file is fetched by script, since a plain link cannot send it. */
 
-import { getFile, queryString } from "./api.js";
+import { getFile, queryString, token } from "./api.js";
 import { h } from "./dom.js";
-import { token } from "./token.js";
 
 const FORMATS = ["svg", "png", "pdf"];
 

@@ -3,11 +3,7 @@
 
 import { isDark } from "./theme.js";
 
-/**
- * Colours of lines that are too dark on a dark ground, each with its replacement there.
- *
- * @type {Record<string, string>}
- */
+/** Colours of lines that are too dark on a dark ground, each with its replacement there. @type {Record<string, string>} */
 const LIGHTER = {
   "0,114,178": "86,172,230", "213,94,0": "255,140,66", "0,158,115": "64,201,160",
   "204,121,167": "230,160,201", "230,159,0": "242,183,64", "86,180,233": "170,220,250",
@@ -18,13 +14,7 @@ const OPAQUER = 1.4;  // what is half transparent loses its contrast on a dark g
 const WORDS_PX = 100;  // added on a phone for words that stand upright below an axis
 const PANEL_PX = 270;  // of each panel, where panels stand one above the other
 
-/**
- * Return a chart as it is drawn in an element.
- *
- * @param {Api.Chart} chart
- * @param {Element} canvas
- * @returns {Api.Chart}
- */
+/** Return a chart as it is drawn in an element. @param {Api.Chart} chart @param {Element} canvas @returns {Api.Chart} */
 export function themed({ data, layout: given }, canvas) {
   const isNarrow = canvas.clientWidth < NARROW_PX;
   const layout = isNarrow ? stacked(given) : given;
@@ -55,7 +45,6 @@ export function themed({ data, layout: given }, canvas) {
 
 /**
  * Return a layout for a phone: the panels one above the other, a bar of colours above them all, and words below an axis upright.
- *
  * @param {Record<string, any>} layout
  * @returns {Record<string, any>}
  */
@@ -83,11 +72,7 @@ export function stacked(layout) {
   return { ...result, height: PANEL_PX * axes.length + 120 };
 }
 
-/**
- * @param {any} trace
- * @param {string} ink
- * @param {boolean} isShaded whether the colours of the figure are shades of a scale
- */
+/** @param {any} trace @param {string} ink @param {boolean} isShaded whether the colours of the figure are shades of a scale */
 function themedTrace(trace, ink, isShaded) {
   const color = (/** @type {unknown} */ value) => {
     if (typeof value !== "string") return value;
@@ -102,11 +87,7 @@ function themedTrace(trace, ink, isShaded) {
   return result;
 }
 
-/**
- * Return the red, green, blue and opacity of a colour like `#0072B2` or `rgba(0, 114, 178, 0.1)`.
- *
- * @param {string} color
- */
+/** Return the red, green, blue and opacity of a colour like `#0072B2` or `rgba(0, 114, 178, 0.1)`. @param {string} color */
 export function components(color) {
   if (color.startsWith("#")) return [...[1, 3, 5].map((start) => parseInt(color.slice(start, start + 2), 16)), 1];
   const [red, green, blue, opacity = 1] = color.match(/[\d.]+/g)?.map(Number) ?? [];
@@ -115,7 +96,6 @@ export function components(color) {
 
 /**
  * Return the colour of a line on a dark ground.
- *
  * @param {string} color
  * @param {boolean} [isShaded] whether a colour without a replacement is a shade of a scale, which is then mixed with white
  */
@@ -128,7 +108,6 @@ export function lighter(color, isShaded = false) {
 
 /**
  * Return a scale of colours mixed with white, since its dark end could not be seen on a dark ground.
- *
  * @param {{ colorscale: [number, string][] }} axis
  */
 function paler(axis) {
@@ -141,10 +120,7 @@ function mixed(color) {
   return `rgba(${[red, green, blue].map((value) => Math.round(value + (255 - value) * WHITE_SHARE))},${opacity})`;
 }
 
-/**
- * @param {string} color
- * @param {string} ink
- */
+/** @param {string} color @param {string} ink */
 function inInk(color, ink) {
   const [red, green, blue] = components(ink);
   return `rgba(${red},${green},${blue},${components(color)[3]})`;

@@ -8,7 +8,6 @@ const INTERVAL_MS = 10_000;
 
 /**
  * Return what is wrong with the service, in words; nothing if all is well, or if the service does not answer, which the view tells.
- *
  * @param {() => Promise<{ warnings?: string[] }>} ask
  */
 export async function trouble(ask) {

@@ -2,11 +2,13 @@
 /** Keeps a view up to date: it is refreshed when something happened, and when the service is back. */
 
 import { streamEvents } from "./api.js";
-import { byId, setText } from "./dom.js";
+import { byId, h, setText } from "./dom.js";
+import { age } from "./format.js";
 
 const INTERVAL_MS = 1000;
 const MOST_EVENTS = 1000;
 const GONE = 404;
+const RETIME_MS = 30_000;
 
 /**
  * Call `refresh` soon after events that fit a query, at most once a second, with the events since the last call.
@@ -14,7 +16,6 @@ const GONE = 404;
  * No events are given after a break of the stream, or if there were too many to look at one by one: then everything may have
  * changed. Calls do not overlap; one that failed is repeated. A hidden page waits until it is visible. The bar at the top says
  * when the service is away. The page is loaded again when the token is no longer valid, or the database was replaced.
- *
  * @param {Page.Query} query
  * @param {(events: Page.ServerEvent[]) => Promise<void>} refresh
  * @param {AbortSignal} signal
@@ -80,10 +81,9 @@ export function follow(query, refresh, signal) {
 /**
  * Return functions that load a page again, and that take an answer to a change of it. Of two answers the one that was asked for later
  * stays, whichever comes first: an older one has an older state and an older tag.
- *
  * @param {() => Promise<Page.Tagged<any>>} load
  * @param {(tagged: Page.Tagged<any>) => void} show
- * @returns {Pick<Page.Editable, "take" | "reload">}
+ * @returns {Pick<Page.StudyPage, "take" | "reload">}
  */
 export function latestAnswers(load, show) {
   let asked = 0;
@@ -103,28 +103,25 @@ export function latestAnswers(load, show) {
 }
 
 /**
- * Bring a page up to date at regular intervals until its signal: times pass without events too. A page that nobody sees is left as it
- * is, and of what has ended only the ages change.
- *
- * @param {Page.Editable} page
+ * Act at regular intervals until `signal`, while somebody sees the page.
  * @param {number} intervalMs
+ * @param {() => void} act
+ * @param {AbortSignal} signal
  */
-export function reloadEvery(page, intervalMs) {
-  const again = () => {
-    if (document.hidden) return;
-    if (page.hasEnded()) page.update();
-    else page.reload().catch(() => {});
-  };
-  const timer = setInterval(again, intervalMs);
-  page.signal.addEventListener("abort", () => clearInterval(timer));
+export function every(intervalMs, act, signal) {
+  const timer = setInterval(() => { if (!document.hidden) act(); }, intervalMs);
+  signal.addEventListener("abort", () => clearInterval(timer));
 }
 
-/**
- * Say in the bar that the service is away, or why it refused the stream of events.
- *
- * @param {boolean} isConnected
- * @param {string} [reason]
- */
+/** Return how long ago a moment was. @param {string} time */
+export const ageOf = (time) => h("time", { datetime: time, title: new Date(time).toLocaleString() }, age(time));
+
+/** Bring the ages below an element up to date now and then, until `signal`. @param {HTMLElement} element @param {AbortSignal} signal */
+export function keepAges(element, signal) {
+  every(RETIME_MS, () => { for (const time of element.querySelectorAll("time")) time.textContent = age(time.dateTime); }, signal);
+}
+
+/** Say in the bar that the service is away, or why it refused the stream of events. @param {boolean} isConnected @param {string} [reason] */
 function showConnection(isConnected, reason = "") {
   const problem = reason ? `Live updates are refused: ${reason.replace(/\.$/, "")}` : "The service is away";
   setText(byId("connection"), isConnected ? "" : `${problem}; trying again…`);

@@ -14,16 +14,12 @@ const HARMLESS = /^(https?:\/\/|mailto:|#)/i;
 
 /**
  * Return the nodes of rendered Markdown. No element, attribute or address that is not listed here reaches the page.
- *
  * @param {string} html
  * @returns {Page.Child[]}
  */
 export const markdownNodes = (html) => copied(new DOMParser().parseFromString(html, "text/html").body);
 
-/**
- * @param {Node} parent
- * @returns {Page.Child[]}
- */
+/** @param {Node} parent @returns {Page.Child[]} */
 function copied(parent) {
   return [...parent.childNodes].map((node) => {
     if (node.nodeType === Node.TEXT_NODE) return node.textContent;
@@ -43,7 +39,6 @@ function linkAttributes(link) {
 
 /**
  * Return the notes of a study or an experiment; until they are rendered they are plain text.
- *
  * @param {string} path of the study or the experiment
  * @param {AbortSignal} signal
  * @returns {Page.Updatable<string | null>}

@@ -29,7 +29,6 @@ function plotly() {
  *
  * Returns a function that draws it for a query. That function resolves to false if the figure could not be updated and an earlier
  * answer to the same query still stands. After each drawing the element dispatches the event `drawn`, for what stands over the figure.
- *
  * @param {HTMLElement} element
  * @param {string} kind
  * @param {AbortSignal} signal
@@ -114,10 +113,7 @@ export function plot(element, kind, signal) {
   return draw;
 }
 
-/**
- * @param {Api.TableRead} numbers
- * @param {boolean | undefined} open
- */
+/** @param {Api.TableRead} numbers @param {boolean | undefined} open */
 function numbersTable({ head, rows }, open) {
   return h("details", { class: "numbers", open }, h("summary", {}, "The numbers"), table("The numbers of the figure", head, rows));
 }

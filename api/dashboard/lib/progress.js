@@ -6,32 +6,23 @@ import { count, durationRange, percent } from "./format.js";
 
 const MOST_STEPS = 5;
 
-/**
- * Return the share that is done, between 0 and 1; a saved rollout is done.
- *
- * @param {Api.Progress} progress
- */
+/** Return the share that is done, between 0 and 1; a saved rollout is done. @param {Api.Progress} progress */
 export function fraction(progress) {
   return progress.rollouts ? Math.min(1, (progress.rollouts_done + progress.rollouts_saved) / progress.rollouts) : 0;
 }
 
-/**
- * Return the number of rollouts, with those that were saved.
- *
- * @param {Api.Progress} progress
- */
+/** Return the number of rollouts, with those that were saved. @param {Api.Progress} progress */
 export const rolloutsDone = ({ rollouts_done: done, rollouts: all, rollouts_saved: saved }) =>
   `${count(done)} of ${count(all)}${saved ? `, ${count(saved)} saved` : ""}`;
 
 /**
  * Return the facts of completed work and of the steps under way. Iterations are counted as in a spec: without number 0.
- *
  * @param {Api.Progress} progress
  */
 export function workFacts(progress) {
   const { completed, repetitions, failed, counted_iterations: iterations, counted_iterations_done: done, rollouts_failed: broken, steps } = progress;
   const shares = steps.map(({ kind, iteration, rollouts, budget }) => `${kind} ${iteration}: ${percent(rollouts / budget)}`);
-  /** @type {import("./head_parts.js").Fact[]} */
+  /** @type {import("./table.js").Fact[]} */
   const facts = [
     ["Repetitions", `${count(completed)} of ${count(repetitions)}${failed ? `, ${count(failed)} failed` : ""}`],
     ["Iterations", iterations ? `${count(done)} of ${count(iterations)}` : ""],
@@ -41,12 +32,7 @@ export function workFacts(progress) {
   return facts.filter(([, text]) => text);
 }
 
-/**
- * Return a bar with its per cent.
- *
- * @param {string} label
- * @returns {Page.Updatable<Api.Progress>}
- */
+/** Return a bar with its per cent. @param {string} label @returns {Page.Updatable<Api.Progress>} */
 export function progressBar(label) {
   const bar = h("progress", { max: 1, "aria-label": label });
   const shownPercent = h("span", { class: "percent" });
@@ -60,7 +46,6 @@ export function progressBar(label) {
 
 /**
  * Return the time left; nothing unless the experiment or study is running, and neither pausing nor stopping.
- *
  * @param {{ state: Api.State, progress: Api.Progress }} item
  */
 export function timeLeft({ state, progress }) {
@@ -68,9 +53,5 @@ export function timeLeft({ state, progress }) {
   return progress.time_left ? durationRange(progress.time_left) : "not known yet";
 }
 
-/**
- * Return the time left as a fact: a dash unless it is running.
- *
- * @param {{ state: Api.State, progress: Api.Progress }} item
- */
+/** Return the time left as a fact: a dash unless it is running. @param {{ state: Api.State, progress: Api.Progress }} item */
 export const timeLeftFact = (item) => timeLeft(item) || "–";

@@ -7,7 +7,6 @@ import { readableName } from "./format.js";
 
 /**
  * Return a function that gives the unit of an experiment's fitness; the empty text if its robot is not installed.
- *
  * @param {Api.Catalogue} catalogue
  */
 export function unitsOf({ robots }) {
@@ -17,24 +16,15 @@ export function unitsOf({ robots }) {
 
 /**
  * Return whether an experiment's robot is a function, whose curve is stepped through instead of a motion that is replayed.
- *
  * @param {Api.Catalogue} catalogue
  * @param {Api.ExperimentRead} experiment
  */
 export const isFunction = ({ robots }, { spec }) => robots.some(({ name, details }) => name === spec.robot.name && details.function === true);
 
-/**
- * Return whether reality is a robot on a bench.
- *
- * @param {{ spec: Record<string, any> }} experiment
- */
+/** Return whether reality is a robot on a bench. @param {{ spec: Record<string, any> }} experiment */
 export const isPhysical = ({ spec }) => spec.reality.kind === "physical";
 
-/**
- * Return the engine of the simulators, and what reality is if it is something else.
- *
- * @param {Record<string, any>} spec resolved
- */
+/** Return the engine of the simulators, and what reality is if it is something else. @param {Record<string, any>} spec resolved */
 export function worldsText({ engine, reality }) {
   if (reality.kind === "physical") return `${readableName(engine.name)}, reality on the bench “${reality.bench}”`;
   return `${readableName(engine.name)}${reality.engine.name === engine.name ? "" : `, reality in ${readableName(reality.engine.name)}`}`;

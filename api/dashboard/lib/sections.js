@@ -2,7 +2,7 @@
 /** Sections of a view that load when they come into sight, and again after events that change them. */
 
 import { failed, loading } from "./placeholders.js";
-import { rest } from "./rest.js";
+import { rest } from "./waiting.js";
 
 const REST_FACTOR = 4;
 const RETRY_MS = 1000;
@@ -29,7 +29,6 @@ const RETRY_MS = 1000;
  *
  * `add` returns a function that loads the section at once, after a choice of the reader. What was being loaded is then out of date:
  * `load()` must drop it.
- *
  * @param {AbortSignal} signal
  * @returns {Page.Sections}
  */

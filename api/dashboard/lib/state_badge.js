@@ -14,12 +14,7 @@ export const ENDED = /** @type {Api.State[]} */ (["COMPLETED", "FAILED", "CANCEL
 
 const PARTLY = "◑";
 
-/**
- * Return a state as an element; a caveat is what the state alone does not say.
- *
- * @param {Api.State} state
- * @param {string | null} [caveat]
- */
+/** Return a state as an element; a caveat is what the state alone does not say. @param {Api.State} state @param {string | null} [caveat] */
 export const stateBadge = (state, caveat = null) =>
   h("span", { class: `state-badge ${state.toLowerCase()}${caveat ? " partly" : ""}`, title: caveat ?? undefined },
     h("span", { "aria-hidden": "true" }, caveat && ENDED.includes(state) ? PARTLY : SIGNS[state]), " ", state.toLowerCase(),

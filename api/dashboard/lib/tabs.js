@@ -8,7 +8,6 @@ const STEPS = { ArrowRight: 1, ArrowLeft: -1 };
 
 /**
  * Return tabs over panels.
- *
  * @param {string} label
  * @param {[name: string, title: string, panel: Page.Child][]} entries
  * @param {string | null} chosen the name of the panel that is open at first; the first one if there is none of that name

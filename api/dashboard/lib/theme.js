@@ -14,12 +14,7 @@ export function switchTheme() {
   apply(theme);
 }
 
-/**
- * Call a handler after every switch between light and dark, until `signal`.
- *
- * @param {() => void} handler
- * @param {AbortSignal} signal
- */
+/** Call a handler after every switch between light and dark, until `signal`. @param {() => void} handler @param {AbortSignal} signal */
 export function onTheme(handler, signal) {
   addEventListener("gaplab-theme", handler, { signal });
 }

@@ -34,6 +34,9 @@ declare namespace Page {
     update: (value: Value) => void;
   }
 
+  /** What a list has to choose from. */
+  type Choices = [value: string, label: string, disabled?: boolean][];
+
   /** A name as the API takes it: a plug-in without options is its bare name. */
   type PluginName = string | { name: string; options?: Record<string, any> };
 
@@ -45,30 +48,23 @@ declare namespace Page {
     reload(events: ServerEvent[]): void;
   }
 
-  /** What the parts of a view of one study or experiment share. */
-  interface Editable {
-    signal: AbortSignal;
-    tag: string | null;
-    take(tagged: Tagged<any>): void;
-    reload(): Promise<void>;
-    update(): void;
-    hasEnded(): boolean;
-  }
-
-  interface ExperimentPage extends Editable {
+  /** What the parts of the view of a study, or of one of its experiments, share. */
+  interface StudyPage {
+    /** The id in the address. */
     id: string;
+    signal: AbortSignal;
+    /** The number of the latest event when the page was loaded. */
     latest: number;
-    experiment: Api.ExperimentRead;
+    study: Api.StudyRead;
+    /** The first experiment, and often the only one. */
+    readonly experiment: Api.ExperimentRead;
+    tag: string | null;
     isFunction: boolean;
     unit(experiment: Api.ExperimentRead | undefined): string;
     sections: Sections;
-  }
-
-  interface StudyPage extends Editable {
-    id: string;
-    study: Api.StudyRead;
-    unit(experiment: Api.ExperimentRead | undefined): string;
-    sections: Sections;
+    take(tagged: Tagged<any>): void;
+    reload(): Promise<void>;
+    update(): void;
   }
 
   /** What the parts of the view of a bench share. */

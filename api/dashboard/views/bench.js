@@ -1,15 +1,14 @@
 // @ts-check
 /** The bench: what an operator measures next, beside the robot, on a phone whose network comes and goes. */
 
-import { keepAges } from "../lib/ages.js";
 import { get } from "../lib/api.js";
+import { conflictList } from "../lib/bench/corrections.js";
+import { isWanted, nextRequest } from "../lib/bench/requests.js";
 import { answers, onAnswers, sendWaiting } from "../lib/bench/sender.js";
-import { isWanted, nextRequest } from "../lib/bench/choosing.js";
 import { h, refill, setText } from "../lib/dom.js";
+import { keepAges } from "../lib/live.js";
 import { failed } from "../lib/placeholders.js";
-import { conflictList } from "./bench/conflicts.js";
-import { nextCard, nothingToDo } from "./bench/next_card.js";
-import { otherList } from "./bench/others.js";
+import { nextCard, nothingToDo, otherList } from "./bench/next_card.js";
 import { keepPolling } from "./bench/polling.js";
 import { sentList } from "./bench/sent.js";
 import { Take } from "./bench/take.js";
@@ -20,7 +19,6 @@ const LOST = [401, 403, 404];  // the view cannot go on
 
 /**
  * Fill `root` with the requests of the bench or the experiment that the parameters name, or of all, until `signal`.
- *
  * @param {HTMLElement} root
  * @param {URLSearchParams} parameters
  * @param {AbortSignal} signal
@@ -98,7 +96,6 @@ export async function show(root, parameters, signal) {
 
 /**
  * Return the requests with the one that the reader chose, if it still waits: it may be beyond the first page.
- *
  * @param {Api.RequestRead[]} requests
  * @param {string | null} chosen
  * @param {AbortSignal} signal
@@ -115,17 +112,9 @@ export async function withChosen(requests, chosen, signal) {
   }
 }
 
-/**
- * Return links to the benches, if there are several.
- *
- * @param {string[]} benches
- */
+/** Return links to the benches, if there are several. @param {string[]} benches */
 const benchLinks = (benches) => (benches.length < 2 ? null
   : h("p", { class: "links" }, ...benches.flatMap((bench) => [h("a", { href: `#/bench?${new URLSearchParams({ bench })}` }, bench), " "])));
 
-/**
- * Return what of a request is shown; times pass without a change.
- *
- * @param {Api.RequestRead} request
- */
+/** Return what of a request is shown; times pass without a change. @param {Api.RequestRead} request */
 const keyOf = ({ id, state, takes, taken_by: by, busy, answers: given, safety }) => [id, state, takes, by, busy, given.length, safety];

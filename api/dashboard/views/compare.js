@@ -3,6 +3,7 @@
 
 import { copyButton } from "../lib/copy.js";
 import { h } from "../lib/dom.js";
+import { CURVE_KINDS } from "../lib/event_kinds.js";
 import { follow } from "../lib/live.js";
 import { empty } from "../lib/placeholders.js";
 import { sections } from "../lib/sections.js";
@@ -16,7 +17,6 @@ import { figure } from "./compare/figure.js";
 import { remarks } from "./compare/remarks.js";
 import { settings } from "./compare/settings.js";
 import { significance } from "./compare/significance.js";
-import { CURVE_KINDS } from "./experiment/event_words.js";
 
 const KINDS = [...CURVE_KINDS, "started", "waiting", "pausing", "paused", "resumed", "stopping", "retried"];
 

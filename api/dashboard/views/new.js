@@ -1,25 +1,24 @@
 // @ts-check
 /** A new study: a form made from the catalogue, which the service checks and prices while the reader types. */
 
-import { get, post } from "../lib/api.js";
-import { confirmingCost } from "../lib/cost.js";
+import { get, keyed, post } from "../lib/api.js";
+import { confirmingCost } from "../lib/dialog.js";
 import { h } from "../lib/dom.js";
-import { keyed } from "../lib/keyed.js";
+import { parse } from "../lib/json.js";
 import { draftOf, followRobot, specOf } from "./new/draft.js";
 import { ErrorPlaces } from "./new/fields.js";
 import { budgetPart, simulationPart, strategiesPart, studyPart, tunablesPart } from "./new/form_parts.js";
 import { realityPart } from "./new/reality_part.js";
 import { panel } from "./new/panel.js";
-import { pasteField } from "./new/paste.js";
 
 const TYPING_MS = 300;
 const PARTS = [studyPart, strategiesPart, simulationPart, tunablesPart, realityPart, budgetPart];
 
+/** @typedef {Record<string, any>} Spec */
 /** @typedef {{ name: string, summary: string, spec: Record<string, any> }} Preset */
 
 /**
  * Fill `root` with the form, until `signal`. A spec in the address fills the form.
- *
  * @param {HTMLElement} root
  * @param {URLSearchParams} parameters
  * @param {AbortSignal} signal
@@ -41,11 +40,7 @@ export async function show(root, parameters, signal) {
 
 /** The form, its content, and what the service says about it. */
 export class Form {
-  /**
-   * @param {Api.Catalogue} catalogue
-   * @param {Record<string, any>} spec the one to start from
-   * @param {AbortSignal} signal
-   */
+  /** @param {Api.Catalogue} catalogue @param {Record<string, any>} spec the one to start from @param {AbortSignal} signal */
   constructor(catalogue, spec, signal) {
     this.catalogue = catalogue;
     this.signal = signal;
@@ -63,12 +58,7 @@ export class Form {
     signal.addEventListener("abort", () => clearTimeout(this.timer));
   }
 
-  /**
-   * Return a function that sets a value of the draft.
-   *
-   * @param {Record<string, any>} object
-   * @param {string} name
-   */
+  /** Return a function that sets a value of the draft. @param {Record<string, any>} object @param {string} name */
   setter(object, name) {
     return (/** @type {unknown} */ value) => {
       object[name] = value;
@@ -76,11 +66,7 @@ export class Form {
     };
   }
 
-  /**
-   * Start from another spec.
-   *
-   * @param {Record<string, any>} spec
-   */
+  /** Start from another spec. @param {Record<string, any>} spec */
   start(spec) {
     this.draft = draftOf(spec, this.catalogue);
     this.remake();
@@ -123,10 +109,7 @@ export class Form {
     }
   }
 
-  /**
-   * @param {any} error
-   * @param {string} words
-   */
+  /** @param {any} error @param {string} words */
   showErrors(error, words) {
     const errors = error.errors ?? [];
     const others = this.places.show(errors);
@@ -150,4 +133,48 @@ export class Form {
       this.panel.setBusy(false);
     }
   }
+}
+
+/** Return the spec of a study for a spec of a study or an experiment, whose one strategy becomes a list. @param {Spec} spec @returns {Spec} */
+export function studyOf(spec) {
+  if (!("strategy" in spec) || "strategies" in spec) return spec;
+  const { strategy, ...others } = spec;
+  return { ...others, strategies: [strategy] };
+}
+
+/** Return the object in a text of JSON. @param {string} text @returns {Spec} */
+export function specIn(text) {
+  let found;
+  try {
+    found = parse(text);
+  } catch (error) {
+    throw new Error(`This is not JSON: ${error.message}`, { cause: error });
+  }
+  if (found === null || typeof found !== "object" || Array.isArray(found)) throw new Error('A spec is an object, like {"budget": "smoke"}.');
+  return found;
+}
+
+/** Return a field for pasted JSON, and a function that takes a text as if it had been pasted. @param {(spec: Spec) => void} fill fills the form */
+function pasteField(fill) {
+  const area = h("textarea", { id: "pasted", rows: 8, spellcheck: "false", placeholder: '{"budget": "smoke", "repetitions": 3}' });
+  const troubles = h("div", { role: "alert", class: "trouble" });
+  const element = h("details", { class: "paste" }, h("summary", {}, "Paste a spec"),
+    h("label", { for: "pasted" }, "Spec of a study or an experiment, as JSON"), area, troubles,
+    h("button", { type: "button", onclick: () => { take(area.value); } }, "Fill the form"));
+  const take = async (/** @type {string} */ text) => {
+    area.value = text;
+    troubles.replaceChildren();
+    try {
+      const spec = studyOf(specIn(text));
+      await post("/studies/estimate", spec);
+      fill(spec);
+      element.open = false;
+    } catch (error) {
+      element.open = true;
+      const errors = error.errors?.length ? error.errors : [{ pointer: "", message: error.message }];
+      troubles.replaceChildren(...errors.map((/** @type {{ pointer: string, message: string }} */ { pointer, message }) =>
+        h("p", {}, pointer ? h("code", {}, pointer) : null, ` ${message}`)));
+    }
+  };
+  return { element, take };
 }

@@ -11,7 +11,6 @@ const STEP_MS = 1300;
 
 /**
  * Fill `root` with the iterations of one repetition of the experiment that the parameters name, until `signal`.
- *
  * @param {HTMLElement} root
  * @param {URLSearchParams} parameters
  * @param {AbortSignal} signal

@@ -1,9 +1,9 @@
 """The tables.
 
-    study ──< experiment ──< repetition ──< iteration ──< measurement
-                                    │                └──< simulator
+    study ──< experiment ──< repetition ──< step, of its log or of a closed branch
+                                    ├──< branch
                                     ├──< attempt
-                                    ├──< request ──< answer;  branch, of closed steps
+                                    ├──< request ──< answer
                                     └──< checkpoint, of the current step
     sensitivity, shared by experiments with the same subject, whose hash is its id
     provenance, shared by experiments through experiment_provenance; its id is a hash of its facts
@@ -17,8 +17,8 @@
 Values that are plotted or filtered are columns; vectors are JSON arrays, in which floats round-trip exactly. Neither a
 database nor JSON has nan or infinity: a fitness of nan and a squared error of infinity are NULL.
 
-The tallies in `repetition` (steps, rollouts, seconds) are updated in the transaction that adds the rows they count.
-So progress is a sum over repetitions, and reads no results.
+The tallies in `repetition` (steps, rollouts, seconds) are sums over its log, and change in the same transaction.
+So progress is a sum over repetitions, and reads no steps.
 """
 
 from gaplab.services.store.models.base import REVISION as REVISION
@@ -27,7 +27,6 @@ from gaplab.services.store.models.base import Number as Number
 from gaplab.services.store.models.base import Reason as Reason
 from gaplab.services.store.models.bench import AnswerRow as AnswerRow
 from gaplab.services.store.models.bench import AttachmentRow as AttachmentRow
-from gaplab.services.store.models.bench import BranchRow as BranchRow
 from gaplab.services.store.models.bench import RequestRow as RequestRow
 from gaplab.services.store.models.experiments import DeletionRow as DeletionRow
 from gaplab.services.store.models.experiments import ExperimentRow as ExperimentRow
@@ -37,9 +36,10 @@ from gaplab.services.store.models.provenance import ExperimentProvenanceRow as E
 from gaplab.services.store.models.provenance import ProvenanceRow as ProvenanceRow
 from gaplab.services.store.models.provenance import RobotRow as RobotRow
 from gaplab.services.store.models.provenance import SupervisorRow as SupervisorRow
-from gaplab.services.store.models.results import IterationRow as IterationRow
-from gaplab.services.store.models.results import MeasurementRow as MeasurementRow
-from gaplab.services.store.models.results import SimulatorRow as SimulatorRow
+from gaplab.services.store.models.results import LOG as LOG
+from gaplab.services.store.models.results import BranchRow as BranchRow
+from gaplab.services.store.models.results import StepKind as StepKind
+from gaplab.services.store.models.results import StepRow as StepRow
 from gaplab.services.store.models.service import EventCounterRow as EventCounterRow
 from gaplab.services.store.models.service import EventRow as EventRow
 from gaplab.services.store.models.service import IdempotencyRow as IdempotencyRow

@@ -1,4 +1,4 @@
-"""Tables of physical measurements: requests, answers, closed branches and attachments."""
+"""Tables of physical measurements: requests, answers and attachments."""
 
 from datetime import datetime
 from typing import Any
@@ -94,25 +94,6 @@ class AnswerRow(Base):
     reason: Mapped[str | None] = mapped_column(Reason)
     token_id: Mapped[str | None] = mapped_column(String(32))
     at: Mapped[datetime] = mapped_column(default=now())
-
-
-class BranchRow(Base):
-    """Steps that a correction closed. They are in no other table, so they count nowhere.
-
-    Attributes:
-        number: from 1, within the repetition.
-        iteration: iteration of the measurement that was corrected.
-        steps: the steps, as JSON.
-    """
-
-    __tablename__ = "branch"
-
-    repetition_id: Mapped[int] = mapped_column(ForeignKey("repetition.id"), primary_key=True, autoincrement=False)
-    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    iteration: Mapped[int]
-    reason: Mapped[str] = mapped_column(Reason)
-    steps: Mapped[list[dict[str, Any]]]
-    closed_at: Mapped[datetime] = mapped_column(default=now())
 
 
 class AttachmentRow(Base):

@@ -4,6 +4,7 @@ from datetime import datetime
 from typing import Any
 
 from sqlalchemy import BigInteger, ForeignKey, Index, String, Text, UniqueConstraint
+from sqlalchemy.ext.hybrid import hybrid_property
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import State
@@ -134,7 +135,6 @@ class RepetitionRow(LeasedRow):
     number: Mapped[int]
     steps: Mapped[int] = mapped_column(default=0)
     checkpoints: Mapped[int] = mapped_column(default=0, server_default="0")
-    iterations_done: Mapped[int] = mapped_column(default=0)
     rollouts_done: Mapped[int] = mapped_column(BigInteger, default=0)
     rollouts_failed: Mapped[int] = mapped_column(BigInteger, default=0)
     rollouts_saved: Mapped[int] = mapped_column(BigInteger, default=0)
@@ -143,6 +143,11 @@ class RepetitionRow(LeasedRow):
     measuring_at: Mapped[datetime | None]
     hidden_error: Mapped[str | None] = mapped_column(Reason)
     hardware: Mapped[str | None] = mapped_column(String(32))
+
+    @hybrid_property
+    def iterations_done(self) -> int:
+        """Number of ended iterations: the first has three steps, each later one five."""
+        return (self.steps + 2) // 5
 
 
 class DeletionRow(Base):

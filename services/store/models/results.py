@@ -1,92 +1,79 @@
-"""Results of repetitions."""
+"""The log of a repetition: its steps, which are its results."""
 
 from datetime import datetime
+from enum import StrEnum
+from typing import Any
 
-from sqlalchemy import (
-    BigInteger,
-    ForeignKey,
-    ForeignKeyConstraint,
-    String,
-)
+from sqlalchemy import BigInteger, ForeignKey, Index, String, text
 from sqlalchemy.orm import Mapped, mapped_column
 
-from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.clock import now
-from gaplab.services.store.models.base import Base
+from gaplab.services.store.models.base import Base, Reason, words
+
+LOG = 0
+"""The branch of the steps that count."""
 
 
-class IterationRow(Base):
-    """An iteration: select, measure, tune, transfer; columns of later steps are NULL.
+class StepKind(StrEnum):
+    """What a step did; in an iteration, steps have this order."""
 
-    The rollouts of a phase are NULL until it is recorded. Number 0, the untuned baseline, selects nothing.
-    """
-
-    __tablename__ = "iteration"
-
-    repetition_id: Mapped[int] = mapped_column(ForeignKey("repetition.id"), primary_key=True)
-    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    selected_genome: Mapped[list[float] | None]
-    selection_rollouts: Mapped[int | None] = mapped_column(BigInteger)
-    selection_failures: Mapped[int | None] = mapped_column(BigInteger)
-    selection_saved: Mapped[int | None] = mapped_column(BigInteger)
-    tuning_rollouts: Mapped[int | None] = mapped_column(BigInteger)
-    tuning_failures: Mapped[int | None] = mapped_column(BigInteger)
-    tuning_saved: Mapped[int | None] = mapped_column(BigInteger)
-    transferred_genome: Mapped[list[float] | None]
-    simulated_fitness: Mapped[float | None]
-    transfer_rollouts: Mapped[int | None] = mapped_column(BigInteger)
-    transfer_failures: Mapped[int | None] = mapped_column(BigInteger)
-    transfer_saved: Mapped[int | None] = mapped_column(BigInteger)
-    recorded_fitness: Mapped[float | None]
-    seconds: Mapped[float] = mapped_column(default=0.0)
-    ended_at: Mapped[datetime | None]
+    SELECTED = "selected"
+    MEASURED = "measured"
+    TUNED = "tuned"
+    TRANSFERRED = "transferred"
+    PROBED = "probed"
 
 
-class MeasurementRow(Base):
-    """One real-world evaluation. Readings are NULL if the robot has no sensors; one of them, if its sensor failed.
+_PROBES = text("kind = 'probed'")
+_CURVE = ("repetition_id", "branch", "kind", "iteration", "recorded")
+
+
+class StepRow(Base):
+    """One step of a log, or of a branch of it that a correction closed.
 
     Attributes:
-        repeats: the values whose mean is the fitness; NULL if it is a single value.
-        left_out: true for a probe that the spec does not ask for.
+        branch: `LOG`, or the number of the closed branch.
+        place: its place in the log, from 0.
+        fitness: fitness in reality of what was measured or probed, in simulation of what was transferred.
+        recorded: what the curve shows, if it is a probe.
+        measured_by: engine or operator of a measurement; NULL if nothing was measured.
+        rollouts, failures, saved: its cost, as in `gaplab.services.core.types.Cost`.
+        seconds: seconds of work.
+        at: when it was recorded.
+        body: vectors and simulators, as `gaplab.services.store.queries.logs` packs them; last, since it is long.
     """
 
-    __tablename__ = "measurement"
-    __table_args__ = (
-        ForeignKeyConstraint(["repetition_id", "iteration"], ["iteration.repetition_id", "iteration.number"]),
-    )
+    __tablename__ = "step"
+    __table_args__ = (Index("ix_step_curve", *_CURVE, sqlite_where=_PROBES, postgresql_where=_PROBES),)
 
-    repetition_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    repetition_id: Mapped[int] = mapped_column(ForeignKey("repetition.id"), primary_key=True)
+    branch: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, default=LOG)
+    kind: Mapped[StepKind] = mapped_column(words(StepKind, "kind"), primary_key=True)
     iteration: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    kind: Mapped[MeasurementKind] = mapped_column(primary_key=True)
-    genome: Mapped[list[float]]
+    place: Mapped[int]
     fitness: Mapped[float | None]
-    readings: Mapped[list[float | None] | None]
-    repeats: Mapped[list[float] | None]
-    left_out: Mapped[bool] = mapped_column(server_default="0")
-    measured_by: Mapped[str] = mapped_column(String(100))
-    measured_at: Mapped[datetime] = mapped_column(default=now())
+    recorded: Mapped[float | None]
+    measured_by: Mapped[str | None] = mapped_column(String(200))
+    rollouts: Mapped[int] = mapped_column(BigInteger, default=0)
+    failures: Mapped[int] = mapped_column(BigInteger, default=0)
+    saved: Mapped[int] = mapped_column(BigInteger, default=0)
+    seconds: Mapped[float] = mapped_column(default=0.0)
+    at: Mapped[datetime] = mapped_column(default=now())
+    body: Mapped[dict[str, Any]]
 
 
-class SimulatorRow(Base):
-    """One tuned simulator; rank 0 is the best of its iteration.
+class BranchRow(Base):
+    """A branch that a correction closed: the steps with its number, which count nowhere.
 
-    Its 95 % intervals, from `lower` to `upper`, and its share of the posterior are NULL unless the tuner gives them.
-    Its discrepancy from held-out samples is NULL unless it is the best, and there are some; its fit unless it is the
-    best, and the noise is known: expected error, surprise, scale of intervals, then the errors of readings.
+    Attributes:
+        number: from 1, within the repetition.
+        iteration: iteration of the measurement that was corrected.
     """
 
-    __tablename__ = "simulator"
-    __table_args__ = (
-        ForeignKeyConstraint(["repetition_id", "iteration"], ["iteration.repetition_id", "iteration.number"]),
-    )
+    __tablename__ = "branch"
 
-    repetition_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    iteration: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    rank: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    parameters: Mapped[list[float]]
-    squared_error: Mapped[float | None]
-    lower: Mapped[list[float] | None]
-    upper: Mapped[list[float] | None]
-    weight: Mapped[float | None]
-    held_out_error: Mapped[float | None]
-    fit: Mapped[list[float | None] | None]
+    repetition_id: Mapped[int] = mapped_column(ForeignKey("repetition.id"), primary_key=True, autoincrement=False)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    iteration: Mapped[int]
+    reason: Mapped[str] = mapped_column(Reason)
+    closed_at: Mapped[datetime] = mapped_column(default=now())

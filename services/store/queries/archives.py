@@ -6,7 +6,7 @@ from itertools import islice
 from typing import Any
 
 from sqlalchemy import Select, delete, insert, select, text
-from sqlalchemy.exc import DataError, IntegrityError
+from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from gaplab.services.store.models import (
@@ -24,10 +24,13 @@ Row = dict[str, Any]
 Refused = (IntegrityError, DataError)
 """Errors of the database for rows that contradict each other, or do not fit their table."""
 
+Unreadable = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError, SQLAlchemyError)
+"""Errors of reading a value that its column does not permit, from a database that another program wrote."""
+
 REPETITION_ID, EXPERIMENT, REPETITION = "repetition_id", "experiment", "repetition"
 """Rows have the experiment and the number of a repetition instead of its id, which one database generated."""
 
-_AT_ONCE = 1_000
+_AT_ONCE = 500
 _LOCK = 0x67617069  # among the advisory locks of a Postgres database
 _REPETITIONS = Base.metadata.tables["repetition"]
 _SHARED: dict[str, Callable[[Session, Sequence[Row]], None]] = {
@@ -38,7 +41,9 @@ _SHARED: dict[str, Callable[[Session, Sequence[Row]], None]] = {
 _REPLACED = {EXPERIMENT: _REPETITIONS.c.experiment_id, REPETITION: _REPETITIONS.c.number}
 
 
-def read_rows(session: Session, name: str, columns: Iterable[str], owners: Sequence[str]) -> Iterator[Row]:
+def read_rows(
+    session: Session, name: str, columns: Iterable[str], owners: Sequence[str], at_once: int = _AT_ONCE
+) -> Iterator[Row]:
     """Yield the rows of experiments in a table, as the database returns them.
 
     Args:
@@ -46,10 +51,19 @@ def read_rows(session: Session, name: str, columns: Iterable[str], owners: Seque
         name: the table.
         columns: their names, with `EXPERIMENT` and `REPETITION` in place of the id of a repetition.
         owners: ids of experiments, or of studies if the table is `study`; rows have this order.
+        at_once: number of rows in memory, of files one.
     """
-    for query in _queries(session, name, list(columns), owners):
-        for row in session.execute(query, execution_options={"yield_per": _AT_ONCE}).mappings():
+    columns = list(columns)
+    for query in _queries(session, name, columns, owners):
+        at_once = 1 if "content" in columns else at_once
+        for row in session.execute(query, execution_options={"yield_per": at_once}).mappings():
             yield {key: value.value if isinstance(value, Enum) else value for key, value in row.items()}
+
+
+def all_ids(session: Session, model: type[StudyRow | ExperimentRow]) -> list[str]:
+    """Return the ids of all studies or experiments, those of a study in its order."""
+    order = (model.id,) if model is StudyRow else (ExperimentRow.position, model.id)
+    return list(session.scalars(select(model.id).order_by(*order)))
 
 
 def taken_ids(session: Session, ids: set[str]) -> set[str]:
@@ -65,22 +79,20 @@ def forget_deletions(session: Session, ids: Iterable[str]) -> None:
     session.execute(delete(DeletionRow).where(DeletionRow.id.in_(list(ids))))
 
 
-def insert_rows(session: Session, name: str, rows: Iterable[Row]) -> int:
-    """Insert rows into a table, and return their number.
+def insert_rows(session: Session, name: str, rows: Iterable[Row], at_once: int = _AT_ONCE) -> None:
+    """Insert rows into a table, so many at once, and files one at a time.
 
     Raises:
         IntegrityError: a row exists already, or belongs to a row that does not exist.
         DataError: a value does not fit its column.
         KeyError: a row belongs to a repetition that does not exist.
     """
-    table, count, incoming = Base.metadata.tables[name], 0, iter(rows)
-    while some := list(islice(incoming, 1 if name == "attachment" else _AT_ONCE)):
-        count += len(some)
+    table, incoming = Base.metadata.tables[name], iter(rows)
+    while some := list(islice(incoming, 1 if name == "attachment" else at_once)):
         if name in _SHARED:
             _SHARED[name](session, some)
         else:
             session.execute(insert(table), _with_ids(session, some) if REPETITION_ID in table.c else some)
-    return count
 
 
 def _queries(session: Session, name: str, columns: Sequence[str], owners: Sequence[str]) -> list[Select[Any]]:

@@ -35,12 +35,18 @@ def missing(session: Session, names: Sequence[str], place: str) -> list[Violatio
     return [Violation(f"{place}/{at}", name, message) for at, name in enumerate(names) if name not in stored]
 
 
+def all_ids(session: Session) -> set[str]:
+    """Return the ids of all that are stored."""
+    return set(session.scalars(select(AttachmentRow.id)))
+
+
 def named(session: Session, repetitions: ScalarSelect[int] | None = None) -> set[str]:
     """Return the ids that answers name: all answers, or the answers of some repetitions."""
     chosen = select(AnswerRow.attachments)
     if repetitions is not None:
         chosen = chosen.where(AnswerRow.repetition_id.in_(repetitions))
-    return set(chain.from_iterable(each or () for each in session.scalars(chosen)))
+    some_at_once = session.scalars(chosen, execution_options={"yield_per": 100})
+    return set(chain.from_iterable(each or () for each in some_at_once))
 
 
 def remove_unnamed(session: Session, once_named: Collection[str]) -> None:
@@ -65,7 +71,7 @@ def insert_unless_there(session: Session, rows: Iterable[dict[str, Any]]) -> Non
     """Insert files with their contents; one that is there already stays as it is, until the transaction has ended."""
     for row in rows:
         if not present(session, [row["id"]]):
-            session.execute(insert_new(session, AttachmentRow).values(**row, created_at=now()))
+            session.execute(insert_new(session, AttachmentRow).values({"created_at": now()} | row))
 
 
 def unnamed_bytes(session: Session) -> int:

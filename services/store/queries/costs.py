@@ -7,8 +7,8 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from gaplab.schemas.records import MeasurementKind
-from gaplab.services.store.models import ExperimentRow, MeasurementRow, RepetitionRow
+from gaplab.services.store.models import LOG, ExperimentRow, RepetitionRow, StepKind, StepRow
+from gaplab.services.store.queries.repetition_rows import MEASURED
 
 
 def latest(session: Session, count: int) -> tuple[tuple[dict[str, Any], float, int], ...]:
@@ -47,16 +47,14 @@ class Work:
 
 def work_of(session: Session, experiments: Sequence[str]) -> dict[str, Work]:
     """Return the work of each experiment."""
-    run, row = RepetitionRow, MeasurementRow
+    run, row = RepetitionRow, StepRow
     seconds = select(run.experiment_id, func.sum(run.seconds)).where(run.experiment_id.in_(experiments))
     measured = select(run.experiment_id, row.kind, func.count()).join(run, run.id == row.repetition_id)
-    measured = measured.where(run.experiment_id.in_(experiments), ~row.left_out).group_by(run.experiment_id, row.kind)
-    counts = {(id_, kind): count for id_, kind, count in session.execute(measured)}
+    real = (row.branch == LOG) & row.kind.in_(MEASURED.values()) & row.measured_by.is_not(None)
+    measured = measured.where(run.experiment_id.in_(experiments), real)
+    found = session.execute(measured.group_by(run.experiment_id, row.kind))
+    counts = {(id_, kind): count for id_, kind, count in found}
     return {
-        id_: Work(
-            float(spent or 0.0),
-            counts.get((id_, MeasurementKind.SAMPLE), 0),
-            counts.get((id_, MeasurementKind.PROBE), 0),
-        )
+        id_: Work(float(spent or 0.0), counts.get((id_, StepKind.MEASURED), 0), counts.get((id_, StepKind.PROBED), 0))
         for id_, spent in session.execute(seconds.group_by(run.experiment_id))
     }

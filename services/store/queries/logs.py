@@ -1,15 +1,17 @@
-"""Reading of repetitions' logs: the steps equal the recorded ones to the last bit."""
+"""Repetitions' logs: how a step is stored as a row, and read again to the last bit.
 
-from collections import defaultdict
-from collections.abc import Iterable, Sequence
+A body has vectors as JSON arrays, in which floats round-trip exactly, and leaves out what is unknown. JSON has no nan
+and no infinity: a reading of nan and a squared error of infinity are null.
+"""
+
+from collections.abc import Mapping, Sequence
 from math import inf, nan
-from typing import Any, TypeVar
+from typing import Any, cast
 
-from sqlalchemy import select
+from sqlalchemy import Row, Table, select
 from sqlalchemy.orm import Session
 
-from gaplab.schemas.records import MeasurementKind
-from gaplab.services.core.arrays import NO_READINGS, FloatArray, Readings, frozen
+from gaplab.services.core.arrays import NO_READINGS, FloatArray, frozen, known
 from gaplab.services.core.types import (
     Cost,
     Fit,
@@ -22,117 +24,159 @@ from gaplab.services.core.types import (
     Transferred,
     Tuned,
 )
-from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
+from gaplab.services.store.models import LOG, BranchRow, StepKind, StepRow
 
-R = TypeVar("R", IterationRow, MeasurementRow, SimulatorRow)
+_ORDER = tuple(StepKind)
+_STEP = cast("Table", StepRow.__table__)
 
 
 def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, ...]]:
     """Return the log of each of these repetitions."""
-    iterations = _rows(session, repetitions, IterationRow, IterationRow.number)
-    measurements = _rows(session, repetitions, MeasurementRow, MeasurementRow.iteration)
-    simulators = _rows(session, repetitions, SimulatorRow, SimulatorRow.iteration, SimulatorRow.rank)
-    return {each: _log(iterations[each], measurements[each], simulators[each]) for each in repetitions}
+    row = StepRow
+    found: dict[int, list[Step]] = {each: [] for each in repetitions}
+    query = select(*_STEP.columns).where(row.repetition_id.in_(repetitions), row.branch == LOG)
+    for each in session.execute(query.order_by(row.repetition_id, row.place)):
+        found[each.repetition_id].append(step_of(each))
+    return {repetition: tuple(steps) for repetition, steps in found.items()}
 
 
-def _rows(session: Session, repetitions: Sequence[int], table: type[R], *order: Any) -> dict[int, list[R]]:  # noqa: ANN401  # columns
-    found: Iterable[R] = session.scalars(select(table).where(table.repetition_id.in_(repetitions)).order_by(*order))
-    gathered: dict[int, list[R]] = defaultdict(list)
-    for row in found:
-        gathered[row.repetition_id].append(row)
-    return gathered
+def is_whole(session: Session, repetition: int, length: int, at_once: int) -> bool:
+    """Return whether a log has this many steps in order, and each step, of branches too, is as it is stored here.
 
-
-def _log(
-    iterations: Iterable[IterationRow], measurements: Iterable[MeasurementRow], simulators: Iterable[SimulatorRow]
-) -> tuple[Step, ...]:
-    """Return the steps that one repetition's rows describe.
-
-    Args:
-        iterations: iterations by number.
-        measurements: measurements in any order.
-        simulators: simulators by iteration and rank.
+    `at_once` rows are in memory.
     """
-    measured = {(each.iteration, each.kind): each for each in measurements}
-    tuned: dict[int, list[SimulatorRow]] = {}
-    for each in simulators:
-        tuned.setdefault(each.iteration, []).append(each)
-    return tuple(
-        step
-        for row in iterations
-        for step in (
-            _selected(row),
-            _measured(measured.get((row.number, MeasurementKind.SAMPLE))),
-            _tuned(row, tuned.get(row.number, ())),
-            _transferred(row),
-            _probed(row, measured.get((row.number, MeasurementKind.PROBE))),
-        )
-        if step is not None
+    row, count = StepRow, 0
+    query = select(*_STEP.columns).where(row.repetition_id == repetition).order_by(row.branch, row.place)
+    try:
+        for each in session.execute(query, execution_options={"yield_per": at_once}):
+            columns = columns_of(step_of(each))
+            if any(getattr(each, name) != value for name, value in columns.items()):
+                return False
+            if each.branch == LOG:
+                if each.place != count:
+                    return False
+                count += 1
+    except (KeyError, ValueError, TypeError, AssertionError):  # steps check themselves
+        return False
+    return count == length
+
+
+def unknown_branch(session: Session) -> int | None:
+    """Return the branch of a step, of any repetition, that is neither the log nor a closed branch; None without any."""
+    row, branch = StepRow, BranchRow
+    of_it = (branch.repetition_id == row.repetition_id) & (branch.number == row.branch)
+    query = select(row.branch).outerjoin(branch, of_it).where(row.branch != LOG, branch.number.is_(None))
+    found: int | None = session.scalar(query.limit(1))
+    return found
+
+
+def kind_of(step: Step) -> StepKind:
+    """Return the kind of a step."""
+    return StepKind(type(step).__name__.lower())
+
+
+def position(step: Step) -> int:
+    """Return the step's place in the log of its repetition, from 0. Iteration 0 has no Selected and no Measured."""
+    return len(_ORDER) * step.iteration + _ORDER.index(kind_of(step)) - _ORDER.index(StepKind.TUNED)
+
+
+def vector(values: FloatArray) -> list[float]:
+    """Return a JSON array, whose numbers read back exactly."""
+    return [float(each) for each in values]
+
+
+def columns_of(step: Step) -> dict[str, Any]:
+    """Return the columns of a step that say what it is; not whose it is, who measured it, and how long it took."""
+    cost = getattr(step, "cost", Cost())
+    return {
+        "kind": kind_of(step),
+        "iteration": step.iteration,
+        "place": position(step),
+        "fitness": None,
+        "recorded": None,
+        "rollouts": int(cost.rollouts),
+        "failures": int(cost.failures),
+        "saved": int(cost.saved),
+    } | _outcome(step)
+
+
+def _outcome(step: Step) -> dict[str, Any]:
+    match step:
+        case Selected(genome=genome):
+            return {"body": {"genome": vector(genome)}}
+        case Measured(sample=sample):
+            return {"fitness": known(sample.fitness), "body": {"genome": vector(sample.genome)} | _seen(sample)}
+        case Tuned(simulators=simulators):
+            return {"body": {"simulators": [*map(_packed, simulators)]}}
+        case Transferred(genome=genome):
+            return {"fitness": known(step.fitness), "body": {"genome": vector(genome)}}
+        case Probed():
+            return {"fitness": known(step.fitness), "recorded": known(step.recorded), "body": _seen(step)}
+
+
+def _seen(measured: Sample | Probed) -> dict[str, Any]:
+    readings, repeats = [known(each) for each in measured.readings.tolist()], vector(measured.repeats)
+    return ({"readings": readings} if readings else {}) | ({"repeats": repeats} if repeats else {})
+
+
+def _packed(simulator: Simulator) -> dict[str, Any]:
+    interval, fit = simulator.interval, simulator.fit
+    packed = {
+        "parameters": vector(simulator.parameters),
+        "squared_error": known(simulator.squared_error),
+        "lower": None if interval is None else vector(interval[:, 0]),
+        "upper": None if interval is None else vector(interval[:, 1]),
+        "weight": simulator.weight,
+        "held_out_error": simulator.held_out_error,
+        "fit": None if fit is None else _fit(fit),
+    }
+    return {name: value for name, value in packed.items() if value is not None or name == "squared_error"}
+
+
+def _fit(fit: Fit) -> list[float | None]:
+    return [*map(known, (fit.expected_error, fit.surprise, fit.interval_scale, *fit.reading_errors.tolist()))]
+
+
+def step_of(row: StepRow | Row[Any]) -> Step:
+    """Return the step that a row describes."""
+    body, fitness = row.body, _or(nan, row.fitness)
+    cost = Cost(row.rollouts, row.failures, row.saved)
+    match row.kind:
+        case StepKind.SELECTED:
+            return Selected(row.iteration, frozen(body["genome"]), cost)
+        case StepKind.MEASURED:
+            sample = Sample(frozen(body["genome"]), fitness, _vector(body, "readings"), _vector(body, "repeats"))
+            return Measured(row.iteration, sample)
+        case StepKind.TUNED:
+            return Tuned(row.iteration, tuple(map(simulator_of, body["simulators"])), cost)
+        case StepKind.TRANSFERRED:
+            return Transferred(row.iteration, frozen(body["genome"]), fitness, cost)
+    seen = _vector(body, "readings"), _vector(body, "repeats")
+    return Probed(row.iteration, fitness, _or(nan, row.recorded), *seen, left_out=row.measured_by is None)
+
+
+def simulator_of(packed: Mapping[str, Any]) -> Simulator:
+    """Return a simulator of the body of a tuned step."""
+    lower, upper = packed.get("lower"), packed.get("upper")
+    return Simulator(
+        parameters=frozen(packed["parameters"]),
+        squared_error=_or(inf, packed["squared_error"]),
+        interval=None if lower is None or upper is None else frozen(list(zip(lower, upper, strict=True))),
+        weight=packed.get("weight"),
+        held_out_error=packed.get("held_out_error"),
+        fit=_fit_of(packed.get("fit")),
     )
 
 
-def _selected(row: IterationRow) -> Selected | None:
-    if row.selected_genome is None:
-        return None
-    return Selected(
-        row.number,
-        frozen(row.selected_genome),
-        _cost(row.selection_rollouts, row.selection_failures, row.selection_saved),
-    )
-
-
-def _measured(row: MeasurementRow | None) -> Measured | None:
-    if row is None:
-        return None
-    sample = Sample(frozen(row.genome), _or(nan, row.fitness), _readings(row.readings), _repeats(row))
-    return Measured(row.iteration, sample)
-
-
-def _tuned(row: IterationRow, simulators: Sequence[SimulatorRow]) -> Tuned | None:
-    if row.tuning_rollouts is None:
-        return None
-    found = tuple(map(_simulator, simulators))
-    return Tuned(row.number, found, _cost(row.tuning_rollouts, row.tuning_failures, row.tuning_saved))
-
-
-def _simulator(row: SimulatorRow) -> Simulator:
-    interval = None if row.lower is None or row.upper is None else frozen(list(zip(row.lower, row.upper, strict=True)))
-    error = _or(inf, row.squared_error)
-    return Simulator(frozen(row.parameters), error, interval, row.weight, row.held_out_error, fit_of(row.fit))
-
-
-def fit_of(stored: list[float | None] | None) -> Fit | None:
-    """Return the fit of a simulator from its column; None if it is not known."""
+def _fit_of(stored: Sequence[float | None] | None) -> Fit | None:
     if stored is None or None in stored[:3]:
         return None
-    expected, surprise, scale, *errors = _readings(stored).tolist()
+    expected, surprise, scale, *errors = [_or(nan, each) for each in stored]
     return Fit(expected, surprise, scale, frozen(errors))
 
 
-def _transferred(row: IterationRow) -> Transferred | None:
-    if row.transferred_genome is None:
-        return None
-    spent = _cost(row.transfer_rollouts, row.transfer_failures, row.transfer_saved)
-    return Transferred(row.number, frozen(row.transferred_genome), _or(nan, row.simulated_fitness), spent)
-
-
-def _probed(row: IterationRow, probe: MeasurementRow | None) -> Probed | None:
-    if probe is None:
-        return None
-    fitnesses = _or(nan, probe.fitness), _or(nan, row.recorded_fitness)
-    return Probed(row.number, *fitnesses, _readings(probe.readings), _repeats(probe), probe.left_out)
-
-
-def _readings(values: list[float | None] | None) -> Readings:
-    return frozen([_or(nan, each) for each in values]) if values else NO_READINGS
-
-
-def _repeats(row: MeasurementRow) -> FloatArray:
-    return frozen(row.repeats) if row.repeats else NO_READINGS
-
-
-def _cost(rollouts: int | None, failures: int | None, saved: int | None) -> Cost:
-    return Cost(rollouts or 0, failures or 0, saved or 0)
+def _vector(body: Mapping[str, Any], name: str) -> FloatArray:
+    return frozen([_or(nan, each) for each in body[name]]) if name in body else NO_READINGS
 
 
 def _or(missing: float, value: float | None) -> float:

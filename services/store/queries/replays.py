@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import starmap
 from statistics import fmean
 
 from sqlalchemy import func, select
@@ -10,15 +9,8 @@ from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.held_out import is_held_out
-from gaplab.services.store.models import (
-    ExperimentRow,
-    IterationRow,
-    MeasurementRow,
-    RepetitionRow,
-    RequestRow,
-    SimulatorRow,
-)
-from gaplab.services.store.queries.repetition_rows import of_experiments
+from gaplab.services.store.models import ExperimentRow, RepetitionRow, RequestRow, StepKind, StepRow
+from gaplab.services.store.queries.repetition_rows import MEASURED, best, same_log, steps_of
 
 
 @dataclass(frozen=True)
@@ -43,27 +35,27 @@ def tuned_samples(session: Session, experiment: ExperimentRow) -> tuple[TunedSam
 
     Held-out samples are not among them.
     """
-    row, before, after = MeasurementRow, aliased(SimulatorRow), aliased(SimulatorRow)
-    columns = row.iteration, row.genome, row.fitness, before.parameters, after.parameters
-    query = of_experiments(row, [experiment.id], RepetitionRow.number, *columns)
-    query = query.where(row.kind == MeasurementKind.SAMPLE)
+    row, before, after = StepRow, aliased(StepRow), aliased(StepRow)
+    query = steps_of([experiment.id], StepKind.MEASURED, RepetitionRow.number, row, best(before), best(after))
     for found, iteration in ((before, row.iteration - 1), (after, row.iteration)):
-        best = (found.repetition_id == row.repetition_id) & (found.iteration == iteration) & (found.rank == 0)
-        query = query.join(found, best)
+        query = query.join(found, same_log(row, found, StepKind.TUNED) & (found.iteration == iteration))
     share = experiment.spec["held_out"]
-    samples = starmap(TunedSample, session.execute(query.order_by(RepetitionRow.number, row.iteration)))
+    samples = (
+        TunedSample(number, step.iteration, step.body["genome"], step.fitness, known["parameters"], tuned["parameters"])
+        for number, step, known, tuned in session.execute(query.order_by(RepetitionRow.number, row.iteration))
+    )
     seen = (each for each in samples if not is_held_out(experiment.known + each.iteration, share))
     return (*_known_samples(session, experiment), *seen)
 
 
 def _known_samples(session: Session, experiment: ExperimentRow) -> Iterator[TunedSample]:
-    row, share = SimulatorRow, experiment.spec["held_out"]
-    tuned = (row.iteration == 0) & (row.rank == 0) & row.squared_error.is_not(None)
-    query = of_experiments(row, [experiment.id], RepetitionRow.number, row.parameters).where(tuned)
-    for repetition, after in session.execute(query.order_by(RepetitionRow.number)):
-        for number, known in enumerate(experiment.spec["reality"]["samples"][: experiment.known], 1):
-            if not is_held_out(number, share):
-                yield TunedSample(repetition, 0, known["genome"], fmean(known["values"]), None, after)
+    row, share = StepRow, experiment.spec["held_out"]
+    query = steps_of([experiment.id], StepKind.TUNED, RepetitionRow.number, best(row)).where(row.iteration == 0)
+    for repetition, tuned in session.execute(query.order_by(RepetitionRow.number)):
+        samples = experiment.spec["reality"]["samples"][: experiment.known] if tuned else ()
+        for number, known in enumerate(samples, 1):
+            if tuned["squared_error"] is not None and not is_held_out(number, share):
+                yield TunedSample(repetition, 0, known["genome"], fmean(known["values"]), None, tuned["parameters"])
 
 
 @dataclass(frozen=True)
@@ -87,26 +79,25 @@ def measured_controller(
     session: Session, experiment: str, repetition: int, iteration: int, kind: MeasurementKind
 ) -> MeasuredController | None:
     """Return the sample or the transferred controller of an iteration; None if it is not measured yet."""
-    row, measured = IterationRow, MeasurementRow
-    query = (
-        of_experiments(
-            measured, [experiment], measured.genome, measured.fitness, row.simulated_fitness, measured.readings
-        )
-        .join(row, (row.repetition_id == measured.repetition_id) & (row.number == measured.iteration))
-        .where(RepetitionRow.number == repetition, measured.iteration == iteration, measured.kind == kind)
+    row, transferred = StepRow, aliased(StepRow)
+    query = steps_of([experiment], MEASURED[kind], row, transferred)
+    query = query.outerjoin(
+        transferred, same_log(row, transferred, StepKind.TRANSFERRED) & (transferred.iteration == row.iteration)
     )
-    found = session.execute(query).first()
+    found = session.execute(query.where(RepetitionRow.number == repetition, row.iteration == iteration)).first()
     if found is None:
         return None
-    genome, real, simulated, readings = found
-    return MeasuredController(genome, real, simulated if kind is MeasurementKind.PROBE else None, readings)
+    measured, evolved = found
+    readings = measured.body.get("readings")
+    if kind is MeasurementKind.SAMPLE:
+        return MeasuredController(measured.body["genome"], measured.fitness, None, readings)
+    return MeasuredController(evolved.body["genome"], measured.fitness, evolved.fitness, readings)
 
 
 def last_measured(session: Session, experiment: str, repetition: int, kind: MeasurementKind) -> int | None:
     """Return the last iteration of a repetition with such a measurement; None if there is none yet."""
-    row = MeasurementRow
-    query = of_experiments(row, [experiment], func.max(row.iteration))
-    last: int | None = session.scalar(query.where(RepetitionRow.number == repetition, row.kind == kind))
+    query = steps_of([experiment], MEASURED[kind], func.max(StepRow.iteration))
+    last: int | None = session.scalar(query.where(RepetitionRow.number == repetition))
     return last
 
 
@@ -124,7 +115,6 @@ def requested_controller(
 
 def tuned_parameters(session: Session, experiment: str, repetition: int, iteration: int) -> list[list[float]]:
     """Return the parameters of the simulators of an iteration, the best first; empty if they are not tuned yet."""
-    row = SimulatorRow
-    query = of_experiments(row, [experiment], row.parameters)
-    query = query.where(RepetitionRow.number == repetition, row.iteration == iteration)
-    return list(session.scalars(query.order_by(row.rank)))
+    query = steps_of([experiment], StepKind.TUNED, StepRow.body)
+    body = session.scalar(query.where(RepetitionRow.number == repetition, StepRow.iteration == iteration))
+    return [each["parameters"] for each in body["simulators"]] if body else []

@@ -15,10 +15,10 @@ from gaplab.services.store.queries import request_states
 from gaplab.services.store.queries.benches import spellings
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import lock, new_id
+from gaplab.services.store.queries.logs import vector
 from gaplab.services.store.queries.repetition_rows import of_experiments
 from gaplab.services.store.queries.request_states import ANSWERED as ANSWERED
 from gaplab.services.store.queries.request_states import PENDING as PENDING
-from gaplab.services.store.queries.step_rows import vector
 from gaplab.services.store.statements import storable
 
 MOST_UNANSWERED = 5

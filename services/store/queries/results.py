@@ -1,11 +1,12 @@
 """Results: samples, simulators, recorded fitnesses and costs of iterations."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
+from itertools import islice
 from typing import Any
 
 from sqlalchemy import ColumnElement, Select, bindparam, case, func, select, tuple_
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.lifecycle import PENDING, State
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
@@ -13,32 +14,14 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.repeats import standard_error
 from gaplab.services.core.stored_specs import discrepancy_of
-from gaplab.services.store.cursor import decode, encode
-from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
-from gaplab.services.store.queries.logs import fit_of
-from gaplab.services.store.queries.repetition_rows import of_experiments
+from gaplab.services.store.cursor import decode, encode, key_of
+from gaplab.services.store.models import LOG, ExperimentRow, RepetitionRow, StepKind, StepRow
+from gaplab.services.store.queries.logs import simulator_of
+from gaplab.services.store.queries.repetition_rows import MEASURED, in_log, of_experiments, same_log, steps_of
 from gaplab.services.store.queries.tunings import intervals, measured, per_sample
-
-_TURN = case((MeasurementRow.kind == MeasurementKind.SAMPLE, 0), else_=1)
-"""Within an iteration the sample comes before the probe."""
 
 _ASKED = RepetitionRow.experiment_id.in_(bindparam("experiments", expanding=True))
 """Condition of statements that are built once: building and hashing one takes longer than SQLite needs for it."""
-
-
-def _page(
-    session: Session,
-    query: Select[Any],
-    key: tuple[Any, ...],
-    wanted: Mapping[Any, Any],
-    limit: int,
-    cursor: str | None,
-) -> Iterable[Any]:
-    """Return up to `limit` rows after the cursor, in the order of the key; a wanted value of None permits all."""
-    query = query.where(*(column == value for column, value in wanted.items() if value is not None))
-    if cursor is not None:
-        query = query.where(tuple_(*key) > decode(cursor, key))
-    return session.execute(query.order_by(*key).limit(limit))
 
 
 def page_of_samples(
@@ -55,19 +38,39 @@ def page_of_samples(
     Raises:
         InvalidSpec: the cursor is invalid.
     """
-    row = MeasurementRow
-    columns = row.iteration, row.kind, row.genome, row.fitness, row.readings, row.repeats
-    query = of_experiments(row, [experiment], RepetitionRow.number, *columns, row.measured_by, row.measured_at)
-    query = query.where(~row.left_out)
-    key, wanted = (RepetitionRow.number, row.iteration, _TURN), {RepetitionRow.number: repetition, row.kind: kind}
-    return tuple(_sample(found._mapping) for found in _page(session, query, key, wanted, limit, cursor))
+    row, run, transferred = StepRow, RepetitionRow, aliased(StepRow)
+    key, turn = (run.number, row.iteration), case((row.kind == StepKind.MEASURED, 0), else_=1)
+    columns = row.kind, row.iteration, row.fitness, row.measured_by, row.at, row.body
+    query = of_experiments(row, [experiment], run.number, transferred.body, *columns).where(
+        row.branch == LOG,
+        row.measured_by.is_not(None),
+        row.kind.in_(MEASURED.values() if kind is None else [MEASURED[kind]]),
+    )
+    evolved = same_log(row, transferred, StepKind.TRANSFERRED) & (transferred.iteration == row.iteration)
+    query = query.outerjoin(transferred, evolved)
+    if repetition is not None:
+        query = query.where(run.number == repetition)
+    if cursor is not None:
+        query = query.where(tuple_(*key, turn) > decode(cursor, (*key, turn)))
+    found = session.execute(query.order_by(*key, turn).limit(limit))
+    return tuple(_sample(number, evolved, step) for number, evolved, *step in found)
 
 
-def _sample(found: Mapping[str, Any]) -> SampleRead:
-    values = dict(found)
-    values["repetition"] = values.pop("number")
-    values["standard_error"] = standard_error(frozen(values["repeats"] or ()))
-    return SampleRead(**values)
+def _sample(repetition: int, evolved: Mapping[str, Any] | None, step: Sequence[Any]) -> SampleRead:
+    kind, iteration, fitness, measured_by, at, body = step
+    repeats, sampled = body.get("repeats"), kind is StepKind.MEASURED
+    return SampleRead(
+        repetition=repetition,
+        iteration=iteration,
+        kind=MeasurementKind.SAMPLE if sampled else MeasurementKind.PROBE,
+        genome=(body if sampled else evolved or {})["genome"],
+        fitness=fitness,
+        readings=body.get("readings"),
+        repeats=repeats,
+        standard_error=standard_error(frozen(repeats or ())),
+        measured_by=measured_by or "",
+        measured_at=at,
+    )
 
 
 def page_of_simulators(
@@ -84,29 +87,43 @@ def page_of_simulators(
     Raises:
         InvalidSpec: the cursor is invalid.
     """
-    row = SimulatorRow
-    key = (RepetitionRow.number, row.iteration, row.rank)
-    query = of_experiments(row, [experiment.id], *key, row)
-    wanted = {RepetitionRow.number: repetition, row.iteration: iteration}
-    tuned = measured(session, experiment)
-    discrepancy = discrepancy_of(experiment.spec)
+    row, key = StepRow, (RepetitionRow.number, StepRow.iteration)
+    query = steps_of([experiment.id], StepKind.TUNED, *key, row.body)
+    for column, wanted in zip(key, (repetition, iteration), strict=True):
+        query = query if wanted is None else query.where(column == wanted)
+    last = (0, 0, -1) if cursor is None else key_of(cursor, (*key, row.place))
+    query = query.where(tuple_(*key) >= last[:2]).order_by(*key)
+    tuned, discrepancy = measured(session, experiment), discrepancy_of(experiment.spec)
     tunables = experiment.spec["tunables"]
-    return tuple(
-        _simulator(number, found, tunables, tuned.tuned_until(number, found.iteration), discrepancy)
-        for number, *_, found in _page(session, query, key, wanted, limit, cursor)
-    )
+    with session.execute(query, execution_options={"yield_per": 10}) as steps:
+        members = (
+            (number, at, rank, packed)
+            for number, at, body in steps
+            for rank, packed in enumerate(body["simulators"])
+            if (number, at, rank) > last
+        )
+        return tuple(
+            _simulator((number, at, rank), packed, tunables, tuned.tuned_until(number, at), discrepancy)
+            for number, at, rank, packed in islice(members, limit)
+        )
 
 
 def _simulator(
-    repetition: int, row: SimulatorRow, tunables: Sequence[Mapping[str, Any]], samples: int, discrepancy: Discrepancy
+    place: tuple[int, int, int],
+    packed: Mapping[str, Any],
+    tunables: Sequence[Mapping[str, Any]],
+    samples: int,
+    discrepancy: Discrepancy,
 ) -> SimulatorRead:
-    names, fit = [each["name"] for each in tunables], fit_of(row.fit)
-    pairs = intervals(row.parameters, row.lower, row.upper, fit, tunables)
-    return SimulatorRead.filled_from(
-        row,
-        repetition=repetition,
-        parameters=dict(zip(names, row.parameters, strict=True)),
-        error=per_sample(row.squared_error, samples, discrepancy),
+    names, simulator = [each["name"] for each in tunables], simulator_of(packed)
+    pairs, fit = intervals(simulator, tunables), simulator.fit
+    return SimulatorRead(
+        **dict(zip(("repetition", "iteration", "rank"), place, strict=True)),
+        parameters=dict(zip(names, packed["parameters"], strict=True)),
+        squared_error=packed["squared_error"],
+        error=per_sample(simulator.squared_error, samples, discrepancy),
+        weight=simulator.weight,
+        held_out_error=simulator.held_out_error,
         intervals=None if pairs is None else dict(zip(names, map(tuple, pairs.tolist()), strict=True)),
         expected_error=None if fit is None else per_sample(fit.expected_error, samples, discrepancy),
         surprise=None if fit is None else fit.surprise,
@@ -122,18 +139,20 @@ def cursor_of(row: SampleRead | SimulatorRead) -> str:
 
 def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str, int, int, float | None]]:
     """Return experiment, repetition, iteration and recorded fitness of every iteration that has one."""
-    row = IterationRow
-    columns = RepetitionRow.experiment_id, RepetitionRow.number, row.number, row.recorded_fitness
-    return session.execute(of_experiments(row, experiments, *columns).where(row.recorded_fitness.is_not(None))).all()
+    row = StepRow
+    columns = RepetitionRow.experiment_id, RepetitionRow.number, row.iteration, row.recorded
+    query = steps_of(experiments, StepKind.PROBED, *columns).where(row.recorded.is_not(None))
+    return session.execute(query.order_by(*columns[:3])).all()
 
 
 def measured_fitness(
     session: Session, experiments: Sequence[str], kind: MeasurementKind
 ) -> Sequence[tuple[str, int, int, float | None]]:
     """Return experiment, repetition, iteration and fitness of every measurement of a kind; None if it failed."""
-    row = MeasurementRow
+    row = StepRow
     columns = RepetitionRow.experiment_id, RepetitionRow.number, row.iteration, row.fitness
-    return session.execute(of_experiments(row, experiments, *columns).where(row.kind == kind, ~row.left_out)).all()
+    query = steps_of(experiments, MEASURED[kind], *columns).where(row.measured_by.is_not(None))
+    return session.execute(query.order_by(*columns[:3])).all()
 
 
 def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, list[float]]:
@@ -145,10 +164,13 @@ def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, lis
     return found
 
 
+_PROBES = in_log(StepRow, StepKind.PROBED)
+
+
 @cache
 def _best_recorded() -> Select[Any]:
-    row = IterationRow
-    of_one = select(func.max(row.recorded_fitness)).where(row.repetition_id == RepetitionRow.id).scalar_subquery()
+    row = StepRow
+    of_one = select(func.max(row.recorded)).where(row.repetition_id == RepetitionRow.id, _PROBES).scalar_subquery()
     return select(RepetitionRow.experiment_id, of_one).where(_ASKED)
 
 
@@ -197,10 +219,10 @@ def recorded_at(session: Session, counts: Mapping[str, int]) -> dict[str, list[f
 
 @cache
 def _recorded_at() -> Select[Any, Any, Any]:
-    row = IterationRow
-    query = select(RepetitionRow.experiment_id, row.number, row.recorded_fitness)
-    query = query.join(RepetitionRow, RepetitionRow.id == row.repetition_id).where(_ASKED)
-    query = query.where(row.number.in_(bindparam("numbers", expanding=True)), row.recorded_fitness.is_not(None))
+    row = StepRow
+    query = select(RepetitionRow.experiment_id, row.iteration, row.recorded)
+    query = query.join(RepetitionRow, RepetitionRow.id == row.repetition_id).where(_ASKED, _PROBES)
+    query = query.where(row.iteration.in_(bindparam("numbers", expanding=True)), row.recorded.is_not(None))
     return query.order_by(RepetitionRow.experiment_id, RepetitionRow.number)
 
 
@@ -210,30 +232,28 @@ def iteration_costs(session: Session, experiments: Sequence[str]) -> Sequence[tu
     Returns:
         Experiment, repetition, iteration, rollouts, seconds, and whether the iteration has a recorded fitness.
     """
-    row = IterationRow
-    phases = (row.selection_rollouts, row.tuning_rollouts, row.transfer_rollouts)
-    rollouts = sum((func.coalesce(each, 0) for each in phases[1:]), func.coalesce(phases[0], 0))
-    key = RepetitionRow.experiment_id, RepetitionRow.number, row.number
-    query = of_experiments(row, experiments, *key, rollouts, row.seconds, row.recorded_fitness.is_not(None))
-    return session.execute(query.order_by(*key)).all()
+    row = StepRow
+    key = RepetitionRow.experiment_id, RepetitionRow.number, row.iteration
+    sums = func.sum(row.rollouts), func.sum(row.seconds), func.count(row.recorded) > 0
+    query = of_experiments(row, experiments, *key, *sums).where(row.branch == LOG)
+    return session.execute(query.group_by(*key).order_by(*key)).all()
 
 
 def points_of_all() -> tuple[Select[Any], ColumnElement[Any]]:
     """Return the ids of experiments with a fitness after the last common number, grouped, and that of a repetition."""
-    row, shared = IterationRow, last_common_of_all().subquery()
+    row, shared = StepRow, last_common_of_all().subquery()
     query = select(RepetitionRow.experiment_id).join(shared, shared.c.experiment_id == RepetitionRow.experiment_id)
-    query = query.join(row, (row.repetition_id == RepetitionRow.id) & (row.number == shared.c.done - 1))
-    return query.where(row.recorded_fitness.is_not(None)).group_by(
-        RepetitionRow.experiment_id
-    ), row.recorded_fitness.expression
+    query = query.join(row, (row.repetition_id == RepetitionRow.id) & (row.iteration == shared.c.done - 1))
+    query = query.where(_PROBES, row.recorded.is_not(None)).group_by(RepetitionRow.experiment_id)
+    return query, row.recorded.expression
 
 
 def best_of_all() -> tuple[Select[Any], ColumnElement[Any]]:
     """Return the ids of experiments with a recorded fitness, grouped, and the best of a repetition in these groups."""
     best = (
-        select(RepetitionRow.experiment_id, func.max(IterationRow.recorded_fitness).label("best"))
-        .join(IterationRow, IterationRow.repetition_id == RepetitionRow.id)
-        .where(IterationRow.recorded_fitness.is_not(None))
+        select(RepetitionRow.experiment_id, func.max(StepRow.recorded).label("best"))
+        .join(StepRow, StepRow.repetition_id == RepetitionRow.id)
+        .where(_PROBES, StepRow.recorded.is_not(None))
         .group_by(RepetitionRow.id, RepetitionRow.experiment_id)
         .subquery()
     )

@@ -46,4 +46,4 @@ def insert_unless_there(session: Session, rows: Sequence[dict[str, Any]]) -> Non
     for row in rows:
         oldest = session.scalar(select(func.min(RobotRow.created_at)).where(RobotRow.name == row["name"]))
         at = now() if oldest is None else oldest - timedelta(microseconds=1)
-        session.execute(insert_new(session, RobotRow).values(**row, created_at=at))
+        session.execute(insert_new(session, RobotRow).values({"created_at": at} | row))

@@ -3,19 +3,22 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
-from sqlalchemy import Table, bindparam, select, tuple_, update
+from sqlalchemy import Table, bindparam, func, insert, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import Conflict
-from gaplab.services.core.types import Probed
+from gaplab.services.core.types import Cost, Measured, Probed, Step
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Claim, Delivered, TimedStep
-from gaplab.services.store.models import RepetitionRow
+from gaplab.services.store.models import LOG, RepetitionRow, StepRow
 from gaplab.services.store.queries import checkpoints, events
-from gaplab.services.store.queries.step_rows import StepRows, position, tallied
+from gaplab.services.store.queries.logs import columns_of, position
 
-_REPETITION = cast("Table", RepetitionRow.__table__)
+_REPETITION, _STEP = (cast("Table", each.__table__) for each in (RepetitionRow, StepRow))
+
+_TALLIES = {"rollouts_done": "rollouts", "rollouts_failed": "failures", "rollouts_saved": "saved"}
+"""Columns of a repetition, and those of its steps whose sums they are."""
 
 _ADVANCE = (
     update(_REPETITION)
@@ -30,7 +33,7 @@ _ADVANCE = (
         losses=0,
         measuring_at=None,
         heartbeat_at=now(),
-        **{name: _REPETITION.c[name] + bindparam(f"more_{name}") for name in (*tallied(()), "seconds")},
+        **{name: _REPETITION.c[name] + bindparam(f"more_{name}") for name in (*_TALLIES, "seconds")},
     )
 )
 """Built once: building a statement costs more than executing it."""
@@ -50,12 +53,12 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     moving = [_move(claim, lengths[claim][0], steps) for claim, steps in fresh.items() if steps]
     if moving and session.connection().execute(_ADVANCE, moving).rowcount != len(moving):
         raise Conflict("a log has new steps although it was locked")
-    batch = StepRows()
+    rows = [_row(claim.id, each, _engine(claim)) for claim, steps in fresh.items() for each in steps]
+    if rows:
+        session.connection().execute(insert(_STEP), rows)
     for claim, steps in fresh.items():
         for each in steps:
-            batch.add(claim.id, each, _measured_by(claim))
             events.note_step(session, each.step, claim.experiment_id, claim.number)
-    batch.write(session)
     checkpoints.forget(session, [claim.id for claim, steps in fresh.items() if steps and lengths[claim][1]])
     parts = {
         claim: checkpoints.fresh(deliveries[claim], lengths[claim][0] + len(steps), 0 if steps else lengths[claim][1])
@@ -74,13 +77,38 @@ def append(session: Session, repetition: RepetitionRow, timed: TimedStep, measur
     if repetition.state not in (State.WAITING, State.QUEUED) or position(timed.step) != repetition.steps:
         msg = f"step {position(timed.step)} cannot be recorded: repetition {repetition.number} is {repetition.state} "
         raise Conflict(msg + f"after {repetition.steps} steps")
-    batch = StepRows()
-    batch.add(repetition.id, timed, measured_by)
-    batch.write(session)
-    row, ends = RepetitionRow, isinstance(timed.step, Probed)
-    values = {"steps": row.steps + 1, "iterations_done": row.iterations_done + int(ends), "losses": 0, "error": None}
+    session.connection().execute(insert(_STEP), [_row(repetition.id, timed, measured_by)])
+    row = RepetitionRow
+    values = {"steps": row.steps + 1, "losses": 0, "error": None}
     session.execute(update(row).where(row.id == repetition.id).values(values))
     events.note_step(session, timed.step, repetition.experiment_id, repetition.number)
+
+
+def close(session: Session, repetition: int, place: int, branch: int) -> None:
+    """Move the steps of a log from a place on into a branch; they count nowhere from then on."""
+    row = StepRow
+    of_it = (row.repetition_id == repetition) & (row.branch == LOG)
+    session.execute(update(row).where(of_it, row.place >= place).values(branch=branch))
+    sums = (func.coalesce(func.sum(getattr(row, name)), 0) for name in (*_TALLIES.values(), "seconds"))
+    found = session.execute(select(*sums).where(of_it)).one()
+    values = dict(zip((*_TALLIES, "seconds"), found, strict=True))
+    session.execute(update(RepetitionRow).where(RepetitionRow.id == repetition).values(steps=place, **values))
+
+
+def rewrite(session: Session, repetition: int, step: Step, measured_by: str | None = None) -> None:
+    """Write the outcome of a measurement into its row; who measured it stays unless it is given."""
+    columns, row = columns_of(step), StepRow
+    values = {name: columns[name] for name in ("fitness", "recorded", "body")}
+    values |= {} if measured_by is None else {"measured_by": measured_by}
+    of_it = (row.repetition_id == repetition) & (row.branch == LOG) & (row.kind == columns["kind"])
+    session.execute(update(row).where(of_it, row.iteration == step.iteration).values(values))
+
+
+def _row(repetition: int, timed: TimedStep, measured_by: str) -> dict[str, Any]:
+    step = timed.step
+    measured = isinstance(step, Measured) or (isinstance(step, Probed) and not step.left_out)
+    own = {"repetition_id": repetition, "seconds": timed.seconds, "measured_by": measured_by if measured else None}
+    return own | columns_of(step)
 
 
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
@@ -111,17 +139,18 @@ def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[Time
     return found
 
 
-def _measured_by(claim: Claim) -> str:
+def _engine(claim: Claim) -> str:
     engine = claim.spec.reality.engine
     return engine.name if engine else "nobody"
 
 
 def _move(claim: Claim, length: int, steps: Sequence[TimedStep]) -> dict[str, Any]:
-    more = tallied([each.step for each in steps]) | {"seconds": sum(each.seconds for each in steps)}
+    costs = [getattr(each.step, "cost", Cost()) for each in steps]
     return {
         "of_id": claim.id,
         "of_epoch": claim.epoch,
         "from_steps": length,
         "to_steps": length + len(steps),
-        **{f"more_{name}": count for name, count in more.items()},
+        "more_seconds": sum(each.seconds for each in steps),
+        **{f"more_{name}": sum(int(getattr(each, of)) for each in costs) for name, of in _TALLIES.items()},
     }

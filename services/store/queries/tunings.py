@@ -2,20 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
-from gaplab.schemas.records import MeasurementKind
-from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.held_out import is_held_out, seen_of
 from gaplab.services.core.misspecification import widened
 from gaplab.services.core.space import Space
-from gaplab.services.core.types import Fit
-from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
-from gaplab.services.store.queries.logs import fit_of
-from gaplab.services.store.queries.repetition_rows import of_experiments
+from gaplab.services.core.types import Simulator
+from gaplab.services.store.models import LOG, ExperimentRow, RepetitionRow, StepKind, StepRow
+from gaplab.services.store.queries.logs import simulator_of
+from gaplab.services.store.queries.repetition_rows import best, of_experiments, same_log, steps_of
 
 
 @dataclass(frozen=True)
@@ -23,56 +23,40 @@ class BestSimulator:
     """The best simulator of one iteration, and the fitness of the controller that was evolved in it.
 
     Attributes:
-        squared_error: None if the physics failed on a sample.
-        held_out_error: None without held-out samples, or if the physics failed on one.
-        lower: lower ends of the 95 % intervals as the tuner gave them; None if it gives none.
-        upper: their upper ends.
+        simulator: its intervals are as the tuner gave them.
         simulated: fitness in the simulator; None if there is none.
         real: fitness in reality; None if there is none.
-        fit: how well it reproduces the samples; None if it is not known.
     """
 
     repetition: int
     iteration: int
-    parameters: list[float]
-    squared_error: float | None
-    held_out_error: float | None
-    lower: list[float] | None
-    upper: list[float] | None
+    simulator: Simulator
     simulated: float | None
     real: float | None
-    fit: Fit | None = None
 
 
 def best_simulators(session: Session, experiment: str) -> tuple[BestSimulator, ...]:
     """Return the best simulator of every iteration of every repetition, ordered by repetition, then iteration."""
-    row, found, probe = IterationRow, SimulatorRow, MeasurementRow
-    errors = found.squared_error, found.held_out_error
-    columns = found.parameters, *errors, found.lower, found.upper, row.simulated_fitness, probe.fitness, found.fit
-    best = (found.repetition_id == row.repetition_id) & (found.iteration == row.number) & (found.rank == 0)
-    probed = (probe.repetition_id == row.repetition_id) & (probe.iteration == row.number)
-    query = of_experiments(row, [experiment], RepetitionRow.number, row.number, *columns)
-    query = query.join(found, best).outerjoin(probe, probed & (probe.kind == MeasurementKind.PROBE))
-    ordered = session.execute(query.order_by(RepetitionRow.number, row.number))
-    return tuple(BestSimulator(*(*each, fit_of(fit))) for *each, fit in ordered)
+    row, transferred, probed = StepRow, aliased(StepRow), aliased(StepRow)
+    columns = RepetitionRow.number, row.iteration, best(row), transferred.fitness, probed.fitness
+    query = steps_of([experiment], StepKind.TUNED, *columns)
+    for later, kind in ((transferred, StepKind.TRANSFERRED), (probed, StepKind.PROBED)):
+        query = query.outerjoin(later, same_log(row, later, kind) & (later.iteration == row.iteration))
+    found = session.execute(query.order_by(RepetitionRow.number, row.iteration))
+    return tuple(
+        BestSimulator(repetition, iteration, simulator_of(packed), simulated, real)
+        for repetition, iteration, packed, simulated, real in found
+        if packed is not None
+    )
 
 
-def intervals(
-    parameters: Sequence[float],
-    lower: Sequence[float] | None,
-    upper: Sequence[float] | None,
-    fit: Fit | None,
-    tunables: Sequence[Mapping[str, Any]],
-) -> FloatArray | None:
-    """Return the 95 % intervals `(p, 2)`, widened if the samples differ more than they should; None without any.
-
-    Lower and upper ends are as the tuner gave them. `fit` says how well the simulator reproduces the samples.
-    """
-    if lower is None or upper is None:
+def intervals(simulator: Simulator, tunables: Sequence[Mapping[str, Any]]) -> FloatArray | None:
+    """Return the 95 % intervals `(p, 2)`, widened if the samples differ more than they should; None without any."""
+    if simulator.interval is None:
         return None
     space = Space.box([float(each["lower"]) for each in tunables], [float(each["upper"]) for each in tunables])
-    scale = 1.0 if fit is None else fit.interval_scale
-    return widened(frozen(list(zip(lower, upper, strict=True))), frozen(parameters), scale, space)
+    scale = 1.0 if simulator.fit is None else simulator.fit.interval_scale
+    return widened(simulator.interval, simulator.parameters, scale, space)
 
 
 @dataclass(frozen=True)
@@ -102,13 +86,12 @@ class MeasuredIterations:
 
 def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
     """Return the iterations whose sample has a fitness."""
-    row, share = MeasurementRow, experiment.spec["held_out"]
-    query = of_experiments(row, [experiment.id], RepetitionRow.number, row.iteration)
+    row, share = StepRow, experiment.spec["held_out"]
+    query = steps_of([experiment.id], StepKind.MEASURED, RepetitionRow.number, row.iteration)
     tuned_on, held_out = dict[int, list[int]](), dict[int, list[int]]()
     before = experiment.known
-    for repetition, iteration in session.execute(
-        query.where(row.kind == MeasurementKind.SAMPLE, row.fitness.is_not(None))
-    ):
+    succeeded = query.where(row.fitness.is_not(None)).order_by(RepetitionRow.number, row.iteration)
+    for repetition, iteration in session.execute(succeeded):
         (held_out if is_held_out(before + iteration, share) else tuned_on).setdefault(repetition, []).append(iteration)
     known = seen_of(before, share)
     return MeasuredIterations(tuned_on, held_out, known, before - known)
@@ -116,25 +99,28 @@ def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
 
 def repeats(session: Session, experiment: str) -> list[list[float]]:
     """Return the values of each sample and probe that was measured several times."""
-    row = MeasurementRow
-    return list(session.scalars(of_experiments(row, [experiment], row.repeats).where(row.repeats.is_not(None))))
+    bodies = of_experiments(StepRow, [experiment], StepRow.body).where(
+        StepRow.branch == LOG, StepRow.kind.in_([StepKind.MEASURED, StepKind.PROBED])
+    )
+    return [body["repeats"] for body in session.scalars(bodies) if "repeats" in body]
 
 
 def posteriors(session: Session, experiment: str) -> dict[tuple[int, int], tuple[list[list[float]], list[float]]]:
     """Return parameters and weights of the simulators of each repetition and iteration whose tuner weights them."""
-    row = SimulatorRow
-    query = of_experiments(row, [experiment], RepetitionRow.number, row.iteration, row.parameters, row.weight)
+    row = StepRow
+    query = steps_of([experiment], StepKind.TUNED, RepetitionRow.number, row.iteration, row.body)
     found: dict[tuple[int, int], tuple[list[list[float]], list[float]]] = {}
-    for repetition, iteration, parameters, weight in session.execute(query.where(row.weight.is_not(None))):
-        members, weights = found.setdefault((repetition, iteration), ([], []))
-        members.append(parameters)
-        weights.append(weight)
+    for repetition, iteration, body in session.execute(query):
+        weighted = [each for each in body["simulators"] if "weight" in each]
+        if weighted:
+            members = [each["parameters"] for each in weighted]
+            found[repetition, iteration] = members, [each["weight"] for each in weighted]
     return found
 
 
-def per_sample(squared_error: float | None, samples: int, discrepancy: Discrepancy) -> float | None:
+def per_sample(squared_error: float, samples: int, discrepancy: Discrepancy) -> float | None:
     """Return the error per sample; None without samples, or if the physics failed on one."""
-    return discrepancy.error(squared_error / samples) if squared_error is not None and samples else None
+    return discrepancy.error(squared_error / samples) if isfinite(squared_error) and samples else None
 
 
 def _until(iterations: Mapping[int, Sequence[int]], repetition: int, iteration: int) -> int:

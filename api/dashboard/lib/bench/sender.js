@@ -1,15 +1,16 @@
 // @ts-check
-/** Sends the answers that wait in this browser, whatever view is open, and says in the bar how many wait. */
+/** The bench in the bar, whatever view is open: its link, and how many answers wait in this browser, which are sent. */
 
-import { post } from "../api.js";
+import { get, post } from "../api.js";
 import { byId, h, refill } from "../dom.js";
-import { backoffMs } from "./choosing.js";
+import { backoffMs } from "../waiting.js";
 import { outbox } from "./outbox.js";
 
 const PATIENCE_MS = 20_000;  // a wireless that is gone says nothing
 const CHANGED = "gaplab-answers";
 
 let failures = 0;
+let isAsked = false;
 /** @type {number | undefined} */
 let timer;
 
@@ -21,12 +22,7 @@ export const answers = outbox(
 
 const waiting = () => answers.list().filter(({ state }) => state === "waiting");
 
-/**
- * Call a handler after every change of the answers, also in another tab, until `signal`.
- *
- * @param {() => void} handler
- * @param {AbortSignal} signal
- */
+/** Call a handler after every change of the answers, also in another tab, until `signal`. @param {() => void} handler @param {AbortSignal} signal */
 export function onAnswers(handler, signal) {
   addEventListener(CHANGED, handler, { signal });
 }
@@ -61,4 +57,20 @@ function showWaiting() {
   const count = waiting().length;
   refill(byId("unsent"), String(count), () =>
     (count ? h("a", { href: "#/bench" }, `${count === 1 ? "1 answer waits" : `${count} answers wait`} to be sent`) : null));
+}
+
+/** Show the link to the bench. */
+export function showBenchLink() {
+  byId("to-bench").hidden = false;
+}
+
+/** Show the link to the bench if the service has ever asked for a measurement. */
+export async function linkBench() {
+  if (isAsked) return;
+  isAsked = true;
+  try {
+    if ((await get("/requests", { limit: 1, pending: false })).items.length) showBenchLink();
+  } catch {
+    isAsked = false;  // asked again with the next view
+  }
 }

@@ -1,24 +1,22 @@
 // @ts-check
 /** The form for an answer: a number for each repeat, or why there are none. What is typed is kept until it is sent. */
 
-import { post } from "../../lib/api.js";
-import { browserStore } from "../../lib/bench/browser_store.js";
-import { isMine } from "../../lib/bench/choosing.js";
+import { post, postFile } from "../../lib/api.js";
 import { operatorName } from "../../lib/bench/corrections.js";
+import { browserStore } from "../../lib/bench/outbox.js";
+import { answerText, isMine, requestWords, typedValues, withOtherSign } from "../../lib/bench/requests.js";
 import { answers } from "../../lib/bench/sender.js";
-import { answerText, requestWords, typedValues, withOtherSign } from "../../lib/bench/values.js";
 import { h, setText } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
-import { filesField } from "./files_field.js";
 
 const ASK_MS = 5000;
 const EVALUATE_MS = 600_000;
 
-/** @typedef {{ values: string[], note: string, failed: string, files?: import("./files_field.js").Kept[], traces?: import("./files_field.js").Kept[] }} Draft */
+/** @typedef {{ id: string, name: string }} Kept a stored file */
+/** @typedef {{ values: string[], note: string, failed: string, files?: Kept[], traces?: Kept[] }} Draft */
 
 /**
  * Return the form. A request keeps its form when its card is made again, so that nobody who types is interrupted.
- *
  * @param {Api.RequestRead} request
  * @param {Page.BenchView} view
  */
@@ -27,23 +25,14 @@ export function answerForm(request, view) {
   return view.form.element;
 }
 
-/**
- * Fill the form of a request with an answer that was refused.
- *
- * @param {Page.BenchView} view
- * @param {string} id
- * @param {Record<string, any>} body
- */
+/** Fill the form of a request with an answer that was refused. @param {Page.BenchView} view @param {string} id @param {Record<string, any>} body */
 export function reviseAnswer(view, id, { values, note, failed, attachments = [], traces = [] }) {
   const [files, recorded] = [attachments, traces].map((hashes) => hashes.map((/** @type {string} */ hash) => ({ id: hash, name: "file" })));
   browserStore("draft").write(id, { values: (values ?? []).map(String), note: note ?? "", failed: failed ?? "", files, traces: recorded });
   view.form = null;
 }
 
-/**
- * @param {Api.RequestRead} request
- * @param {Page.BenchView} view
- */
+/** @param {Api.RequestRead} request @param {Page.BenchView} view */
 function make(request, view) {
   const { id, repeats, unit, between_repeats: between } = request;
   const drafts = browserStore("draft");
@@ -115,7 +104,6 @@ function make(request, view) {
 
 /**
  * Return what is unlikely about values, and what traces say; nothing if the service is away. It then remarks on what it gets later.
- *
  * @param {string} id
  * @param {{ values?: number[], traces?: string[] }} measured
  * @param {string} unit
@@ -155,4 +143,44 @@ function valueField(index, repeats, unit, value) {
   };
   const sign = h("button", { type: "button", class: "quiet", "aria-label": `Change the sign of ${label}`, onclick: changeSign }, "±");
   return { input, mark, element: h("div", { class: "field value" }, h("label", { for: id }, label), h("div", {}, input, sign), room) };
+}
+
+/**
+ * Return a field for files of an answer, like photographs, or its traces, and the files that it has. Each is stored as soon as it is
+ * chosen, and the answer names it by its hash.
+ * @param {{ id: string, label: string }} words
+ * @param {Kept[]} given
+ * @param {() => void} changed
+ */
+function filesField({ id: name, label }, given, changed) {
+  let kept = given;
+  const input = h("input", { id: name, type: "file", multiple: true });
+  const list = h("ul", { class: "rows" });
+  const status = h("small", { role: "status" });
+  const draw = () => list.replaceChildren(...kept.map((file) => {
+    const remove = () => {
+      kept = kept.filter((other) => other !== file);
+      changed();
+      draw();
+    };
+    return h("li", {}, h("span", {}, `✓ ${file.name} `, h("button", { type: "button", class: "link", "aria-label": `Remove ${file.name}`, onclick: remove }, "Remove")));
+  }));
+  input.addEventListener("change", async () => {
+    for (const file of input.files ?? []) {
+      setText(status, `Sending ${file.name}…`);
+      try {
+        const { id } = await postFile("/attachments", { name: file.name.slice(0, 200) }, file, file.type || "application/octet-stream");
+        kept = [...kept.filter((other) => other.id !== id), { id, name: file.name }];
+        setText(status, "");
+      } catch (error) {
+        setText(status, `${file.name} is not stored: ${error.message} Choose it again.`);
+      }
+      changed();
+      draw();
+    }
+    input.value = "";
+  });
+  draw();
+  const element = h("div", { class: "field" }, h("label", { for: name }, label), input, status, list);
+  return { element, kept: () => kept };
 }

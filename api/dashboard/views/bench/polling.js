@@ -2,9 +2,7 @@
 /** Asks again and again, less often while the service does not answer, and not at all while the page is hidden. */
 
 import { unreachable } from "../../lib/api.js";
-import { backoffMs } from "../../lib/bench/choosing.js";
-import { rest } from "../../lib/rest.js";
-import { abortWhenHidden, untilVisible } from "../../lib/visibility.js";
+import { abortWhenHidden, backoffMs, rest, untilVisible } from "../../lib/waiting.js";
 
 const WAIT_S = 25;
 const PATIENCE_MS = 15_000;
@@ -13,7 +11,6 @@ const LEAST_MS = 1000;  // also where the service answers at once that nothing w
 
 /**
  * Call `ask` until `signal`, or until `isOver` says that an error ends it.
- *
  * @param {(waitS: number, signal: AbortSignal) => Promise<number>} ask returns the number of requests; with none, the service may wait
  * @param {(error: any) => void} told learns of each failure, and with null of each success
  * @param {AbortSignal} signal

@@ -2,9 +2,9 @@
 /** The answers of this browser: which are stored, and which still wait here. */
 
 import { undoButtons } from "../../lib/bench/corrections.js";
+import { answerText } from "../../lib/bench/requests.js";
 import { answers } from "../../lib/bench/sender.js";
-import { answerText } from "../../lib/bench/values.js";
-import { h, refill, setText } from "../../lib/dom.js";
+import { button, h, refill, setText } from "../../lib/dom.js";
 import { reviseAnswer } from "./answer_form.js";
 
 /** @typedef {import("../../lib/bench/outbox.js").Entry} Entry */
@@ -15,12 +15,7 @@ const STORED = {
   replaced: "stored, and replaced since", void: "stored, and void since", dismissed: "stored, and dismissed since",
 };
 
-/**
- * Return the list, which says first whether anything waits.
- *
- * @param {Page.BenchView} view
- * @returns {Page.Updatable}
- */
+/** Return the list, which says first whether anything waits. @param {Page.BenchView} view @returns {Page.Updatable} */
 export function sentList(view) {
   const summary = h("p", { class: "large", role: "status" });
   const list = h("div");
@@ -34,11 +29,7 @@ export function sentList(view) {
   return { element, update };
 }
 
-/**
- * Return in a sentence what is stored and what waits.
- *
- * @param {{ state: Entry["state"] }[]} entries
- */
+/** Return in a sentence what is stored and what waits. @param {{ state: Entry["state"] }[]} entries */
 export function summaryOf(entries) {
   const of = (/** @type {Entry["state"]} */ state) => entries.filter((entry) => entry.state === state).length;
   const [waiting, refused] = [of("waiting"), of("refused")];
@@ -49,14 +40,10 @@ export function summaryOf(entries) {
   return parts.join(" ") || "✓ All of them are stored by the service.";
 }
 
-/**
- * @param {Entry} entry
- * @param {Page.BenchView} view
- */
+/** @param {Entry} entry @param {Page.BenchView} view */
 function row(entry, view) {
   const { key, state, words, body, message, answer } = entry;
   const unit = body.unit ?? "";
-  const button = (/** @type {string} */ label, /** @type {() => void} */ onclick) => h("button", { type: "button", class: "quiet small", onclick }, label);
   const forget = () => answers.forget(key);
   const revise = () => {
     reviseAnswer(view, entry.request, body);

@@ -1,23 +1,19 @@
 // @ts-check
 /** The take of this browser: others see who has the robot, and it is kept by heartbeats. */
 
-import { post } from "../../lib/api.js";
-import { browserStore } from "../../lib/bench/browser_store.js";
-import { isMine } from "../../lib/bench/choosing.js";
-import { newKey } from "../../lib/keyed.js";
+import { newKey, post } from "../../lib/api.js";
+import { browserStore } from "../../lib/bench/outbox.js";
+import { isMine } from "../../lib/bench/requests.js";
 
 const LEASE_S = 1800;  // a phone in a pocket shows no sign of life
 const HEARTBEAT_MS = 300_000;
 const GONE = [404, 409];
 
-/** @typedef {import("../../lib/bench/choosing.js").Holding} Holding */
+/** @typedef {import("../../lib/bench/requests.js").Holding} Holding */
 
 /** A take that outlives a reload; one whose answer was lost is asked for again under its key. */
 export class Take {
-  /**
-   * @param {AbortSignal} signal
-   * @param {() => void} changed
-   */
+  /** @param {AbortSignal} signal @param {() => void} changed */
   constructor(signal, changed) {
     this.store = browserStore("take");
     this.changed = changed;
@@ -32,12 +28,7 @@ export class Take {
     return /** @type {Holding | null} */ (this.store.read("held"));
   }
 
-  /**
-   * Take a request.
-   *
-   * @param {string} request id
-   * @param {string} operator
-   */
+  /** Take a request. @param {string} request id @param {string} operator */
   async take(request, operator) {
     const asked = this.store.read("asked");
     const isSame = asked?.request === request && asked.operator === operator;
@@ -59,11 +50,7 @@ export class Take {
     this.changed();
   }
 
-  /**
-   * Ask again for a take whose answer was lost, and forget one that has ended.
-   *
-   * @param {Api.RequestRead[]} requests as the service has them
-   */
+  /** Ask again for a take whose answer was lost, and forget one that has ended. @param {Api.RequestRead[]} requests as the service has them */
   async resume(requests) {
     const { holding } = this;
     const held = requests.find(({ id }) => id === holding?.request);
@@ -86,11 +73,7 @@ export class Take {
     }
   }
 
-  /**
-   * Forget the take of a request that is answered.
-   *
-   * @param {string} request id
-   */
+  /** Forget the take of a request that is answered. @param {string} request id */
   end(request) {
     if (this.holding?.request === request) this.store.remove("held");
   }

@@ -72,7 +72,7 @@ export function addressOf({ experiments, x, cost_s: cost, band, fitness, each, t
  * @param {Page.Comparison} comparison
  */
 export const figureQuery = ({ experiments, x, cost_s: cost, band, fitness, each }) => ({
-  experiment: experiments, x: x === "evaluations" ? null : x, cost_s: x === "time" ? cost : null, band, fitness, each: each || null,
+  study: experiments, x: x === "evaluations" ? null : x, cost_s: x === "time" ? cost : null, band, fitness, each: each || null,
 });
 
 /** @param {string | null} text */

@@ -17,12 +17,10 @@ export function experimentCache(signal) {
   /** @type {Map<string, string>} */
   const studyNames = new Map();
 
-  const addExperiment = (/** @type {Api.ExperimentRead} */ experiment) => { experiments.set(experiment.id, experiment); };
-
   /** @param {Api.StudyRead} study */
   function addStudy(study) {
     studyNames.set(study.id, study.name);
-    study.experiments.forEach(addExperiment);
+    for (const experiment of study.experiments) experiments.set(experiment.id, experiment);
   }
 
   /**
@@ -67,13 +65,13 @@ export function experimentCache(signal) {
   const nameOf = (id) => titleOf(experiments.get(id) ?? { name: id, strategy: "" });
 
   return {
-    addExperiment, addStudy, loadStudy, reload, load, nameOf,
+    addStudy, loadStudy, reload, load, nameOf,
     /** @param {string} id of an experiment; null if it is not known, or there is none */
     get: (id) => experiments.get(id) ?? null,
     /** @param {string} id of an experiment that does not exist */
     isMissing: (id) => experiments.get(id) === null,
-    /** @param {string} id of an experiment whose study is named */
-    studyName: (id) => studyNames.get(experiments.get(id)?.study ?? "") ?? null,
+    /** @param {string} id of an experiment whose study is named; null if it is the only one of its study */
+    studyName: (id) => (experiments.get(id)?.study === id ? null : studyNames.get(experiments.get(id)?.study ?? "") ?? null),
     /**
      * Return names by id, as the figure has them: names that are alike are followed by their ids.
      *

@@ -6,8 +6,7 @@ import { h } from "../../lib/dom.js";
 import { age, count, titleOf } from "../../lib/format.js";
 
 const PAUSE_MS = 150;
-const STUDIES = 5;
-const EXPERIMENTS = 12;
+const FOUND = 12;
 const MOST = 100;  // the service's limit for one figure
 
 /** @typedef {{ name: string, description: string, item: Api.StudyRead | Api.ExperimentRead, ids: string[] }} Match */
@@ -95,7 +94,7 @@ export function chooser(view) {
 }
 
 /**
- * Return the studies and the experiments that have a text in their name or id, the newest first.
+ * Return the studies and the experiments that have a text in their name or id, the newest first; a study of one is its experiment.
  *
  * @param {Page.CompareView} view
  * @param {string} text
@@ -103,14 +102,15 @@ export function chooser(view) {
  * @returns {Promise<Match[]>}
  */
 async function search({ cache, choice }, text, signal) {
-  /** @type {[Api.Page_StudyRead_, Api.Page_ExperimentRead_]} */
-  const [studies, experiments] = await Promise.all([
-    get("/studies", { text, limit: STUDIES }, signal), get("/experiments", { text, limit: EXPERIMENTS }, signal)]);
-  studies.items.forEach(cache.addStudy);
-  experiments.items.forEach(cache.addExperiment);
-  const left = experiments.items.filter(({ id }) => !choice.experiments.includes(id));
+  const quoted = `"${text.replace(/["\\]/g, "\\$&")}"`;
+  const q = text && `name ~ ${quoted} or id ~ ${quoted} or experiment ~ ${quoted}`;
+  /** @type {Api.Page_StudyRead_} */
+  const { items } = await get("/studies", { q, limit: FOUND }, signal);
+  items.forEach(cache.addStudy);
+  const has = (/** @type {string} */ words) => words.toLowerCase().includes(text.toLowerCase());
+  const left = items.flatMap(({ experiments }) => experiments).filter(({ id, name }) => !choice.experiments.includes(id) && (has(id) || has(name))).slice(0, FOUND);
   return [
-    ...studies.items.map((study) => ({
+    ...items.filter(({ name, id, experiments }) => experiments.length > 1 && (has(name) || has(id))).map((study) => ({
       name: study.name, description: `study, all ${count(study.experiments.length)} experiments`, item: study, ids: study.experiments.map(({ id }) => id),
     })),
     ...left.map((experiment) => ({

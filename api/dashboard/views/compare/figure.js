@@ -3,8 +3,8 @@
 
 import { h } from "../../lib/dom.js";
 import { figureDownloads } from "../../lib/downloads.js";
+import { CURVE_KINDS } from "../../lib/event_kinds.js";
 import { plot } from "../../lib/plot.js";
-import { CURVE_KINDS } from "../experiment/event_words.js";
 import { figureQuery } from "./address.js";
 
 /**
@@ -21,16 +21,16 @@ export function figure(view) {
   const queryNow = () => figureQuery({ ...view.choice, experiments: view.cache.known(view.choice.experiments) });
   const load = async () => {
     const query = queryNow();
-    return !query.experiment.length || await draw(query) ? undefined : "failed";
+    return !query.study.length || await draw(query) ? undefined : "failed";
   };
   const loadNow = view.sections.add(place, CURVE_KINDS, load);
   const update = () => {
     const query = queryNow();
     const key = JSON.stringify(query);
-    if (key === lastKey || !query.experiment.length) return;
+    if (key === lastKey || !query.study.length) return;
     lastKey = key;
     downloads.replaceChildren(figureDownloads("curves", query, "gaplab-curves",
-      ["CSV", "/curves", { experiment: query.experiment, fitness: query.fitness, format: "csv" }, "gaplab-curves.csv"]));
+      ["CSV", "/curves", { study: query.study, fitness: query.fitness, format: "csv" }, "gaplab-curves.csv"]));
     loadNow();
   };
   return { element: h("section", { class: "card", "aria-label": "Curves" }, place, downloads), update };

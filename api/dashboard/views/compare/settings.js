@@ -38,7 +38,7 @@ async function fill(place, view, ids, isCurrent) {
   if (!place.hasChildNodes()) place.replaceChildren(loading());
   try {
     /** @type {Api.SpecDiff} */
-    const found = await get("/differences", { experiment: ids }, view.signal);
+    const found = await get("/differences", { study: ids }, view.signal);
     if (isCurrent()) place.replaceChildren(...shown(found, view.cache.namesOf(ids)));
   } catch (error) {
     if (isCurrent()) place.replaceChildren(failed(error, () => fill(place, view, ids, isCurrent), "h3"));

@@ -4,7 +4,7 @@
 import { get } from "../../lib/api.js";
 import { h, refill, refillInPlace } from "../../lib/dom.js";
 import { failed } from "../../lib/placeholders.js";
-import { CURVE_KINDS } from "../experiment/event_words.js";
+import { CURVE_KINDS } from "../../lib/event_kinds.js";
 import { TESTS, wholeNumber } from "./address.js";
 import { exports } from "./exports.js";
 import { marginField } from "./margin.js";
@@ -128,8 +128,8 @@ async function fill(place, view, isCurrent, unfolded) {
   const isOpen = (/** @type {string} */ name) => place.querySelector(`details.${name}`)?.hasAttribute("open") ?? false;
   const hasOthers = isOpen("every");
   const others = hasOthers ? ranges.filter((each) => rangeText(each) !== rangeText(range)) : [];
-  const asked = { experiment: ids, from: range[0], to: range[1], margin, margin_of_direct: share, fitness };
-  const queries = [...others.map(([from, to]) => ({ experiment: ids, from, to, fitness, intervals: false })), asked];
+  const asked = { study: ids, from: range[0], to: range[1], margin, margin_of_direct: share, fitness };
+  const queries = [...others.map(([from, to]) => ({ study: ids, from, to, fitness, intervals: false })), asked];
   const answers = await Promise.all(queries.map((query) => get("/comparisons", query, view.signal)));
   if (!isCurrent()) return;
   const results = [...others, range].map((each, index) => ({ range: each, pairs: answers[index] }));

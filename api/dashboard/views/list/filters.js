@@ -1,57 +1,36 @@
 // @ts-check
-/** The filters of the list: all, studies or experiments, in which state, with which strategy and words, in which order. */
+/** The filters of the list: in which state, with which strategy and words, in which order. */
 
-import { h } from "../../lib/dom.js";
+import { h, select } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
 import { STATES } from "../../lib/state_badge.js";
 
-/** @typedef {{ show: "all" | "studies" | "experiments", sort: string, state: string, strategy: string, text: string, q: string }} Filters */
-/** @typedef {[value: string, label: string][]} Choices */
+/** @typedef {{ sort: string, state: string, strategy: string, text: string, q: string }} Filters */
 
-/** @type {Choices} */
-const STUDY_ORDERS = [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"], ["-name", "By name, reversed"]];
-/** @type {Choices} */
-const EXPERIMENT_ORDERS = [...STUDY_ORDERS,
-  ["strategy", "By strategy"], ["-strategy", "By strategy, reversed"], ["state", "By state"], ["-state", "By state, reversed"]];
-const ORDERS = { all: STUDY_ORDERS, studies: STUDY_ORDERS, experiments: EXPERIMENT_ORDERS };
+/** @type {[value: string, label: string][]} */
+const ORDERS = [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"], ["-name", "By name, reversed"]];
 const NEWEST_FIRST = "-created_at";
 const TYPING_MS = 350;
 
-/**
- * Return the filters in an address.
- *
- * @param {URLSearchParams} parameters
- * @returns {Filters}
- */
+/** Return the filters in an address. @param {URLSearchParams} parameters @returns {Filters} */
 export function filtersOf(parameters) {
-  const wanted = parameters.get("show");
-  const show = wanted === "studies" || wanted === "experiments" ? wanted : "all";
-  const order = ORDERS[show].find(([name]) => name === parameters.get("sort"));
   const value = (/** @type {string} */ name) => parameters.get(name) ?? "";
-  return { show, sort: order ? order[0] : NEWEST_FIRST, state: value("state"), strategy: value("strategy"), text: value("text"), q: value("q") };
+  const [sort] = ORDERS.find(([name]) => name === value("sort")) ?? [NEWEST_FIRST];
+  return { sort, state: value("state"), strategy: value("strategy"), text: value("text"), q: value("q") };
 }
 
-/**
- * Return the address of filters, without those that have their default.
- *
- * @param {Filters} filters
- */
-export function addressOf({ show, sort, ...others }) {
-  const values = { ...others, show: show === "all" ? "" : show, sort: sort === NEWEST_FIRST ? "" : sort };
+/** Return the address of filters, without those that have their default. @param {Partial<Filters>} filters */
+export function addressOf({ sort = NEWEST_FIRST, ...others }) {
+  const values = { ...others, sort: sort === NEWEST_FIRST ? "" : sort };
   const query = new URLSearchParams(Object.entries(values).filter(([, value]) => value)).toString();
   return query ? `#/?${query}` : "#/";
 }
 
-/**
- * Return whether the filters leave something out of the list.
- *
- * @param {Filters} filters
- */
+/** Return whether the filters leave something out of the list. @param {Filters} filters */
 export const isFiltered = ({ state, strategy, text, q }) => Boolean(state || strategy || text || q);
 
 /**
  * Return the form of the filters.
- *
  * @param {Filters} filters changed in place
  * @param {string[]} strategies
  * @param {(filters: Filters) => void} changed
@@ -59,14 +38,7 @@ export const isFiltered = ({ state, strategy, text, q }) => Boolean(state || str
 export function filterForm(filters, strategies, changed) {
   /** @type {number | undefined} */
   let typing;
-  const change = (/** @type {Partial<Filters>} */ changes) => {
-    Object.assign(filters, changes);
-    changed(filters);
-  };
-  const kinds = /** @type {const} */ (["all", "studies", "experiments"]).map((show) => {
-    const press = () => change({ show, sort: NEWEST_FIRST });
-    return h("button", { type: "button", "aria-pressed": String(filters.show === show), onclick: press }, readableName(show));
-  });
+  const change = (/** @type {Partial<Filters>} */ changes) => changed(Object.assign(filters, changes));
   const type = () => {
     clearTimeout(typing);
     const words = { text: "", q: search.value.trim() };
@@ -75,26 +47,14 @@ export function filterForm(filters, strategies, changed) {
   };
   const search = h("input", { type: "search", placeholder: "Words, or a query like tag = gait", "aria-label": "Search by words or a query", maxlength: 1000, oninput: type });
   search.value = filters.q || filters.text;
-  /** @type {Choices} */
-  const states = STATES.map((state) => [state, readableName(state.toLowerCase())]);
-  /** @type {Choices} */
-  const names = strategies.map((name) => [name, readableName(name)]);
-  return h("form", { class: "filters", role: "search", onsubmit: (event) => event.preventDefault() },
-    h("div", { class: "segments", role: "group", "aria-label": "All, studies or experiments" }, ...kinds), search,
-    select("State", filters.state, [["", "Any state"], ...states], (state) => change({ state })),
-    select("Strategy", filters.strategy, [["", "Any strategy"], ...names], (strategy) => change({ strategy })),
-    select("Order", filters.sort, ORDERS[filters.show], (sort) => change({ sort })));
-}
-
-/**
- * @param {string} label
- * @param {string} value
- * @param {Choices} choices
- * @param {(value: string) => void} changed
- */
-function select(label, value, choices, changed) {
-  const options = choices.map(([name, words]) => h("option", { value: name }, words));
-  const field = h("select", { "aria-label": label, onchange: () => { changed(field.value); } }, ...options);
-  field.value = value;
-  return field;
+  /** @type {(name: "state" | "strategy" | "sort", label: string, choices: Page.Choices) => HTMLElement} */
+  const choice = (name, label, choices) => {
+    const field = select(choices, { "aria-label": label, onchange: () => change({ [name]: field.value }) });
+    field.value = filters[name];
+    return field;
+  };
+  return h("form", { class: "filters", role: "search", onsubmit: (event) => event.preventDefault() }, search,
+    choice("state", "State", [["", "Any state"], ...STATES.map((state) => /** @type {[string, string]} */ ([state, readableName(state.toLowerCase())]))]),
+    choice("strategy", "Strategy", [["", "Any strategy"], ...strategies.map((name) => /** @type {[string, string]} */ ([name, readableName(name)]))]),
+    choice("sort", "Order", ORDERS));
 }

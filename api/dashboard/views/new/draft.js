@@ -8,12 +8,7 @@ export const EVALUATIONS = ["controller_evaluations", "selection_evaluations", "
 
 /** @typedef {Record<string, any>} Spec */
 
-/**
- * Return a plug-in as the form has it.
- *
- * @param {Page.PluginName} [given]
- * @returns {Page.PluginDraft}
- */
+/** Return a plug-in as the form has it. @param {Page.PluginName} [given] @returns {Page.PluginDraft} */
 function pluginDraft(given = "") {
   const { name, options } = typeof given === "string" ? { name: given, options: {} } : given;
   return { name, options: { ...options } };
@@ -21,7 +16,6 @@ function pluginDraft(given = "") {
 
 /**
  * Return the form's content for a spec, with everything that the catalogue has to choose from.
- *
  * @param {Spec} spec
  * @param {Api.Catalogue} catalogue
  * @returns {Page.Draft}
@@ -66,7 +60,6 @@ const realityDraft = ({ kind, engine, parameters, bench, repeats, probes, sample
 
 /**
  * Return the named strategies, ticked and in their order, then the others of the catalogue.
- *
  * @param {Page.PluginName[]} given a strategy may be there several times
  * @param {Api.Catalogue} catalogue
  * @returns {Page.PluginDraft[]}
@@ -77,11 +70,7 @@ function strategyDrafts(given, catalogue) {
   return [...named, ...others.map(({ name }) => ({ name, options: {}, on: false }))];
 }
 
-/**
- * @param {(string | { name: string, lower?: number, upper?: number })[]} given
- * @param {Api.Catalogue} catalogue
- * @returns {Page.TunableDraft[]}
- */
+/** @param {(string | { name: string, lower?: number, upper?: number })[]} given @param {Api.Catalogue} catalogue @returns {Page.TunableDraft[]} */
 function tunableDrafts(given, catalogue) {
   const named = given.map((tunable) => (typeof tunable === "string" ? { name: tunable } : tunable));
   const others = catalogue.tunables.filter(({ name }) => !named.some((tunable) => tunable.name === name));
@@ -93,7 +82,6 @@ function tunableDrafts(given, catalogue) {
 
 /**
  * Return what a spec tunes that names a robot and no tunables.
- *
  * @param {string} robot
  * @param {Api.Catalogue} catalogue
  * @returns {(string | { name: string })[]}
@@ -105,7 +93,6 @@ function usualTunables(robot, { robots, defaults }) {
 
 /**
  * Tick the usual tunables of a newly chosen robot, unless the reader has chosen others than those of the robot before.
- *
  * @param {Page.Draft} draft
  * @param {Api.Catalogue} catalogue
  */
@@ -117,19 +104,10 @@ export function followRobot(draft, catalogue) {
   draft.tunablesOf = draft.robot.name;
 }
 
-/**
- * Return the name of the plug-in that a label like `mass(trunk)` names.
- *
- * @param {string} label
- */
+/** Return the name of the plug-in that a label like `mass(trunk)` names. @param {string} label */
 export const plainName = (label) => label.split("(")[0].trim();
 
-/**
- * Add a tunable by its label, ticked; one that is there is only ticked.
- *
- * @param {Page.Draft} draft
- * @param {string} label
- */
+/** Add a tunable by its label, ticked; one that is there is only ticked. @param {Page.Draft} draft @param {string} label */
 export function addTunable({ tunables }, label) {
   const name = label.trim();
   const given = tunables.find((tunable) => tunable.name === name);
@@ -145,12 +123,7 @@ export function addTunable({ tunables }, label) {
  */
 export const ticked = (list) => list.filter(({ on }) => on);
 
-/**
- * Return the spec of a form.
- *
- * @param {Page.Draft} draft
- * @returns {Spec}
- */
+/** Return the spec of a form. @param {Page.Draft} draft @returns {Spec} */
 export function specOf(draft) {
   const { strategies, robot, controller, task, engine, optimizer, controllerOptimizer, discrepancy, tuner, tunables, budget } = draft;
   return withoutEmpty({
@@ -171,11 +144,7 @@ export function specOf(draft) {
   }, ["strategies", "tunables"]);
 }
 
-/**
- * Return reality without what its kind does not have; the form keeps that while the reader changes the kind.
- *
- * @param {Page.Draft} draft
- */
+/** Return reality without what its kind does not have; the form keeps that while the reader changes the kind. @param {Page.Draft} draft */
 function realityOf({ realityEngine, realityParameters, bench: { isPhysical, limits, samples, repeats, ...bench } }) {
   if (!isPhysical) {
     const { probes } = bench;
@@ -191,11 +160,7 @@ function budgetOf({ preset, reuse_transfer: isReused, ...evaluations }) {
   return Object.keys(changes).length ? { preset, ...changes } : preset;
 }
 
-/**
- * Return a plug-in as a spec has it.
- *
- * @param {Page.PluginDraft} plugin
- */
+/** Return a plug-in as a spec has it. @param {Page.PluginDraft} plugin */
 export const pluginName = ({ name, options }) => shortest({ name, ...withoutEmpty({ options: withoutEmpty(typedValues(options)) }) });
 
 /** @param {Spec} plugin a bare name stands for a plug-in that has nothing but its name */
@@ -204,24 +169,14 @@ const shortest = (plugin) => (Object.keys(plugin).length === 1 ? plugin.name : p
 /** @param {Spec} values */
 const typedValues = (values) => Object.fromEntries(Object.entries(values).map(([name, value]) => [name, typedValue(value)]));
 
-/**
- * Return the number that was typed, or else the text, which the service then refuses with a reason.
- *
- * @param {unknown} value
- */
+/** Return the number that was typed, or else the text, which the service then refuses with a reason. @param {unknown} value */
 function typedValue(value) {
   if (typeof value !== "string") return value;
   const text = value.trim();
   return text && (parseNumber(text.replace("−", "-")) ?? text);
 }
 
-/**
- * Return an object without empty values, except those whose names are kept.
- *
- * @param {Spec} values
- * @param {string[]} [kept]
- * @returns {Spec}
- */
+/** Return an object without empty values, except those whose names are kept. @param {Spec} values @param {string[]} [kept] @returns {Spec} */
 function withoutEmpty(values, kept = []) {
   return Object.fromEntries(Object.entries(values).filter(([name, value]) => kept.includes(name) || !isEmpty(value)));
 }

@@ -1,13 +1,12 @@
 // @ts-check
 /** Fields of the form: each with its label, its meaning, and room for the service's errors. */
 
-import { h, setText } from "../../lib/dom.js";
+import { h, select, setText } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
 
 /** @typedef {() => string | null} Pointer where a value stands in the spec now; null if it is not in it */
 /** @typedef {{ pointer: Pointer, element: Element, room: HTMLElement }} Place */
 /** @typedef {{ pointer: string, message: string }} FieldError */
-/** @typedef {[value: string, label: string, disabled?: boolean][]} Choices */
 
 const MOST_MESSAGES = 5;  // a table of samples may have thousands of errors
 
@@ -22,7 +21,6 @@ export class ErrorPlaces {
 
   /**
    * Let errors of the value at a pointer mark an element and be shown in a room.
-   *
    * @param {Pointer} pointer
    * @param {Element} element
    * @param {HTMLElement} room
@@ -31,11 +29,7 @@ export class ErrorPlaces {
     this.places.push({ pointer, element, room });
   }
 
-  /**
-   * Show errors at their nearest places, and return those that have none.
-   *
-   * @param {FieldError[]} errors
-   */
+  /** Show errors at their nearest places, and return those that have none. @param {FieldError[]} errors */
   show(errors) {
     this.places = this.places.filter(({ element }) => element.isConnected);
     const pointers = this.places.map(({ pointer }) => pointer());
@@ -51,12 +45,7 @@ export class ErrorPlaces {
   }
 }
 
-/**
- * Return the index of the longest place that contains a pointer, or -1.
- *
- * @param {string} pointer
- * @param {(string | null)[]} places
- */
+/** Return the index of the longest place that contains a pointer, or -1. @param {string} pointer @param {(string | null)[]} places */
 export function nearestPlace(pointer, places) {
   let nearest = -1;
   places.forEach((place, index) => {
@@ -79,21 +68,16 @@ export function errorRoom() {
  * @property {(value: string) => void} set
  * @property {Pointer | string} pointer
  * @property {ErrorPlaces} places
- * @property {Choices | null} [choices] makes the field a list to choose from
+ * @property {Page.Choices | null} [choices] makes the field a list to choose from
  */
 
-/**
- * Return a field; other options are attributes of its input.
- *
- * @param {FieldOptions & Page.Attributes} options
- */
+/** Return a field; other options are attributes of its input. @param {FieldOptions & Page.Attributes} options */
 export function field({ label, hint = "", value, set, pointer, places, choices = null, ...attributes }) {
   const room = errorRoom();
   const id = `field-${rooms}`;
   const common = { id, "aria-describedby": `${room.id}${hint ? ` ${id}-hint` : ""}`, ...attributes };
-  const options = choices?.map(([name, words, disabled]) => h("option", { value: name, disabled }, words));
-  const input = options
-    ? h("select", { ...common, onchange: () => { set(input.value); } }, ...options)
+  const input = choices
+    ? select(choices, { ...common, onchange: () => { set(input.value); } })
     : h("input", { autocomplete: "off", ...common, oninput: () => { set(input.value); } });
   input.value = String(value ?? "");
   places.add(typeof pointer === "function" ? pointer : () => pointer, input, room);
@@ -103,18 +87,11 @@ export function field({ label, hint = "", value, set, pointer, places, choices =
 
 /**
  * Return a field for a number. It takes any text, so that the service can say what is wrong with it.
- *
  * @param {FieldOptions & Page.Attributes} options
  */
 export const numberField = (options) => field({ inputmode: "decimal", ...options });
 
-/**
- * Return a box to tick, with its label.
- *
- * @param {Page.Child} label
- * @param {boolean} isOn
- * @param {(isOn: boolean) => void} set
- */
+/** Return a box to tick, with its label. @param {Page.Child} label @param {boolean} isOn @param {(isOn: boolean) => void} set */
 export function tickField(label, isOn, set) {
   const box = h("input", { type: "checkbox", onchange: () => { set(box.checked); } });
   box.checked = isOn;
@@ -123,7 +100,6 @@ export function tickField(label, isOn, set) {
 
 /**
  * Return fields for the options of a plug-in, made from their JSON Schema; null if it has none.
- *
  * @param {Api.PluginRead | undefined} plugin
  * @param {Record<string, any>} options
  * @param {Pointer} pointer of the plug-in
@@ -140,7 +116,7 @@ export function optionFields(plugin, options, pointer, { places, changed }) {
     if (schema.type === "boolean") return h("p", { class: "field" }, tickField(`${label}: ${schema.description}`, options[name] ?? schema.default, set).element);
     const usual = String(schema.default ?? "");
     const values = /** @type {string[] | undefined} */ (schema.enum);
-    /** @type {Choices | null} */
+    /** @type {Page.Choices | null} */
     const choices = values ? [["", `${readableName(usual)}, the default`], ...values.map((value) => /** @type {[string, string]} */ ([value, readableName(value)]))] : null;
     const attributes = choices ? {} : { placeholder: usual, inputmode: "decimal" };
     const optionPointer = () => (pointer() === null ? null : `${pointer()}/options/${name}`);

@@ -8,19 +8,11 @@ import { EVALUATIONS, addTunable, plainName, ticked } from "./draft.js";
 import { errorRoom, field, numberField, optionFields, tickField } from "./fields.js";
 
 /** @typedef {import("../new.js").Form} Form */
-/** @typedef {import("./fields.js").Choices} Choices */
 
-/**
- * @param {string} title
- * @param {...Page.Child} content
- */
+/** @param {string} title @param {...Page.Child} content */
 export const part = (title, ...content) => h("fieldset", { class: "part" }, h("legend", {}, title), ...content);
 
-/**
- * Return the name, the sizes and the schedule of the study.
- *
- * @param {Form} form
- */
+/** Return the name, the sizes and the schedule of the study. @param {Form} form */
 export function studyPart(form) {
   const { draft, places, catalogue } = form;
   const preset = catalogue.budgets.find(({ name }) => name === draft.budget.preset);
@@ -39,11 +31,7 @@ export function studyPart(form) {
       countField("held_out", "Share of samples held out", "no tuning sees them, simulators are tested on them; 0.2: each fifth", "0")));
 }
 
-/**
- * Return the strategies that are compared, each with its options; one can be there several times.
- *
- * @param {Form} form
- */
+/** Return the strategies that are compared, each with its options; one can be there several times. @param {Form} form */
 export function strategiesPart(form) {
   const { draft, places } = form;
   const room = errorRoom();
@@ -57,16 +45,10 @@ export function strategiesPart(form) {
     linkButton("All", tickAll(true)), " ", linkButton("None", tickAll(false))), room, list);
 }
 
-/**
- * @param {string} label
- * @param {() => void} press
- */
+/** @param {string} label @param {() => void} press */
 const linkButton = (label, press) => h("button", { type: "button", class: "link", onclick: press }, label);
 
-/**
- * @param {Form} form
- * @param {Page.PluginDraft} strategy
- */
+/** @param {Form} form @param {Page.PluginDraft} strategy */
 function strategyField(form, strategy) {
   const { catalogue, draft: { strategies }, places } = form;
   const plugin = catalogue.strategies.find(({ name }) => name === strategy.name);
@@ -93,11 +75,7 @@ function strategyField(form, strategy) {
   return h("div", { class: "strategy" }, element, whyUnavailable(plugin), room, more);
 }
 
-/**
- * Return the robot, the engine of the simulators, the optimizer, and how simulators are tuned.
- *
- * @param {Form} form
- */
+/** Return the robot, the engine of the simulators, the optimizer, and how simulators are tuned. @param {Form} form */
 export function simulationPart(form) {
   const { draft, catalogue } = form;
   const robot = catalogue.robots.find(({ name }) => name === draft.robot.name);
@@ -119,7 +97,6 @@ export function simulationPart(form) {
 
 /**
  * Return a list of plug-ins to choose from, and the options of the chosen one. Unavailable plug-ins say why, and how to get them.
- *
  * @param {Form} form
  * @param {string} label
  * @param {Page.PluginDraft} draft
@@ -129,7 +106,7 @@ export function simulationPart(form) {
  */
 export function pluginField(form, label, draft, plugins, pointer, none = null) {
   const chosen = plugins.find(({ name }) => name === draft.name);
-  /** @type {Choices} */
+  /** @type {Page.Choices} */
   const choices = plugins.map(({ name, available }) => [name, `${readableName(name)}${available ? "" : ": not available"}`, !available]);
   const set = (/** @type {string} */ name) => {
     Object.assign(draft, { name, options: {} });
@@ -142,21 +119,13 @@ export function pluginField(form, label, draft, plugins, pointer, none = null) {
     options ? h("details", { open: Object.keys(draft.options).length > 0 }, h("summary", {}, `Options of ${readableName(draft.name)}`), options) : null];
 }
 
-/**
- * Return why a plug-in is unavailable; null if it is not.
- *
- * @param {Api.PluginRead | undefined} plugin
- */
+/** Return why a plug-in is unavailable; null if it is not. @param {Api.PluginRead | undefined} plugin */
 function whyUnavailable(plugin) {
   return plugin === undefined || plugin.available ? null
     : h("p", { class: "note" }, `${readableName(plugin.name)} is not available: `, h("code", {}, plugin.note));
 }
 
-/**
- * Return what is tuned, and between which bounds.
- *
- * @param {Form} form
- */
+/** Return what is tuned, and between which bounds. @param {Form} form */
 export function tunablesPart(form) {
   const room = errorRoom();
   const list = h("div", {}, ...form.draft.tunables.map((tunable) => tunableField(form, tunable)));
@@ -170,10 +139,7 @@ export function tunablesPart(form) {
     h("p", { class: "note" }, "Of a part of the robot, by pattern: ", label, " ", linkButton("Add", add)));
 }
 
-/**
- * @param {Form} form
- * @param {Page.TunableDraft} tunable
- */
+/** @param {Form} form @param {Page.TunableDraft} tunable */
 function tunableField(form, tunable) {
   const { draft, places, catalogue } = form;
   const { name, on } = tunable;
@@ -198,15 +164,11 @@ function tunableField(form, tunable) {
 
 const SEARCHES = ["Search for the transferred controller", "Search for the next sample", "Search for a simulator"];
 
-/**
- * Return how much is computed.
- *
- * @param {Form} form
- */
+/** Return how much is computed. @param {Form} form */
 export function budgetPart(form) {
   const { draft: { budget }, places, catalogue: { budgets } } = form;
   const preset = /** @type {Record<string, any> | undefined} */ (budgets.find(({ name }) => name === budget.preset));
-  /** @type {Choices} */
+  /** @type {Page.Choices} */
   const choices = budgets.map(({ name }) => [name, readableName(name)]);
   const set = (/** @type {string} */ name) => {
     budget.preset = name;

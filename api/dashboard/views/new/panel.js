@@ -36,7 +36,6 @@ export function panel() {
     showCost: (estimate) => cost.replaceChildren(...costBlocks(estimate)),
     /**
      * Show errors that have no place in the form, and words instead of the cost.
-     *
      * @param {{ pointer: string, message: string }[]} errors
      * @param {string | null} [words]
      */
@@ -52,18 +51,12 @@ export function panel() {
   };
 }
 
-/**
- * Return the submission as a line for a shell.
- *
- * @param {string} base
- * @param {string} json
- */
+/** Return the submission as a line for a shell. @param {string} base @param {string} json */
 export const curlLines = (base, json) =>
   `curl -X POST ${base}studies \\\n  -H 'Content-Type: application/json' \\\n  -d '${json.replaceAll("'", "'\\''")}'`;
 
 /**
  * Return the submission as a program. A raw text of Python holds any JSON without three quotes in a row.
- *
  * @param {string} base
  * @param {string} json
  */

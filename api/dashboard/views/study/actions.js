@@ -1,72 +1,103 @@
 // @ts-check
-/** The actions on a study: each goes to all of its experiments whose state permits it. */
+/** The actions on a study, each for all of its experiments whose state permits it, or on one experiment; those that are refused say why. */
 
-import { post } from "../../lib/api.js";
-import { confirmingCost } from "../../lib/cost.js";
-import { openDialog } from "../../lib/dialog.js";
+import { getTagged, patch, post, Problem, put, remove } from "../../lib/api.js";
+import { confirmingCost, openDialog } from "../../lib/dialog.js";
+import { button, h, setText, tellingErrors } from "../../lib/dom.js";
 import { count } from "../../lib/format.js";
-import { actionButtons, isPermitted, PARTICIPLES, permittedStates } from "../../lib/life_cycle.js";
+import { stringify } from "../../lib/json.js";
+import { ENDED } from "../../lib/state_badge.js";
+import { tagsIn } from "../../lib/tags.js";
 
-/** @typedef {import("../../lib/life_cycle.js").Action} Action */
+/** @typedef {"pause" | "resume" | "stop" | "cancel" | "extend" | "retry"} Action */
+
+const CHANGED_MEANWHILE = 412;
+
+/** The states of an experiment in which an action is permitted, as gaplab.schemas.lifecycle has them. @type {Record<Action, Api.State[]>} */
+export const PERMITTED = {
+  pause: ["QUEUED", "RUNNING", "WAITING"],
+  resume: ["PAUSING", "PAUSED"],
+  stop: ["QUEUED", "RUNNING", "WAITING", "PAUSING", "PAUSED"],
+  cancel: ["QUEUED", "RUNNING", "WAITING", "PAUSING", "PAUSED", "STOPPING"],
+  extend: ["COMPLETED"],
+  retry: ["QUEUED", "RUNNING", "WAITING", "PAUSED", "COMPLETED", "FAILED"],
+};
+
+/** @type {[action: Action, label: string, participle: string][]} */
+const ACTIONS = [["pause", "Pause", "paused"], ["resume", "Resume", "resumed"], ["stop", "Stop…", "stopped"], ["cancel", "Cancel…", "cancelled"],
+  ["extend", "Extend…", "extended"], ["retry", "Retry", "retried"]];
+
+/** Return whether a study stands for one of its experiments, of which there are others. @param {Api.StudyRead} study */
+export const isAmongOthers = ({ id, experiments: [first] }) => first.study !== id;
 
 /**
- * Return the buttons, which are updated when `page.study` has changed.
- *
- * @param {Page.StudyPage} page
- */
-export const actions = (page) => actionButtons("Actions on this study", (action) => refusal(page.study, action), {
-  pause: () => send(page, "pause"),
-  resume: () => send(page, "resume"),
-  stop: () => stop(page),
-  cancel: () => cancel(page),
-  extend: () => extend(page),
-  retry: () => send(page, "retry"),
-});
-
-/**
- * @param {Api.StudyRead} study
+ * Return the experiments that an action goes to: only one with a failed repetition can be retried.
+ * @param {Pick<Api.StudyRead, "experiments">} study
  * @param {Action} action
  */
-const permitting = (study, action) => study.experiments.filter((experiment) => isPermitted(action, experiment));
+const permitting = ({ experiments }, action) =>
+  experiments.filter(({ state, progress }) => PERMITTED[action].includes(state) && (action !== "retry" || progress.failed > 0));
 
-/**
- * @param {Api.StudyRead} study
- * @param {Action} action
- */
-function refusal(study, action) {
+/** Return why an action is refused, or the empty text. @param {Action} action @param {Pick<Api.StudyRead, "experiments">} study */
+export function refusal(action, study) {
+  const [{ state, progress }, ...others] = study.experiments;
   if (permitting(study, action).length) return "";
-  if (action === "retry") return "None of its repetitions has failed, so none can be retried.";
-  return `None of its experiments can be ${PARTICIPLES[action]} now: only one that is ${permittedStates(action)} can.`;
+  if (action === "retry" && (others.length || !progress.failed)) return "None of its repetitions has failed, so none can be retried.";
+  const participle = ACTIONS.find(([name]) => name === action)?.[2];
+  const states = PERMITTED[action].map((permitted) => permitted.toLowerCase());
+  const only = states.length > 1 ? `${states.slice(0, -1).join(", ")} or ${states.at(-1)}` : states[0];
+  return others.length ? `None of its experiments can be ${participle} now: only one that is ${only} can.`
+    : `An experiment that is ${state.toLowerCase()} cannot be ${participle}, only one that is ${only}.`;
 }
 
 /**
+ * Return the buttons of the actions, which are updated when `page.study` has changed. One that is refused can still be reached.
  * @param {Page.StudyPage} page
- * @param {Action} action
- * @param {object} [body]
+ * @returns {Page.Updatable}
  */
-async function send(page, action, body) {
+export function actions(page) {
+  const message = h("p", { class: "outcome", role: "status" });
+  const telling = tellingErrors(message);
+  /** @type {Record<string, (action: Action) => unknown>} */
+  const asking = { stop: () => stop(page), cancel: () => cancel(page), extend: () => extend(page) };
+  const buttons = ACTIONS.map(([action, label]) => {
+    const press = telling(() => {
+      const reason = refusal(action, page.study);
+      if (reason) throw new Error(reason);
+      return (asking[action] ?? ((name) => send(page, name)))(action);
+    });
+    return h("button", { type: "button", class: "quiet", dataset: { action }, onclick: press }, label);
+  });
+  const update = () => buttons.forEach((each, index) => {
+    const reason = refusal(ACTIONS[index][0], page.study);
+    each.setAttribute("aria-disabled", String(Boolean(reason)));
+    each.title = reason;
+  });
+  update();
+  const group = h("div", { role: "group", "aria-label": "Actions" }, ...buttons,
+    h("button", { type: "button", class: "quiet", onclick: telling(() => { schedule(page); }) }, "Change schedule…"));
+  return { element: h("div", { class: "life-cycle" }, group, message), update };
+}
+
+/** @param {Page.StudyPage} page @param {Action} action @param {unknown} [body] */
+async function send(page, action, body = undefined) {
   const done = await confirmingCost((query) => post(`/studies/${page.id}/${action}${query}`, body), page.signal);
   if (!done) throw new Error("Nothing was changed.");
   await page.reload();
 }
 
-/**
- * Return how many experiments an action goes to, as the subject of a sentence.
- *
- * @param {Page.StudyPage} page
- * @param {Action} action
- */
-function subject({ study }, action) {
+/** Return to how many experiments an action goes; nothing where that is clear. @param {Page.StudyPage} page @param {Action} action */
+function concerned({ study }, action) {
   const some = permitting(study, action).length;
-  return some === study.experiments.length ? "All of its experiments" : `${count(some)} of its ${count(study.experiments.length)} experiments`;
+  return some < study.experiments.length ? `This concerns ${count(some)} of its ${count(study.experiments.length)} experiments. ` : "";
 }
 
 /** @param {Page.StudyPage} page */
 function stop(page) {
   openDialog({
-    title: "Stop this study?",
-    text: `${subject(page, "stop")} end: running repetitions finish their step, and each experiment is completed with the results it has. `
-      + "An experiment whose curve has no point yet is cancelled instead.",
+    title: `Stop “${page.study.name}”?`,
+    text: `${concerned(page, "stop")}Running repetitions finish their step, and an experiment is completed with the results it has. `
+      + "If its curve has no point yet, it is cancelled instead.",
     action: "Stop it", danger: true, act: () => send(page, "stop"),
   }, page.signal);
 }
@@ -74,38 +105,157 @@ function stop(page) {
 /** @param {Page.StudyPage} page */
 function cancel(page) {
   openDialog({
-    title: "Cancel this study?",
-    text: `${subject(page, "cancel")} end at once, and lose the steps under way. Stored results stay, but the experiments can never go on.`,
+    title: `Cancel “${page.study.name}”?`,
+    text: `${concerned(page, "cancel")}It ends at once, and the steps under way are lost. Stored results stay, but what is cancelled can never go on.`,
     action: "Cancel it", danger: true, act: () => send(page, "cancel"),
   }, page.signal);
 }
 
 /** @param {Page.StudyPage} page */
 function extend(page) {
-  const whole = { value: "", type: "number", min: 1, step: 1 };
+  const extended = permitting(page.study, "extend");
+  /** @type {(name: "iterations" | "repetitions", label: string, max: number) => import("../../lib/dialog.js").Field[]} the direct baseline has no iterations, and may have other totals */
+  const total = (name, label, max) => {
+    const totals = extended.filter(({ level }) => name === "repetitions" || !level).map(({ spec }) => spec[name]);
+    if (!totals.length) return [];
+    const [least, most] = [Math.min(...totals), Math.max(...totals)];
+    return [{ name, label, value: "", hint: `Now ${count(least)}${most > least ? ` to ${count(most)}` : ""}. Empty: unchanged.`, type: "number", min: 1, max, step: 1 }];
+  };
   openDialog({
-    title: "Extend this study",
-    text: `${subject(page, "extend")} grow to these totals. Results so far stay, and the study is then as if it had been submitted `
-      + "with these totals. An experiment that is larger already stays as it is. To finish experiments that were stopped, leave both empty.",
-    fields: [
-      { name: "iterations", label: "Iterations in all", hint: now(page, "iterations"), max: 1000, ...whole },
-      { name: "repetitions", label: "Repetitions in all", hint: now(page, "repetitions"), max: 10000, ...whole },
-    ],
+    title: `Extend “${page.study.name}”`,
+    text: `${concerned(page, "extend")}Enter totals, not what to add. Results so far stay, and all is then as if it had been submitted with these totals. `
+      + "What is larger already stays as it is. To finish what was stopped, leave the totals empty.",
+    fields: [...total("iterations", "Iterations in all", 1000), ...total("repetitions", "Repetitions in all", 10000)],
     action: "Extend it",
-    act: (values) => send(page, "extend", Object.fromEntries(
-      Object.entries(values).filter(([, value]) => value).map(([name, value]) => [name, Number(value)]))),
+    act: (values) => send(page, "extend", Object.fromEntries(Object.entries(values).filter(([, value]) => value).map(([name, value]) => [name, Number(value)]))),
+  }, page.signal);
+}
+
+/** @param {Page.StudyPage} page */
+function schedule(page) {
+  const { experiments } = page.study;
+  const common = (/** @type {"priority" | "max_parallel"} */ name) => (new Set(experiments.map((each) => each[name])).size > 1 ? "" : String(experiments[0][name] ?? ""));
+  const before = { priority: common("priority"), max_parallel: common("max_parallel") };
+  const whole = { type: "number", step: 1 };
+  openDialog({
+    title: "Change the schedule",
+    text: "This changes no result, and stops nothing that runs. What is left as it is stays so.",
+    fields: [
+      { name: "priority", label: "Priority", value: before.priority, min: -10, max: 10, hint: "−10 to 10; the highest is computed first", ...whole },
+      { name: "max_parallel", label: "Repetitions at once", value: before.max_parallel, min: 1, max: 10000, hint: "of each experiment; empty: one on every free core", ...whole },
+    ],
+    action: "Change it",
+    act: async ({ priority, max_parallel: atOnce }) => {
+      await patch(`/studies/${page.id}/schedule`, {
+        ...(priority !== before.priority && priority ? { priority: Number(priority) } : {}),
+        ...(atOnce !== before.max_parallel ? { max_parallel: atOnce ? Number(atOnce) : null } : {}),
+      });
+      await page.reload();
+    },
+  }, page.signal);
+}
+
+/** Return the button that edits, and the one that opens the form with the same spec. @param {Page.StudyPage} page */
+export function editing(page) {
+  const failure = h("span", { role: "alert", class: "failed" });
+  const again = async () => {
+    const { spec, remarks } = (await getTagged(`/studies/${page.id}/spec`)).value;  // the seed keeps all its digits
+    if (!spec) throw new Error(remarks.join("; "));
+    location.hash = `#/new?${new URLSearchParams({ spec: stringify(spec), ...(remarks.length ? { note: remarks.join("; ") } : {}) })}`;
+  };
+  return [button(isAmongOthers(page.study) ? "Edit name" : "Edit name, notes and tags", () => { edit(page); }), button("New from this", tellingErrors(failure)(again)), failure];
+}
+
+/**
+ * Ask for a name, notes and tags, and store them, unless somebody else has changed them since the page read them. One experiment among
+ * others has a name alone.
+ * @param {Page.StudyPage} page
+ */
+function edit(page) {
+  const { name, notes, tags } = page.study;
+  const isName = isAmongOthers(page.study);
+  let tag = page.tag;
+  const act = async (/** @type {Record<string, string>} */ values) => {
+    const wanted = { name: values.name, ...(isName ? {} : { notes: values.notes || null, tags: tagsIn(values.tags) }) };
+    try {
+      page.take(await patch(`/studies/${page.id}`, wanted, { "If-Match": String(tag) }));
+    } catch (error) {
+      if (error.status !== CHANGED_MEANWHILE) throw error;
+      await page.reload();
+      tag = page.tag;
+      const { study } = page;
+      const stored = { name: study.name, ...(isName ? {} : { notes: study.notes || null, tags: study.tags }) };
+      if (JSON.stringify(stored) === JSON.stringify(wanted)) return;  // it was saved, and the answer was lost
+      const detail = `Somebody changed it meanwhile: its name is “${study.name}”, its notes are “${study.notes ?? ""}”, its tags “${study.tags.join(" ")}”. Save again to overwrite that.`;
+      throw new Problem({ status: error.status, title: error.title, detail });
+    }
+  };
+  openDialog({
+    title: isName ? "Edit name" : "Edit name, notes and tags",
+    fields: [
+      { name: "name", label: "Name", value: name, required: true, maxlength: 200, autocomplete: "off" },
+      ...(isName ? [] : [
+        { name: "notes", label: "Notes", value: notes, multiline: true, rows: 5, maxlength: 10000, hint: "Markdown: *emphasis*, `code`, - lists, [links](address)" },
+        { name: "tags", label: "Tags", value: tags.join(" "), autocomplete: "off", hint: "letters, digits and _ . : / + -, separated by spaces" }]),
+    ],
+    action: "Save",
+    act,
   }, page.signal);
 }
 
 /**
- * Return the present totals of the experiments that can be extended: the direct baseline may have others.
- *
+ * Return the buttons that archive, delete and notify; archiving and deleting wait until everything has ended. One experiment among others
+ * is only deleted.
  * @param {Page.StudyPage} page
- * @param {"iterations" | "repetitions"} name
+ * @returns {Page.Updatable}
  */
-function now({ study }, name) {
-  const totals = permitting(study, "extend").filter(({ level }) => name === "repetitions" || !level).map(({ spec }) => spec[name]);
-  const [least, most] = [Math.min(...totals), Math.max(...totals)];
-  const present = totals.length ? `Now ${count(least)}${most > least ? ` to ${count(most)}` : ""}. ` : "";
-  return `${present}Empty: unchanged.`;
+export function keeping(page) {
+  const message = h("p", { class: "outcome", role: "status" });
+  const telling = tellingErrors(message);
+  const hasEnded = () => page.study.experiments.every(({ state }) => ENDED.includes(state));
+  const whenEnded = (/** @type {string} */ participle, /** @type {() => unknown} */ act) => telling(() => {
+    if (!hasEnded()) throw new Error(`Only what has ended can be ${participle}: stop or cancel it first.`);
+    return act();
+  });
+  const archive = async () => {
+    await post(`/studies/${page.id}/${page.study.archived_at ? "unarchive" : "archive"}`);
+    await page.reload();
+  };
+  const [archiving, deleting] = [button("", whenEnded("archived", archive)), button("Delete…", whenEnded("deleted", () => askToDelete(page)))];
+  const update = () => {
+    setText(archiving, page.study.archived_at ? "Unarchive" : "Archive");
+    for (const one of [archiving, deleting]) one.setAttribute("aria-disabled", String(!hasEnded()));
+  };
+  update();
+  const group = h("div", { role: "group", "aria-label": "Keep" },
+    ...(isAmongOthers(page.study) ? [deleting] : [archiving, deleting, button("Notify…", telling(() => askWhomToTell(page)))]));
+  return { element: h("div", { class: "life-cycle keeping" }, group, message), update };
+}
+
+/** Delete it once the reader has typed its name. @param {Page.StudyPage} page */
+function askToDelete({ id, study, signal }) {
+  const { name, experiments, progress: { repetitions } } = study;
+  const what = `${experiments.length > 1 ? `${count(experiments.length)} experiments and ` : ""}${count(repetitions)} repetitions`;
+  openDialog({
+    title: "Delete it for good?",
+    text: `This deletes “${name}” with ${what}. Nothing can bring it back but an archive: save one first if somebody may need it.`,
+    fields: [{ name: "typed", label: "Type its name to confirm", value: "", required: true, autocomplete: "off" }],
+    action: "Delete it", danger: true,
+    act: async ({ typed }) => {
+      if (typed.trim().toLowerCase() !== name.trim().toLowerCase()) throw new Error(`That is not its name, which is “${name}”.`);
+      await remove(`/studies/${id}`);
+      location.hash = isAmongOthers(study) ? `#/studies/${experiments[0].study}` : "#/";
+    },
+  }, signal);
+}
+
+/** @param {Page.StudyPage} page */
+function askWhomToTell({ id, signal }) {
+  openDialog({
+    title: "Tell a webhook when it has ended",
+    text: "The address gets a POST once. The owner of the service lists the hosts that are permitted.",
+    fields: [{ name: "url", label: "Address", value: "", type: "url", hint: "empty: tell none", maxlength: 1000, autocomplete: "off" }],
+    action: "Save",
+    act: async ({ url }) => { await (url ? put(`/studies/${id}/webhook`, { url }) : remove(`/studies/${id}/webhook`)); },
+  }, signal);
 }

@@ -1,105 +1,104 @@
 // @ts-check
-/** The head of a study: its name and notes, its progress, and the actions on it. */
+/** The head of a study, or of one experiment: what it is, its progress, and the actions on it. */
 
+import { get } from "../../lib/api.js";
+import { requestWords, stateText } from "../../lib/bench/requests.js";
 import { h, refill, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
-import { editNameAndNotes } from "../../lib/edit_dialog.js";
-import { age, count, evaluationsText, fixed, titleOf } from "../../lib/format.js";
-import { factItems, remarkBlocks } from "../../lib/head_parts.js";
-import { keepingButtons } from "../../lib/keeping.js";
+import { age, count, evaluationsText, fixed, percent, readableName, timeBetween, titleOf } from "../../lib/format.js";
 import { notesBlock } from "../../lib/markdown.js";
-import { newFromThis } from "../../lib/new_from_this.js";
-import { progressBar, timeLeftFact, workFacts } from "../../lib/progress.js";
+import { fraction, progressBar, timeLeftFact, workFacts } from "../../lib/progress.js";
+import { isPhysical, worldsText } from "../../lib/robots.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
+import { factItems } from "../../lib/table.js";
 import { tagList } from "../../lib/tags.js";
-import { actions } from "./actions.js";
+import { actions, editing, isAmongOthers, keeping } from "./actions.js";
+import { BENCH_KINDS } from "./measurements.js";
 
-/** @typedef {import("../../lib/head_parts.js").Fact} Fact */
+/** @typedef {import("../../lib/table.js").Fact} Fact */
+/** @typedef {{ text: string, note: string }} Remark */
 
-/**
- * Return the head, which is updated when `page.study` has changed.
- *
- * @param {Page.StudyPage} page
- * @returns {Page.Updatable}
- */
+const MOST = 100;
+
+/** Return the head, which is updated when `page.study` has changed. @param {Page.StudyPage} page @returns {Page.Updatable} */
 export function head(page) {
-  const title = h("h1");
-  const state = h("span", { class: "state-now", role: "status" });
-  const notes = notesBlock(`/studies/${page.id}`, page.signal);
-  const tags = tagList();
-  const keeping = keepingButtons(page, `/studies/${page.id}`, () => keptOf(page.study));
+  const { experiments } = page.study;
+  const [title, state, tags] = [h("h1"), h("span", { class: "state-now", role: "status" }), tagList()];
+  const notes = notesBlock(`/studies/${experiments[0].study}`, page.signal);
   const bar = progressBar("Progress");
-  const facts = h("dl", { class: "facts" });
-  const remarks = h("div", { class: "remarks" });
-  const buttons = actions(page);
+  const [facts, remarks] = [h("dl", { class: "facts" }), h("div", { class: "remarks" })];
+  const buttons = [actions(page), keeping(page)];
   const update = () => {
     const { study } = page;
-    setText(title, study.name);
-    document.title = `${study.name} · gaplab`;
+    setText(title, titleOf({ name: study.name, strategy: study.experiments.length > 1 ? "" : study.experiments[0].strategy }));
+    document.title = `${ENDED.includes(study.state) ? "" : `${percent(fraction(study.progress))} · `}${title.textContent} · gaplab`;
     notes.update(study.notes);
     tags.update(study.tags);
-    keeping.update();
     refill(state, `${study.state} ${study.caveat}`, () => stateBadge(study.state, study.caveat));
     bar.update(study.progress);
     const known = factsOf(page);
     refill(facts, JSON.stringify(known), () => factItems(known));
-    const warnings = gathered(study, ({ warnings }) => warnings);
-    const reasons = gathered(study, ({ reasons }) => reasons);
-    refill(remarks, JSON.stringify([warnings, reasons]), () => remarkBlocks(warnings, reasons));
-    buttons.update();
+    const warnings = gathered(study, (experiment) => experiment.warnings);
+    const reasons = gathered(study, (experiment) => experiment.reasons);
+    refill(remarks, JSON.stringify([warnings, reasons]), () =>
+      [remarkBlock("Warnings", "warned", warnings), remarkBlock("Why repetitions failed", "broken", reasons)]);
+    for (const each of buttons) each.update();
   };
-  const edit = () => editNameAndNotes(page, `/studies/${page.id}`, () => page.study);
   update();
-  const trail = h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Studies"));
-  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name, notes and tags");
-  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, tags.element, editButton, newFromThis(`/studies/${page.id}`)),
-    notes.element, h("div", { class: "whole" }, bar.element), facts, remarks, buttons.element, links(page), keeping.element);
+  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, tags.element, ...editing(page)),
+    experiments.length > 1 ? null : h("p", { class: "what" }, summary(experiments[0])), notes.element, h("div", { class: "whole" }, bar.element), facts,
+    experiments.length === 1 && isPhysical(experiments[0]) ? waitingRemark(page) : null, remarks,
+    h("div", { class: "deeds" }, ...buttons.map((each) => each.element)), links(page));
   return { element, update };
 }
 
-/**
- * @param {Page.StudyPage} page
- * @returns {Fact[]}
- */
+/** Return the way to the list, and from one experiment among others to its study. @param {Page.StudyPage} page */
+function trail({ study, signal }) {
+  const place = h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Studies"));
+  if (!isAmongOthers(study)) return place;
+  const whole = study.experiments[0].study;
+  const link = h("a", { href: `#/studies/${whole}` }, `study ${whole}`);
+  get(`/studies/${whole}`, {}, signal).then(({ name }) => { link.textContent = name; }, () => {});
+  place.append(" / ", link);
+  return place;
+}
+
+/** Return strategy, robot, engines and tunables in a line. @param {Api.ExperimentRead} experiment */
+function summary({ strategy, direct, level, spec }) {
+  const tunables = (/** @type {{ name: string }[]} */ (spec.tunables)).map(({ name }) => name.replaceAll("_", " ")).join(", ");
+  const tunes = tunables && !direct ? `${level ? "varies" : "tunes"} ${tunables}` : null;
+  return [readableName(strategy), spec.robot.name.replaceAll("_", " "), worldsText(spec), tunes].filter(Boolean).join(" · ");
+}
+
+/** @param {Page.StudyPage} page @returns {Fact[]} */
 function factsOf({ study, unit }) {
-  const { progress, experiments } = study;
-  const ended = experiments.filter(({ ended_at: endedAt }) => endedAt).length;
-  return [
-    ["Experiments", `${count(ended)} of ${count(experiments.length)} ended`],
-    ...workFacts(progress),
-    ...bestFact(study, unit(experiments[0])),
-    ...times(study),
-  ];
+  const { experiments: [first, ...others], best, progress } = study;
+  const ended = study.experiments.filter(({ state }) => ENDED.includes(state)).length;
+  const fitness = others.length ? best : first.fitness;
+  const by = best && others.length ? ` by ${titleOf(best)},` : "";
+  const { priority, max_parallel: atOnce } = first;
+  /** @type {Fact[]} */
+  const several = [["Experiments", `${count(ended)} of ${count(others.length + 1)} ended`]];
+  /** @type {Fact[]} */
+  const reached = fitness ? [[by ? "Best fitness" : "Fitness in reality", `${fixed(fitness.mean)} ${unit(first)}${by} after ${evaluationsText(fitness)} (mean of ${fitness.n})`]] : [];
+  return [...(others.length ? several : []), ...workFacts(progress), ...reached, ...times(study),
+    ...(others.length ? [] : [/** @type {Fact} */ (["Priority", priority]), /** @type {Fact} */ (["At once", atOnce === null ? "any number" : `at most ${count(atOnce)}`])])];
 }
 
-/**
- * Return the fittest experiment after the last number of evaluations that all share, as in the figure of the curves.
- *
- * @param {Api.StudyRead} study
- * @param {string} unit
- * @returns {Fact[]}
- */
-function bestFact({ best }, unit) {
-  if (!best) return [];
-  return [["Best fitness", `${fixed(best.mean)} ${unit} by ${titleOf(best)}, after ${evaluationsText(best)} (mean of ${best.n})`]];
-}
-
-/**
- * @param {Api.StudyRead} study
- * @returns {Fact[]}
- */
+/** Return when it ended and how long it took, or what is left and when it began. @param {Api.StudyRead} study @returns {Fact[]} */
 function times(study) {
-  const ends = study.experiments.map(({ ended_at: endedAt }) => endedAt).filter((endedAt) => endedAt !== null);
-  const last = ends.sort().at(-1);
-  if (last && ends.length === study.experiments.length) return [["Ended", age(last)]];
-  return [["Time left", timeLeftFact(study)], ["Submitted", age(study.created_at)]];
+  const known = (/** @type {"started_at" | "ended_at"} */ name) => study.experiments.map((experiment) => experiment[name]).filter((time) => time !== null).sort();
+  const [[began], ends] = [known("started_at"), known("ended_at")];
+  const last = ends.at(-1);
+  if (last && ends.length === study.experiments.length) return [["Ended", age(last)], ...(began ? [/** @type {Fact} */ (["Took", timeBetween(began, last)])] : [])];
+  return [["Time left", timeLeftFact(study)], began ? ["Began", age(began)] : ["Submitted", age(study.created_at)]];
 }
 
 /**
  * Return the texts of all experiments, each text once, with the experiments that have it unless all have.
- *
- * @param {Api.StudyRead} study
+ * @param {Pick<Api.StudyRead, "experiments">} study
  * @param {(experiment: Api.ExperimentRead) => string[]} textsOf
+ * @returns {Remark[]}
  */
 export function gathered({ experiments }, textsOf) {
   /** @type {Map<string, string[]>} */
@@ -110,23 +109,43 @@ export function gathered({ experiments }, textsOf) {
   return [...namesByText].map(([text, names]) => ({ text, note: names.length === experiments.length ? "" : names.join(", ") }));
 }
 
+/** @param {string} title @param {string} cssClass @param {Remark[]} remarks */
+function remarkBlock(title, cssClass, remarks) {
+  const items = remarks.map(({ text, note }) => h("li", {}, text, note ? h("span", { class: "note" }, ` (${note})`) : null));
+  return items.length ? h("div", { class: `remark ${cssClass}` }, h("strong", {}, title), h("ul", {}, ...items)) : null;
+}
+
 /** @param {Page.StudyPage} page */
-function links({ id, study }) {
-  const ids = study.experiments.map((experiment) => experiment.id).join(",");
-  return h("p", { class: "links" }, h("a", { href: `#/compare?experiments=${ids}` }, "Compare its experiments"),
-    " ", downloadLink("Report", `/studies/${id}/report`, {}, `gaplab-${id}-report.html`, "Writing the report"),
-    downloadLink("Report as PDF", `/studies/${id}/report`, { format: "pdf" }, `gaplab-${id}-report.pdf`, "Writing the report"),
+function links({ id, study: { experiments }, isFunction }) {
+  const [{ id: first }, ...others] = experiments;
+  const replay = isFunction ? h("a", { href: `#/toy?experiment=${first}` }, "Step through the function") : h("a", { href: `#/replay?experiment=${first}` }, "Replay a controller");
+  return h("p", { class: "links" },
+    h("a", { href: `#/compare?experiments=${experiments.map((experiment) => experiment.id).join(",")}` }, others.length ? "Compare its experiments" : "Compare with others"),
+    others.length ? null : replay,
+    downloadLink("Report", `/studies/${id}/report`, {}, `gaplab-${id}-report.html`, "Writing the report"),
     downloadLink("Archive of everything (.zip)", `/studies/${id}/export`, {}, `gaplab-${id}.zip`));
 }
 
+/** Return a remark with the measurements that an experiment waits for; nothing while there are none. @param {Page.StudyPage} page */
+function waitingRemark({ study: { experiments: [{ id }] }, sections, signal }) {
+  const place = h("div", { class: "remarks", role: "status" }, "");  // with a text, sections add no note that it loads
+  sections.add(place, [...BENCH_KINDS, "waiting", "resumed", "paused"], async () => {
+    /** @type {{ items: Api.RequestRead[], next: string | null }} */
+    const { items, next } = await get("/requests", { experiment: id, limit: MOST }, signal);
+    place.replaceChildren(...(items.length ? [h("div", { class: "remark" }, h("p", {}, `${waitingText(items, next !== null)} `),
+      h("a", { class: "button", href: `#/bench?experiment=${id}` }, "To the bench"))] : []));
+  });
+  return place;
+}
+
 /**
- * Return what archiving and deleting must know of the study.
- *
- * @param {Api.StudyRead} study
+ * Return in a sentence what is waited for.
+ * @param {Pick<Api.RequestRead, "bench" | "repetition" | "iteration" | "kind" | "state" | "taken_by" | "unanswered" | "busy">[]} requests
+ * @param {boolean} isMore whether there are more than these
  */
-const keptOf = ({ name, experiments, progress, archived_at: archivedAt }) => ({
-  name,
-  what: `${count(experiments.length)} experiments and ${count(progress.repetitions)} repetitions`,
-  hasEnded: experiments.every(({ state }) => ENDED.includes(state)),
-  isArchived: Boolean(archivedAt),
-});
+export function waitingText(requests, isMore = false) {
+  const [first] = requests;
+  const others = requests.length - 1;
+  const rest = others ? `, and for ${isMore ? "more than " : ""}${count(others)} ${others === 1 ? "other" : "others"}` : "";
+  return `It waits for a measurement on the bench “${first.bench}”: ${requestWords(first)} (${stateText(first).replace(/^\S+ /, "")})${rest}.`;
+}

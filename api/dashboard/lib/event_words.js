@@ -1,7 +1,7 @@
 // @ts-check
 /** Events in words. */
 
-import { count, number } from "../../lib/format.js";
+import { count, number } from "./format.js";
 
 /** @typedef {(event: Api.EventRead) => string} Words */
 
@@ -16,7 +16,6 @@ const reason = ({ body }) => (body.reason ? `: ${body.reason}` : "");
 
 /**
  * Return a fitness after some words, or that there is none because the physics failed.
- *
  * @param {string} words
  * @param {number | null | undefined} value
  * @param {string} [where]
@@ -43,13 +42,13 @@ const WORDS = {
   failed: () => "Failed",
   cancelled: () => "Cancelled",
   retried: () => "Retried",
-  edited: ({ body }) => `${body.of_study ? "Its study was edited" : "Edited"}: ${edits(body)}`,
+  edited: ({ body }) => `Edited: ${edits(body)}`,
   archived: () => "Archived: lists leave it out",
   unarchived: () => "Listed again",
   deleted: ({ body }) => `Deleted: ${body.name}`,
-  notified: ({ body }) => `Told ${channel(body)} of the end of the ${body.of}`,
+  notified: ({ body }) => `Told ${channel(body)} of the end of the study`,
   notification_failed: ({ body }) =>
-    `Could not tell ${channel(body)} of the end of the ${body.of}: ${body.reason}${body.again_in_s ? `; again in ${count(body.again_in_s)} s` : "; given up"}`,
+    `Could not tell ${channel(body)} of the end of the study: ${body.reason}${body.again_in_s ? `; again in ${count(body.again_in_s)} s` : "; given up"}`,
   sensitivity_ended: ({ body }) =>
     `Sensitivity check ${String(body.state).toLowerCase()}${body.warnings?.length ? `: ${body.warnings.join(" ")}` : ""}`,
   versions_refused: ({ body }) => / \(unavailable: /.test(body.refused_by)
@@ -83,7 +82,6 @@ const WORDS = {
 
 /**
  * Return what an edit changed: tags by their names, where the event has them, and other fields.
- *
  * @param {{ fields?: string[], tags?: string[], add_tags?: string[], remove_tags?: string[] }} body
  */
 function edits({ fields = [], tags, add_tags: added, remove_tags: removed }) {
@@ -102,21 +100,8 @@ function squaredError(value) {
   return value && value < 0.001 ? value.toExponential(1) : number(value);
 }
 
-/** The kinds of events that take steps out of a log. */
-export const REWRITES = ["corrected", "voided", "decided"];
-
-/** The kinds of events that may change every figure. */
-export const FIGURE_KINDS = ["completed", "failed", "cancelled", "extended", "imported", ...REWRITES];
-
-/** The kinds of events that may change a curve. */
-export const CURVE_KINDS = ["transferred", "probed", "repetition_completed", ...FIGURE_KINDS];
-
 /** Every kind of event that has words here. */
 export const KINDS = Object.keys(WORDS);
 
-/**
- * Return an event in words; a kind that is newer than this page is called by its name.
- *
- * @type {Words}
- */
+/** Return an event in words; a kind that is newer than this page is called by its name. @type {Words} */
 export const eventText = (event) => (WORDS[event.kind] ?? (({ kind }) => kind.replaceAll("_", " ")))(event);

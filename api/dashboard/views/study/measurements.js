@@ -1,20 +1,20 @@
 // @ts-check
-/** The measurements of a robot on a bench: repeats, operators, what was corrected, and the way to take one back. */
+/** The measurements of a robot on a bench: repeats, operators, what was corrected, and the way to take one back. Steps that a correction closed. */
 
-import { isAtRest, isWanted } from "../../lib/bench/choosing.js";
-import { undoButtons } from "../../lib/bench/corrections.js";
-import { answerText, requestWords } from "../../lib/bench/values.js";
-import { h } from "../../lib/dom.js";
+import { get } from "../../lib/api.js";
+import { conflictList, undoButtons } from "../../lib/bench/corrections.js";
+import { answerText, isAtRest, isWanted, requestWords, stateText } from "../../lib/bench/requests.js";
+import { h, refill, select } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
+import { REWRITES } from "../../lib/event_kinds.js";
+import { eventText } from "../../lib/event_words.js";
 import { count, number } from "../../lib/format.js";
 import { empty } from "../../lib/placeholders.js";
-import { table } from "../../lib/table.js";
-import { conflictList } from "../bench/conflicts.js";
-import { stateText } from "../bench/others.js";
-import { pagedList } from "./paged.js";
-import { replayLink } from "./samples.js";
+import { framed, table } from "../../lib/table.js";
+import { pagedList, replayLink } from "./samples.js";
 
 const PAGE_SIZE = 50;
+/** @type {Page.Choices} */
 const CHOICES = [["", "all measurements"], ["pending", "those that wait"], ["conflicts", "those in conflict"]];
 
 /** The events of a bench. */
@@ -26,13 +26,9 @@ const HISTORY = { counted: "counts", conflict: "in conflict", replaced: "replace
 /** @type {Record<string, string>} */
 const ENDED = { failed: "✕ failed", withdrawn: "– wanted no more", measured: "✓ measured" };
 
-/**
- * Return the table, with its filter above and the way to its other pages below.
- *
- * @param {Page.ExperimentPage} page
- */
+/** Return the table, with its filter above and the way to its other pages below. @param {Page.StudyPage} page */
 export function measurements(page) {
-  const show = h("select", {}, ...CHOICES.map(([value, label]) => h("option", { value }, label)));
+  const show = select(CHOICES);
   const reload = () => page.reload().then(() => page.sections.reload([]));
   /** @type {{ values: number[] }[]} */
   const known = page.experiment.spec.reality.samples;
@@ -48,42 +44,30 @@ export function measurements(page) {
   return pagedList(page, {
     path: "/requests", size: PAGE_SIZE, kinds: BENCH_KINDS, render,
     filters: h("p", { class: "options" }, h("label", {}, "Show ", show)),
-    query: () => ({ experiment: page.id, pending: show.value === "pending", conflicts: show.value === "conflicts" || null }),
+    query: () => ({ experiment: page.experiment.id, pending: show.value === "pending", conflicts: show.value === "conflicts" || null }),
   });
 }
 
-/**
- * Return a sample from before the experiment, which every repetition knows.
- *
- * @param {{ values: number[] }} sample
- */
+/** Return a sample from before the experiment, which every repetition knows. @param {{ values: number[] }} sample */
 const earlierRow = ({ values }) => ["all", "–", "sample from before", answerText({ values }), number(values.reduce((sum, each) => sum + each) / values.length), ENDED.measured, "–", "–", "", ""];
 
-/**
- * @param {Page.ExperimentPage} page
- * @param {Api.RequestRead} request
- * @param {() => unknown} reload
- */
+/** @param {Page.StudyPage} page @param {Api.RequestRead} request @param {() => unknown} reload */
 function row(page, request, reload) {
   const { repetition, iteration, kind, unit, repeats, answers, branch, same_as: same } = request;
   const answer = answers.find(({ state }) => state === "counted") ?? null;
   const words = requestWords(request);
-  const experiment = page.experiment.state;
-  const isHeldUp = isWanted(request) && request.state !== "taken" && isAtRest(experiment);
-  const state = [ENDED[request.state] ?? stateText(request), isHeldUp ? `, but the experiment is ${experiment.toLowerCase()}` : null,
+  const { experiment } = page;
+  const isHeldUp = isWanted(request) && request.state !== "taken" && isAtRest(experiment.state);
+  const state = [ENDED[request.state] ?? stateText(request), isHeldUp ? `, but the experiment is ${experiment.state.toLowerCase()}` : null,
     branch === null ? null : `, in closed branch ${branch}`, same ? ", same controller as before" : null];
   const undo = answer && branch === null ? undoButtons({ answer, repeats, unit, words }, page.signal, reload)
-    : isWanted(request) && !isHeldUp ? h("a", { href: `#/bench?experiment=${page.id}&request=${request.id}`, "aria-label": `To the bench: ${words}` }, "To the bench") : "";
+    : isWanted(request) && !isHeldUp ? h("a", { href: `#/bench?experiment=${experiment.id}&request=${request.id}`, "aria-label": `To the bench: ${words}` }, "To the bench") : "";
   return [repetition, iteration, kind, answer ? [answerText(answer), ...history(request)] : history(request),
     answer?.values ? number(answer.fitness) : "–", state, answer?.operator ?? "–", answer ? new Date(answer.at).toLocaleString() : "–",
     replayLink(page, request), undo];
 }
 
-/**
- * Return the note and the files of the answer that counts, and the answers that do not.
- *
- * @param {Api.RequestRead} request
- */
+/** Return the note and the files of the answer that counts, and the answers that do not. @param {Api.RequestRead} request */
 function history({ id, answers, unit }) {
   const notes = answers.filter(({ state, note }) => state === "counted" && note).map(({ note }) => h("li", {}, `Note: ${note}`));
   const others = answers.filter(({ state }) => state !== "counted").map((answer) =>
@@ -93,4 +77,32 @@ function history({ id, answers, unit }) {
   const items = [...notes, ...files, ...others];
   const label = [notes.length ? "note" : "", files.length ? `${files.length} ${files.length === 1 ? "file" : "files"}` : "", others.length ? `${others.length} other ${others.length === 1 ? "answer" : "answers"}` : ""].filter(Boolean).join(", ");
   return items.length ? [h("details", { dataset: { id } }, h("summary", {}, label), h("ul", { class: "helps" }, ...items))] : [];
+}
+
+/** Return the branches, each with its steps on demand. @param {Page.StudyPage} page */
+export function branches(page) {
+  const place = h("div");
+  page.sections.add(place, REWRITES, async () => {
+    /** @type {Api.BranchRead[]} */
+    const loaded = await get(`/experiments/${page.experiment.id}/branches`, {}, page.signal);
+    refill(place, JSON.stringify(loaded.map(({ repetition, number }) => [repetition, number])), () =>
+      (loaded.length ? loaded.map(branch) : empty("No correction has closed a branch.")));
+  });
+  return [h("p", { class: "note" }, "Steps that followed from a measurement which was corrected or voided. They are in no curve; measurements among them are reused."), place];
+}
+
+/** @param {Api.BranchRead} branch */
+function branch({ repetition, number, iteration, reason, steps, closed_at: at }) {
+  const title = `Branch ${number} of repetition ${repetition}, from iteration ${iteration}: ${count(steps.length)} ${steps.length === 1 ? "step" : "steps"}`;
+  return h("details", { class: "branch" },
+    h("summary", {}, title, h("span", { class: "note" }, ` ${reason} · closed ${new Date(at).toLocaleString()}`)),
+    framed(title, h("ol", { class: "events" }, ...steps.map((step) => h("li", {}, stepText(step, repetition))))));
+}
+
+/** Return a step in the words of its event. @param {Record<string, any>} step @param {number} repetition */
+export function stepText({ kind, simulators, ...body }, repetition) {
+  const error = simulators?.[0]?.squared_error;
+  const values = body.repeats?.length ? ` (${body.repeats.join(", ")})` : "";
+  const told = { kind, repetition, body: { ...body, ...(error === undefined ? {} : { squared_error: error }) } };
+  return `${eventText(/** @type {Api.EventRead} */ (told))}${values}`;
 }

@@ -1,10 +1,10 @@
 // @ts-check
 /** The events of an experiment, the newest first, as they happen. */
 
-import { ageOf } from "../../lib/ages.js";
 import { get } from "../../lib/api.js";
-import { h } from "../../lib/dom.js";
-import { eventText, KINDS } from "./event_words.js";
+import { button, h } from "../../lib/dom.js";
+import { eventText, KINDS } from "../../lib/event_words.js";
+import { ageOf } from "../../lib/live.js";
 
 const BATCH = 60;  // events that are shown at first, and more on demand
 const MOST = 600;  // a page that is open for days stays light
@@ -13,17 +13,13 @@ const WINDOW = 400;  // event numbers that are searched at once; they count the 
 
 /** @typedef {(query: Page.Query) => Promise<Api.EventPage>} Load */
 
-/**
- * Return the list, which grows with the experiment.
- *
- * @param {Page.ExperimentPage} page
- */
+/** Return the list, which grows with the experiment. @param {Page.StudyPage} page */
 export function eventList(page) {
   const list = h("ol", { class: "events" });
-  const more = h("button", { type: "button", class: "quiet small" }, "Earlier");
+  const more = button("Earlier", () => showEarlier().catch(() => {}));
   const body = h("div", { class: "event-list framed", tabindex: "0", role: "region", "aria-label": "Latest events" });
   /** @type {Load} */
-  const load = (query) => get("/events/page", { experiment: page.id, limit: PAGE_SIZE, ...query }, page.signal);
+  const load = (query) => get("/events/page", { study: page.id, limit: PAGE_SIZE, ...query }, page.signal);
   const past = pastEvents(load, page.latest);
   let newest = page.latest;
   /** @type {Promise<void> | null} */
@@ -47,7 +43,6 @@ export function eventList(page) {
     while (list.childElementCount > MOST) list.lastElementChild?.remove();
     if (list.childElementCount === MOST) more.hidden = true;
   };
-  more.addEventListener("click", () => showEarlier().catch(() => {}));
   page.sections.add(body, KINDS, async () => {
     if (!body.contains(list)) {
       await showEarlier();
@@ -60,7 +55,6 @@ export function eventList(page) {
 
 /**
  * Return the events up to a number, the newest first, some at a time. The service lists events in their order only.
- *
  * @param {Load} load
  * @param {number} latest
  */

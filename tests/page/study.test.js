@@ -3,21 +3,32 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { isFunction, isPhysical, unitsOf, worldsText } from "../../api/dashboard/lib/robots.js";
 
-const { actions, refusal } = await import("../../api/dashboard/views/experiment/actions.js");
-const { pastEvents } = await import("../../api/dashboard/views/experiment/event_list.js");
-const { eventText } = await import("../../api/dashboard/views/experiment/event_words.js");
-const { stepText } = await import("../../api/dashboard/views/experiment/branches.js");
-const { measurements } = await import("../../api/dashboard/views/experiment/measurements.js");
-const { waitingText } = await import("../../api/dashboard/views/experiment/waiting.js");
+const { eventText } = await import("../../api/dashboard/lib/event_words.js");
 const { lastIteration } = await import("../../api/dashboard/views/replay.js");
-const { gathered } = await import("../../api/dashboard/views/study/head.js");
+const { actions, editing, keeping, refusal } = await import("../../api/dashboard/views/study/actions.js");
+const { pastEvents } = await import("../../api/dashboard/views/study/events.js");
+const { gathered, waitingText } = await import("../../api/dashboard/views/study/head.js");
+const { measurements, stepText } = await import("../../api/dashboard/views/study/measurements.js");
+
+/** A study with experiments in these states, of each of which `failed` repetitions have failed. */
+const study = (states, failed = 0) => ({ id: "s", name: "s", tags: [], experiments: states.map((state) => ({ study: "s", state, progress: { failed } })) });
+const buttons = (element) => element.querySelectorAll("button").map(({ textContent }) => textContent);
 
 test("an action that a state forbids says what would permit it", () => {
-  assert.equal(refusal("pause", { state: "RUNNING", progress: { failed: 0 } }), "");
-  assert.equal(refusal("resume", { state: "QUEUED", progress: { failed: 0 } }), "An experiment that is queued cannot be resumed, only one that is pausing or paused.");
-  assert.equal(refusal("extend", { state: "FAILED", progress: { failed: 1 } }), "An experiment that is failed cannot be extended, only one that is completed.");
-  assert.equal(refusal("retry", { state: "FAILED", progress: { failed: 1 } }), "");
-  assert.equal(refusal("retry", { state: "COMPLETED", progress: { failed: 0 } }), "None of its repetitions has failed, so none can be retried.");
+  assert.equal(refusal("pause", study(["RUNNING"])), "");
+  assert.equal(refusal("resume", study(["QUEUED"])), "An experiment that is queued cannot be resumed, only one that is pausing or paused.");
+  assert.equal(refusal("extend", study(["FAILED"], 1)), "An experiment that is failed cannot be extended, only one that is completed.");
+  assert.equal(refusal("retry", study(["FAILED"], 1)), "");
+  assert.equal(refusal("retry", study(["COMPLETED"])), "None of its repetitions has failed, so none can be retried.");
+  assert.equal(refusal("pause", study(["COMPLETED", "RUNNING"])), "");
+  assert.equal(refusal("pause", study(["COMPLETED", "FAILED"])), "None of its experiments can be paused now: only one that is queued, running or waiting can.");
+});
+
+test("one experiment among others has a name of its own, and its study has the rest", () => {
+  const page = (id) => ({ id, study: { ...study(["COMPLETED"]), id, archived_at: null } });
+  const labels = (id) => [buttons(keeping(page(id)).element), editing(page(id))[0].textContent];
+  assert.deepEqual(labels("s"), [["Archive", "Delete…", "Notify…"], "Edit name, notes and tags"]);
+  assert.deepEqual(labels("e"), [["Delete…"], "Edit name"]);
 });
 
 test("an extension whose cost is not confirmed changes nothing, and keeps its dialog", async () => {
@@ -28,9 +39,9 @@ test("an extension whose cost is not confirmed changes nothing, and keeps its di
   globalThis.FormData = class { [Symbol.iterator] = () => [["repetitions", "9000"]][Symbol.iterator](); };
   const refused = { title: "", status: 422, errors: [{ pointer: "confirm_cost", message: "this takes about 1,229 core-hours" }] };
   globalThis.fetch = () => Promise.resolve(new Response(JSON.stringify(refused), { status: 422 }));
-  const experiment = { state: "COMPLETED", progress: { failed: 0 }, level: false, spec: { iterations: 9, repetitions: 1 } };
+  const experiment = { study: "s", state: "COMPLETED", progress: { failed: 0 }, level: false, spec: { iterations: 9, repetitions: 1 } };
   let loads = 0, closed = 0;
-  const page = { id: "e1", experiment, signal: new AbortController().signal, reload: () => { loads += 1; } };
+  const page = { id: "s", study: { ...study([]), experiments: [experiment] }, signal: new AbortController().signal, reload: () => { loads += 1; } };
   const shown = async (count) => {
     while (dialogs.length < count) await new Promise((resume) => { setTimeout(resume); });
     return dialogs.at(-1);
@@ -69,7 +80,7 @@ test("an edit names its tags, if the event has them", () => {
   const edited = (body) => eventText({ kind: "edited", body });
   assert.equal(edited({ fields: ["add_tags"], add_tags: ["gait", "wet"], remove_tags: [] }), "Edited: added the tags gait, wet");
   assert.equal(edited({ fields: ["name", "remove_tags"], remove_tags: ["wet"] }), "Edited: name; removed the tag wet");
-  assert.equal(edited({ fields: ["tags"], add_tags: ["a_b"], remove_tags: ["wet"], of_study: true }), "Its study was edited: added the tag a_b; removed the tag wet");
+  assert.equal(edited({ fields: ["tags"], add_tags: ["a_b"], remove_tags: ["wet"], }), "Edited: added the tag a_b; removed the tag wet");
   assert.equal(edited({ fields: ["tags"], tags: ["gait"] }), "Edited: set the tag gait");
   assert.deepEqual([edited({ fields: ["name", "remove_tags"] }), edited({ fields: ["tags"], add_tags: [], remove_tags: [] })], ["Edited: name, remove tags", "Edited: tags"]);
 });
@@ -83,7 +94,7 @@ test("samples from before are the first measurements, and on the first page alon
   };
   const samples = [{ values: [0.2, 0.4] }, ...Array(60).fill({ values: [0.5] })];
   let load = null;
-  const page = { id: "e", signal: new AbortController().signal, experiment: { spec: { reality: { samples } } }, unit: () => "m/s", sections: { add: (_, __, given) => { load = given; } } };
+  const page = { signal: new AbortController().signal, experiment: { id: "e", state: "RUNNING", spec: { reality: { samples } } }, unit: () => "m/s", sections: { add: (_, __, given) => { load = given; } } };
   const [, place, buttons] = measurements(page);
   const rows = () => place.querySelectorAll("tr").map(({ children }) => children.map(({ textContent }) => textContent));
 

@@ -4,10 +4,10 @@
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
+import { REWRITES } from "../../lib/event_kinds.js";
 import { readableName, threeDigits } from "../../lib/format.js";
 import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
-import { REWRITES } from "./event_words.js";
 
 const KINDS = ["tuned", "probed", ...REWRITES];
 const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound.";
@@ -15,16 +15,13 @@ const RANDOM = " Simulators tuned on no sample are random.";
 
 const VERDICT_NOTE = "100 % is as uncertain as before any sample. The largest counts of the spread over repetitions, the tuner’s 95 % intervals, and its posterior. Agreement is not truth: simulators that lack an effect agree on a value that makes up for it.";
 
-/**
- * Return the verdicts on tunables, the service's remarks, and a table with a row for each iteration.
- *
- * @param {Page.ExperimentPage} page
- */
+/** Return the verdicts on tunables, the service's remarks, and a table with a row for each iteration. @param {Page.StudyPage} page */
 export function misfit(page) {
   const place = h("div");
+  const { id } = page.experiment;
   page.sections.add(place, KINDS, async () => {
     /** @type {Api.MisfitRead} */
-    const { points, remarks, unit, error_unit: errorUnit, verdicts, held_out: share } = await get(`/experiments/${page.id}/misfit`, {}, page.signal);
+    const { points, remarks, unit, error_unit: errorUnit, verdicts, held_out: share } = await get(`/experiments/${id}/misfit`, {}, page.signal);
     if (!points.length) {
       place.replaceChildren(empty("Nothing is tuned yet."));
       return;
@@ -35,16 +32,12 @@ export function misfit(page) {
     place.replaceChildren(...identified(verdicts), h("h3", {}, "Misfit"),
       h("ul", { class: "misfit-remarks" }, ...remarks.map((remark) => h("li", {}, remark))),
       table("Misfit by iteration", columns, points.map((point) => row(point, Boolean(share)))), h("p", { class: "note" }, NOTE, points[0].error.n ? "" : RANDOM,
-        " ", downloadLink("CSV", `/experiments/${page.id}/misfit`, { format: "csv" }, `gaplab-${page.id}-misfit.csv`)));
+        " ", downloadLink("CSV", `/experiments/${id}/misfit`, { format: "csv" }, `gaplab-${id}-misfit.csv`)));
   });
   return [place];
 }
 
-/**
- * Return the verdict on each tunable, and what would help; nothing before the first sample.
- *
- * @param {Api.TunableVerdict[]} verdicts
- */
+/** Return the verdict on each tunable, and what would help; nothing before the first sample. @param {Api.TunableVerdict[]} verdicts */
 function identified(verdicts) {
   if (!verdicts.length) return [];
   const rows = verdicts.map(({ name, verdict, remaining, helps }) => [
