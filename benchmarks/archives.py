@@ -29,7 +29,7 @@ def import_file(store: Store, path: Path) -> ImportRead:
     """Import an archive, and return the ids of its study and its experiments.
 
     Raises:
-        SystemExit: the file cannot be read, or is no archive.
+        SystemExit: the file cannot be read, or is not an archive.
     """
     try:
         with path.open("rb") as file:

@@ -17,8 +17,6 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.discrepancies.readings import Readings
-from gaplab.services.core.identification import Doubt, Means, verdicts
-from gaplab.services.core.misfit import Tuning, misfit_point
 from gaplab.services.core.misspecification import fit_of, widened
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
@@ -28,8 +26,9 @@ from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.gauss_newton import GaussNewton
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Sample
-from gaplab.services.core.unreproduced import doubt
 from gaplab.services.engines import engines
+from gaplab.services.findings.identification import Means, verdicts
+from gaplab.services.findings.misfit import Doubt, Tuning, doubt, misfit_point
 from gaplab.services.specs.simulation import Simulation
 
 TUNABLES = {"dynamic_friction": (0.0, 1.5), "restitution": (0.0, 0.6), "motor_gain": (0.3, 3.0)}

@@ -7,6 +7,16 @@ from gaplab.schemas.comparisons import Comparison
 UNPAIRED = ("student", "welch", "mann_whitney")
 PAIRED = ("paired_t", "wilcoxon")
 TESTS = (*UNPAIRED, *PAIRED, "brown_forsythe")
+NAMES = {
+    "student": "Student",
+    "welch": "Welch",
+    "mann_whitney": "Mann-Whitney",
+    "paired_t": "Paired t",
+    "wilcoxon": "Wilcoxon",
+    "brown_forsythe": "Brown-Forsythe",
+}
+"""What a table calls each test; Brown and Forsythe's is of the spread."""
+
 _OF_A_TEST = ("statistic", "degrees_of_freedom", "p", "p_holm")
 _OF_AN_ESTIMATE = ("value", "lower", "upper")
 

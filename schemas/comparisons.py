@@ -9,15 +9,45 @@ from gaplab.schemas.base import Frozen, Id, Name, Statistic
 from gaplab.schemas.curves import Fitness
 
 
-class Test(Frozen):
+class Found(StrEnum):
+    """What a test says of the first of a pair. `n. s.`: not shown to differ, which does not show that it is equal."""
+
+    HIGHER = "higher"
+    LOWER = "lower"
+    WIDER = "wider"
+    NARROWER = "narrower"
+    OPEN = "n. s."
+    UNDEFINED = "too few values that vary"
+    UNPAIRED = "not paired"
+
+
+class PValue(Frozen):
+    """A p-value, and what it says of a pair."""
+
+    p: Statistic = Field(default=None, description="two-sided p-value, uncorrected; null if undefined")
+    p_holm: Statistic = Field(default=None, description="p-value with Holm's correction over all pairs")
+    found: Found = Field(
+        default=Found.UNDEFINED,
+        description="what it says of the first of the pair: its mean is higher or lower, or its spread wider or "
+        "narrower, if p_holm is below 0.05",
+    )
+    text: str = Field(
+        default="", description="p with Holm's correction, and the uncorrected p", examples=["0.012 (raw 0.004)"]
+    )
+
+    @property
+    def differs(self) -> bool:
+        """Whether it says that the two of the pair differ."""
+        return self.found in {Found.HIGHER, Found.LOWER, Found.WIDER, Found.NARROWER}
+
+
+class Test(PValue):
     """One statistical test between two groups."""
 
     __test__ = False
 
     statistic: Statistic = None
     degrees_of_freedom: Statistic = None
-    p: Statistic = Field(default=None, description="two-sided p-value, uncorrected; null if undefined")
-    p_holm: Statistic = Field(default=None, description="p-value with Holm's correction over all pairs")
 
 
 class Estimate(Frozen):
@@ -29,6 +59,7 @@ class Estimate(Frozen):
     value: Statistic = None
     lower: Statistic = None
     upper: Statistic = None
+    text: str = Field(default="", description="the number with its interval", examples=["0.71 [0.62, 0.8]"])
 
 
 class Summary(Frozen):
@@ -45,11 +76,20 @@ class Groups(Frozen):
 
     n_first: int
     n_second: int
+    sizes: str = Field(
+        default="",
+        description="how many values the difference is of: of the pairs where streams are shared, else of each group",
+        examples=["8, 8"],
+    )
     difference: Statistic = Field(description="difference of the means")
     effect_size: Statistic = Field(
         description="Cohen's d: the difference divided by the pooled standard deviation; where streams are shared, "
         "over the repetitions that both have"
     )
+    difference_text: str = Field(
+        default="", description="the difference with its interval", examples=["+0.12 [0.05, 0.19]"]
+    )
+    effect_size_text: str = Field(default="", examples=["+0.52"])
     student: Test = Field(description="Student's t-test, which the paper uses")
     welch: Test
     mann_whitney: Test
@@ -64,14 +104,13 @@ class Pooled(Groups):
     )
 
 
-class Trusted(Frozen):
-    """The test by which a pair is judged: paired if the experiments share random streams, else Welch's t."""
+class Trusted(PValue):
+    """The test by which a pair is judged: paired if the experiments share random streams, else Welch's t.
+
+    Holm's correction is over the trusted tests of all pairs.
+    """
 
     test: Literal["welch", "paired_t"]
-    p: Statistic = Field(default=None, description="its two-sided p-value, uncorrected")
-    p_holm: Statistic = Field(
-        default=None, description="p-value with Holm's correction over the trusted tests of all pairs"
-    )
 
 
 class EquivalenceVerdict(StrEnum):
@@ -93,7 +132,7 @@ class Equivalence(Frozen):
         description="equivalent: this p_holm is below 0.05, even where the pair differs by less than the margin; "
         "different: the trusted test's p_holm is; undecided: neither"
     )
-    words: str = Field(examples=["equivalent within ±0.03 (p = 0.012)"])
+    words: str = Field(examples=["equivalent within ±0.03 (p = 0.012, raw 0.004)"])
 
 
 class Pair(Frozen):
@@ -116,6 +155,9 @@ class Comparison(Groups, Pair):
 
     fitness: Fitness = Fitness.RECORDED
     where: str = Field(default="", description="these numbers", examples=["after 5 real-world evaluations"])
+    shared_evaluations: int = Field(
+        default=0, description="last number of real-world evaluations that all compared experiments share"
+    )
     difference: Statistic = Field(
         description="difference of the means; where streams are shared, over the repetitions that both have"
     )
@@ -131,7 +173,7 @@ class Comparison(Groups, Pair):
     warnings: tuple[str, ...] = Field(
         default=(),
         description="what differs besides the strategy, so that fitness says little of it: robot, task or reality",
-        examples=[["different robots (toy_function; quadruped): their fitness does not mean the same"]],
+        examples=[["different robots (quadruped; toy_function): their fitness does not mean the same"]],
     )
     improvement: Estimate = Field(
         description="probability that a repetition of the first is fitter than one of the second; a tie counts half"
@@ -155,6 +197,11 @@ class Comparison(Groups, Pair):
     )
 
     @property
-    def sizes(self) -> str:
-        """Return how many values the difference is of: of the pairs where streams are shared, else of each group."""
-        return f"{self.n_paired}" if self.shared_streams else f"{self.n_first}, {self.n_second}"
+    def differs(self) -> bool:
+        """Whether the trusted test says that the two differ."""
+        return self.trusted.differs
+
+    @property
+    def is_equivalent(self) -> bool:
+        """Whether the two are shown to be equivalent within the margin that was asked for."""
+        return self.equivalence is not None and self.equivalence.verdict is EquivalenceVerdict.EQUIVALENT

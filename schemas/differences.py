@@ -30,14 +30,21 @@ class SettingRead(Frozen):
         "null in a parameter of reality: hidden",
         examples=[((400,), (800,))],
     )
+    texts: tuple[str, ...] = Field(description="by column: these values in words", examples=[("400", "800")])
 
 
 class SpecDiff(Frozen):
-    """The settings that differ. Names and the schedule change no number, so they are no settings."""
+    """The settings that differ. Names and the schedule change no number, so they are not settings."""
 
     columns: tuple[DiffColumn, ...]
     settings: tuple[SettingRead, ...] = Field(description="in the order of the spec; empty if all are equal")
     equal: int = Field(description="number of the other settings", examples=[31])
+    note: str = Field(description="that number in a sentence", examples=["31 other settings are equal."])
+    warnings: tuple[str, ...] = Field(
+        default=(),
+        description="why experiments of the service should not be compared: other robots, tasks or realities",
+        examples=[("different robots (quadruped; toy_function): their fitness does not mean the same",)],
+    )
     hidden: tuple[str, ...] = Field(
         default=(),
         description="pointers of parameters of reality that are still hidden in a column, so they cannot be compared",

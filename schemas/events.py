@@ -79,6 +79,7 @@ class EventRead(Frozen):
         description="details, such as iteration, fitness or reason", examples=[{"iteration": 1, "fitness": 1.31}]
     )
     at: Moment
+    sentence: str = Field(default="", examples=["Repetition 0, iteration 1: measured in reality, 1.31"])
 
 
 class EventPage(Frozen):

@@ -135,7 +135,7 @@ class ExtensionSpec(Frozen):
 
 
 class ScheduleChange(Frozen):
-    """A new schedule for an experiment. A missing field stays unchanged; a `max_parallel` of null is no limit."""
+    """A new schedule for an experiment. A missing field stays unchanged; a `max_parallel` of null is not a limit."""
 
     EXAMPLES: ClassVar[Examples] = {
         "urgent": {"summary": "Before all others, on two cores", "value": {"priority": 10, "max_parallel": 2}}

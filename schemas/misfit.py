@@ -15,6 +15,7 @@ class Distribution(Frozen):
     sd: Statistic = Field(description="sample standard deviation")
     least: Statistic
     greatest: Statistic
+    text: str = Field(default="", description="mean ± standard deviation", examples=["0.71 ± 0.02"])
 
 
 class TunableDistribution(Distribution):
@@ -25,6 +26,9 @@ class TunableDistribution(Distribution):
     upper: float = Field(description="upper bound of tuning", examples=[0.6])
     at_lower: Statistic = Field(description="share of repetitions at the lower bound, within 1 % of the range")
     at_upper: Statistic = Field(description="share of repetitions at the upper bound, within 1 % of the range")
+    at_bounds: str = Field(
+        default="", description="both shares in words; empty: none is at a bound", examples=["50 % at 0"]
+    )
     spread: Statistic = Field(
         default=None, description="standard deviation over repetitions, over that of a uniform draw between the bounds"
     )
@@ -110,3 +114,4 @@ class MisfitRead(Frozen):
     verdicts: tuple[TunableVerdict, ...] = Field(
         default=(), description="which tunables the samples identify; none before the first sample"
     )
+    note: str = Field(default="", description="what the verdicts mean, in sentences")

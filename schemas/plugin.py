@@ -99,10 +99,10 @@ class PluginRead(Frozen):
 
 
 class IgnoredFile(Frozen):
-    """A file in a plug-in folder that is no plug-in."""
+    """A file in a plug-in folder that is not a plug-in."""
 
     file: str
-    why: str = Field(description="why it is no plug-in, and what to do")
+    why: str = Field(description="why it is not a plug-in, and what to do")
 
 
 class BudgetRead(Frozen):
@@ -134,7 +134,7 @@ class Catalogue(Frozen):
     tuners: tuple[PluginRead, ...] = ()
     budgets: tuple[BudgetRead, ...] = ()
     ignored: tuple[IgnoredFile, ...] = Field(
-        default=(), description="files in the folders of GAPLAB_PLUGINS that are no plug-ins"
+        default=(), description="files in the folders of GAPLAB_PLUGINS that are not plug-ins"
     )
     defaults: dict[str, Any] = Field(
         default_factory=dict, description="the value of each field that a study's spec leaves out"

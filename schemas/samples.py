@@ -17,7 +17,7 @@ class CellError(Frozen):
         default=None, description="name of the column; null for the whole line", examples=["gene_2"]
     )
     value: str | None = Field(default=None, description="the cell as it is in the file", examples=["1,5"])
-    message: str = Field(examples=["'1,5' is no number; decimals have a point"])
+    message: str = Field(examples=["'1,5' is not a number; decimals have a point"])
     permitted: str | None = Field(default=None, examples=["0 to 1"])
 
 

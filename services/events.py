@@ -5,11 +5,13 @@ All of them raise StoreUnavailable while the database cannot be used.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from sqlalchemy import func, or_, select
+from sqlalchemy import Row, func, or_, select
 
 from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.services.core.errors import Conflict
+from gaplab.services.findings.event_sentences import event_sentence
 from gaplab.services.store.models import DeletionRow, EventCounterRow, EventRow, ExperimentRow
 from gaplab.services.store.queries.experiments import members, was_deleted
 from gaplab.services.store.session import Session, snapshot
@@ -45,9 +47,7 @@ def page(session: Session, after: int, wanted: WantedEvents, *, limit: int) -> E
         query = query.where(row.kind.in_(list(wanted.kinds)))
     query = query.outerjoin(experiment, experiment.id == row.experiment_id)
     query = query.outerjoin(DeletionRow, DeletionRow.id == row.experiment_id).where(row.number > after)
-    names = ("number", "kind", "experiment", "study", "repetition", "body", "at")
-    rows = session.execute(query.order_by(row.number).limit(limit))
-    items = tuple(EventRead(**dict(zip(names, values, strict=True))) for values in rows)
+    items = tuple(map(_read, session.execute(query.order_by(row.number).limit(limit))))
     last = items[-1].number if len(items) == limit else max(newest, after)
     return EventPage(items=items, last=last, latest=newest)
 
@@ -75,6 +75,12 @@ def _experiments(session: Session, id_: str) -> Sequence[str]:
     named = storable(id_)
     found = (select(row.id).where(or_(row.id == named, row.study_id == named)) for row in (ExperimentRow, DeletionRow))
     return [each for query in found for each in session.scalars(query)]
+
+
+def _read(row: Row[Any]) -> EventRead:
+    names = ("number", "kind", "experiment", "study", "repetition", "body", "at")
+    found = EventRead(**dict(zip(names, row, strict=True)))
+    return found.model_copy(update={"sentence": event_sentence(found.kind, found.repetition, found.body)})
 
 
 def _latest(session: Session) -> int:

@@ -91,7 +91,7 @@ class PermittedReality:
     def __call__(self, genome: Genome, step: int = 0) -> Outcome:
         """Return the outcome of the genome `(g,)` in reality, once it is permitted to ask.
 
-        If the permit expires, it neither returns nor raises: what a stopped robot gives is no measurement.
+        If the permit expires, it neither returns nor raises: what a stopped robot gives is not a measurement.
 
         Args:
             genome: what to measure.

@@ -36,7 +36,7 @@ def numbers_of(values: Any, place: str) -> list[float]:  # noqa: ANN401 - a numb
 
     Raises:
         ValueError: one is not finite.
-        TypeError: one is no number.
+        TypeError: one is not a number.
     """
     values = _python(values)
     if isinstance(values, int | float):

@@ -176,7 +176,7 @@ class Connection:
 
     def unknown_service(self) -> UnknownService:
         """Return the error for an answer that this version cannot read."""
-        return UnknownService(f"what answers at {self.url} is no gaplab of this version")
+        return UnknownService(f"what answers at {self.url} is not gaplab of this version")
 
     def _repeat(self, method: str, path: str, **request: Unpack[Request]) -> bytes:
         final = (*FINAL, httpx2.ReadTimeout) if method == "GET" else FINAL  # asked again, it is as slow
@@ -203,7 +203,7 @@ def _configured_url() -> str:
     """Return the address of the environment's settings.
 
     Raises:
-        ServiceUnreachable: GAPLAB_URL is no address.
+        ServiceUnreachable: GAPLAB_URL is not an address.
         InvalidSetting: another setting is not permitted.
     """
     try:
@@ -247,6 +247,6 @@ def segment(of: Of) -> str:
     """Return any id or name as one segment of a path; servers decode a slash before they split the path.
 
     Raises:
-        TypeError: it is not a text, a study or an experiment.
+        TypeError: it is not text, a study or an experiment.
     """
     return quote(id_of(of).replace("/", "%2F"), safe="", errors="replace").replace(".", "%2E") or "%20"

@@ -34,7 +34,7 @@ class MeasurementFailed(Exception):
 
 
 class DriverBroken(Exception):
-    """A driver that cannot be loaded, returns what is no fitness, or hangs; nothing wrong is sent."""
+    """A driver that cannot be loaded, returns what is not a fitness, or hangs; nothing wrong is sent."""
 
 
 class Driver(Protocol):
@@ -199,7 +199,7 @@ def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a dri
     """Return fitness and readings.
 
     Raises:
-        DriverBroken: the fitness is not a finite number, or readings are no numbers.
+        DriverBroken: the fitness is not a finite number, or readings are not numbers.
     """
     readings: Any
     fitness, readings = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)

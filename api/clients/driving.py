@@ -105,7 +105,7 @@ class TakenRequest:
 
         Raises:
             ValueError: a value is not finite, or a reading is infinite; nothing is journalled.
-            TypeError: a value is no number, or JSON cannot hold a reading; nothing is journalled.
+            TypeError: a value is not a number, or JSON cannot hold a reading; nothing is journalled.
             ServiceError: the service refuses the answer; repeats that were noted stay `known`.
         """
         told = {"values": numbers_of(values, "/values"), "readings": json_of(readings_of(readings), "/readings")}
@@ -151,7 +151,7 @@ class Driving:
 
         Raises:
             ServiceError: the service refuses the token of the driver, or what it asks for.
-            UnknownService: what answers is no gaplab of this version.
+            UnknownService: what answers is not gaplab of this version.
         """
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": WAIT_S}
         pause_s = 0.0

@@ -34,7 +34,7 @@ class ServiceUnreachable(Exception):
 
 
 class UnknownService(ServiceUnreachable):
-    """What answers at the address is no gaplab of this version."""
+    """What answers at the address is not gaplab of this version."""
 
 
 class ExperimentFailed(Exception):

@@ -48,7 +48,7 @@ def mcap_to_csv(file: Path, topic: str | None = None, body: str | None = None) -
                 poses.setdefault(name, []).append(_pose(decoded, message.log_time))
             writer.writerows(_of_body(poses, body, f"{file.name} has {{}} on {chosen!r}"))
     except McapError as error:
-        raise ValueError(f"{file.name} is no MCAP file that can be read: {error}") from error
+        raise ValueError(f"{file.name} is not an MCAP file that can be read: {error}") from error
     return text.getvalue()
 
 

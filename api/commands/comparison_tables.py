@@ -6,17 +6,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from gaplab.api.commands.tables import number, table
-from gaplab.schemas.comparison_columns import UNPAIRED, shown_tests
-from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
-
-NAMES = {
-    "student": "p Student",
-    "welch": "p Welch",
-    "mann_whitney": "p Mann-Whitney",
-    "paired_t": "p paired t",
-    "wilcoxon": "p Wilcoxon",
-    "brown_forsythe": "p of the spread",
-}
+from gaplab.schemas.comparison_columns import NAMES, UNPAIRED, shown_tests
+from gaplab.schemas.comparisons import Comparison, Groups, Summary
 
 
 def comparisons(pairs: Sequence[Comparison]) -> Iterator[Table | str]:
@@ -26,7 +17,7 @@ def comparisons(pairs: Sequence[Comparison]) -> Iterator[Table | str]:
     yield table(("experiment", "n", "mean", "interquartile mean", "SD"), map(_experiment, *_summaries(pairs)))
     yield "Differences with 90 % intervals, Cohen's d, and the probability that a repetition of the first is fitter"
     yield table(("first", "second", "n", "difference", "d", "P(first > second)"), map(_sizes, pairs))
-    yield "p, and in brackets p with Holm's correction over all pairs"
+    yield "p with Holm's correction over all pairs, and in brackets the raw p"
     yield _tests(pairs, pairs, shown_tests(pairs))
     yield from dict.fromkeys(f"! {_names(pair)}: {escape(pair.caution)}\n" for pair in pairs if pair.caution)
     pooled = [pair.pooled for pair in pairs if pair.pooled]
@@ -43,38 +34,21 @@ def _summaries(pairs: Sequence[Comparison]) -> tuple[list[str], list[Summary]]:
 
 
 def _experiment(name: str, one: Summary) -> tuple[str, ...]:
-    return escape(name), f"{one.n}", _estimate(one.mean), _estimate(one.interquartile_mean), number(one.sd)
+    return escape(name), f"{one.n}", escape(one.mean.text), escape(one.interquartile_mean.text), number(one.sd)
 
 
 def _sizes(pair: Comparison) -> tuple[str, ...]:
-    difference = _signed(pair.difference) + _interval(pair.lower, pair.upper)
-    numbers = (difference, _signed(pair.effect_size), _estimate(pair.improvement))
-    return escape(pair.first_name), escape(pair.second_name), f"{pair.n_first}, {pair.n_second}", *numbers
+    numbers = (pair.sizes, pair.difference_text, pair.effect_size_text, pair.improvement.text)
+    return escape(pair.first_name), escape(pair.second_name), *map(escape, numbers)
 
 
 def _tests(pairs: Sequence[Comparison], tested: Sequence[Groups], names: Sequence[str]) -> Table:
     rows = [
-        (escape(pair.first_name), escape(pair.second_name), *(_p(getattr(tests, name)) for name in names))
+        (escape(pair.first_name), escape(pair.second_name), *(getattr(tests, name).text for name in names))
         for pair, tests in zip(pairs, tested, strict=True)
     ]
-    return table(("first", "second", *(NAMES[test] for test in names)), rows)
+    return table(("first", "second", *(f"p {NAMES[test]}" for test in names)), rows)
 
 
 def _names(pair: Comparison) -> str:
     return f"{escape(pair.first_name)} - {escape(pair.second_name)}"
-
-
-def _p(test: Test) -> str:
-    return "-" if test.p is None else f"{number(test.p)} ({number(test.p_holm)})"
-
-
-def _estimate(found: Estimate) -> str:
-    return number(found.value) + _interval(found.lower, found.upper)
-
-
-def _interval(lower: float | None, upper: float | None) -> str:
-    return "" if lower is None or upper is None else f" \\[{lower:.3g}, {upper:.3g}]"
-
-
-def _signed(value: float | None) -> str:
-    return "-" if value is None else f"{value:+.3g}"

@@ -72,7 +72,7 @@ def _range(text: str | None) -> tuple[int | None, int | None]:
     try:
         return int(first), int(last or first)
     except ValueError:
-        msg = f"{text!r} is no number of real-world evaluations, like 5, and no range, like 3-10"
+        msg = f"{text!r} is not a number of real-world evaluations, like 5, and not a range, like 3-10"
         raise typer.BadParameter(msg, param_hint="--at") from None
 
 
@@ -85,7 +85,7 @@ def margins(text: str | None) -> tuple[float | None, float | None]:
     except ValueError:
         number = nan
     if not 0 < number < inf:
-        msg = f"{text!r} is no margin above 0, like 0.03 in the unit of fitness or 3% of the direct baseline"
+        msg = f"{text!r} is not a margin above 0, like 0.03 in the unit of fitness or 3% of the direct baseline"
         raise typer.BadParameter(msg, param_hint="--margin")
     return (None, number / 100) if text.endswith("%") else (number, None)
 

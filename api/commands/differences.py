@@ -1,7 +1,7 @@
 """The command that compares settings."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
@@ -10,7 +10,7 @@ from gaplab.api.clients.client import Client
 from gaplab.api.commands import completion, tables
 from gaplab.api.commands.app import RESULTS, AsJson, Url, app, connect
 from gaplab.api.commands.json_output import print_result
-from gaplab.schemas.differences import SpecDiff, Values
+from gaplab.schemas.differences import SpecDiff
 
 if TYPE_CHECKING:
     from gaplab.services.specs.differences import SpecColumn
@@ -36,9 +36,10 @@ def diff(of: Compared, as_json: AsJson = False, url: Url = None) -> None:
         with connect(url) as client:
             found = client.diff(*of)
     columns = ("setting", *(escape(column.name) for column in found.columns))
-    rows = ((escape(each.setting), *map(_cell, each.values)) for each in found.settings)
+    rows = ((escape(each.setting), *map(escape, each.texts)) for each in found.settings)
     shown = tables.table(columns, rows) if found.settings else "No setting differs."
-    print_result(found, shown, _equal(found), as_json=as_json)
+    warnings = (f"! {warning}" for warning in found.warnings)
+    print_result(found, *warnings, shown, found.note, as_json=as_json)
 
 
 def _with_files(names: list[str], url: str | None) -> SpecDiff:
@@ -62,20 +63,3 @@ def _stored(client: Client, id: str) -> "SpecColumn":
 
     study = client.study(id)
     return SpecColumn(study.id, study.name, tuple(experiment.spec for experiment in study.experiments))
-
-
-def _cell(values: Values) -> str:
-    return escape(", ".join(map(_written, values))) or "-"
-
-
-def _written(value: Any) -> str:  # noqa: ANN401 - JSON
-    if isinstance(value, list):
-        return " + ".join(map(_written, value))
-    if value is None or isinstance(value, bool):
-        return {None: "none", True: "yes", False: "no"}[value]
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _equal(found: SpecDiff) -> str:
-    hidden = f"; {len(found.hidden)} parameters of reality are hidden until the end" if found.hidden else ""
-    return f"{found.equal} other settings are equal{hidden}."

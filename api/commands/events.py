@@ -40,11 +40,5 @@ def events(
 
 
 def _line(event: EventRead) -> str:
-    where = event.experiment if event.repetition is None else f"{event.experiment}/{event.repetition}"
-    details = ", ".join(f"{name} {_short(value)}" for name, value in event.body.items())
     when = event.at.astimezone().strftime("%Y-%m-%d %H:%M:%S")
-    return f"{event.number:>7} {when} {where} [bold]{event.kind}[/] {escape(details)}".rstrip()
-
-
-def _short(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else "none" if value is None else str(value)
+    return f"{event.number:>7} {when} {event.experiment} {escape(event.sentence)}"

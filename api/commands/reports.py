@@ -87,12 +87,12 @@ def replay(
         found = client.replay(id, **choice)
         file = client.video(id, save, **choice) if save else None
     worlds = (("in its simulator", found.simulation), ("in reality", found.reality))
-    print_result(found, *(f"{name}: {_told(world, found.unit)}" for name, world in worlds), as_json=as_json)
+    print_result(found, *(f"{name}: {_result_in(world, found.unit)}" for name, world in worlds), as_json=as_json)
     if file:
         echo(f"Wrote {file}.", err=as_json)
 
 
-def _told(world: ReplayWorld | None, unit: str) -> str:
+def _result_in(world: ReplayWorld | None, unit: str) -> str:
     if world is None:
         return "not shown"
     return "the physics failed" if world.fitness is None else f"{world.fitness:.3f} {unit}, {world.engine}"

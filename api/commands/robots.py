@@ -108,7 +108,7 @@ def _options(given: dict[str, Any]) -> "ImportOptions":
 
 def _mistake(error: dict[str, Any]) -> str:
     if error["type"] == "extra_forbidden":
-        return f"{error['loc'][-1]} is no option of an import; permitted: {OTHERS.partition(';')[0]}"
+        return f"{error['loc'][-1]} is not an option of an import; permitted: {OTHERS.partition(';')[0]}"
     return sentence(error)
 
 
@@ -187,7 +187,8 @@ def _check_that_it_is_json(file: Path) -> None:
         json.loads(content)
     except (ValueError, RecursionError) as error:
         kind = next((kind for root, kind in _IMPORTED.items() if root in content), None)
-        reason = f"is no robot file but {kind}; first: gaplab robot import {file}" if kind else f"is not JSON: {error}"
+        imported = f"is not a robot file but {kind}; first: gaplab robot import {file}"
+        reason = imported if kind else f"is not JSON: {error}"
         raise CommandError(f"{file} {reason}", Exit.FILE) from error
 
 

@@ -65,7 +65,7 @@ def catalogue(plugins: Catalogue) -> list[Table]:
 
 
 def ignored(plugins: Catalogue) -> list[str]:
-    """Return a line for each file in a plug-in folder that is no plug-in."""
+    """Return a line for each file in a plug-in folder that is not a plug-in."""
     return [f"{escape(each.file)} is not used: {escape(each.why)}\n" for each in plugins.ignored]
 
 
@@ -90,7 +90,7 @@ def sensitivity(found: SensitivityRead) -> Table:
 def tuned(found: MisfitRead) -> Table:
     """Return a table of the tunables of the best simulators at the latest iteration, over repetitions."""
     last = found.points[-1]
-    columns = (f"tuned at {last.iteration}", "mean±SD", "least", "greatest", "at a bound")
+    columns = (f"tuned at {last.iteration}", "mean ± SD", "least", "greatest", "at a bound")
     return table(columns, map(_tuned, last.tunables))
 
 
@@ -158,10 +158,7 @@ def _effect(found: Sensitivity) -> tuple[str, ...]:
 
 
 def _tuned(found: TunableDistribution) -> tuple[str, ...]:
-    sides = ((found.lower, found.at_lower), (found.upper, found.at_upper))
-    bounds = ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
-    mean_sd = f"{number(found.mean)}±{number(found.sd)}"
-    return found.name, mean_sd, number(found.least), number(found.greatest), bounds
+    return found.name, found.text, number(found.least), number(found.greatest), found.at_bounds or "-"
 
 
 def _mean(point: CurvePoint | None) -> str:

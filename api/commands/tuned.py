@@ -17,6 +17,7 @@ from gaplab.api.commands.json_output import echo, print_result
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.results import SimulatorRead
 from gaplab.services.core.errors import InvalidRobot
+from gaplab.services.findings.wording import interval
 
 if TYPE_CHECKING:
     from gaplab.services.core.robot_files import RobotFile
@@ -126,8 +127,8 @@ def _headline(id: str, best: SimulatorRead) -> str:
 def _comment(name: str, best: SimulatorRead, before: float, unit: str) -> str:
     unit = "" if unit == "1" else f" {unit}"
     ends = (best.intervals or {}).get(name)
-    interval = f"95 % interval {ends[0]:.6g} to {ends[1]:.6g}" if ends else "the tuner gives no interval"
-    return f"{name} = {best.parameters[name]:.6g}{unit}, {interval}; before {before:.6g}{unit}"
+    stated = interval(*ends, "{:.6g}".format) if ends else "the tuner gives no interval"
+    return f"{name} = {best.parameters[name]:.6g}{unit}, {stated}; before {before:.6g}{unit}"
 
 
 def _facts(

@@ -93,7 +93,7 @@ def install(app: FastAPI) -> None:
 
 
 def response(problem: Problem, headers: dict[str, str] | None = None) -> Response:
-    """Return the response for a problem; `?` stands for what is no character: a message may repeat half a surrogate."""
+    """Return the response for a problem; `?` stands for what is not a character, like half a surrogate."""
     text = json.dumps(problem.model_dump(mode="json"), ensure_ascii=False, allow_nan=False)
     return Response(text.encode(errors="replace"), problem.status, headers, MEDIA_TYPE)
 

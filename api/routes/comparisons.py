@@ -16,7 +16,7 @@ from gaplab.schemas.differences import SpecDiff
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.experiments.reading import read_differences
 from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex
-from gaplab.services.results.comparisons import Margin, compare
+from gaplab.services.results.comparisons import Margin, compare, warnings_of
 from gaplab.services.results.curves import unit_of
 
 router = APIRouter(tags=["curves"])
@@ -127,6 +127,7 @@ def read_spec_differences(store: StoreDep, query: Annotated[DifferencesQuery, Qu
     """Return the settings of the resolved specs that differ, with a column for each study or experiment.
 
     A single study is compared experiment by experiment. Tunables are compared by name. Parameters of reality are
-    compared once they may be shown.
+    compared once they may be shown. Warnings say which experiments should not be compared.
     """
-    return read_differences(store, query.study)
+    found = read_differences(store, query.study)
+    return found.model_copy(update={"warnings": warnings_of(store, query.study)})

@@ -11,10 +11,9 @@ from benchmarks.reproduction.settings import table
 from benchmarks.reproduction.statistics import Difference
 from benchmarks.reproduction.studies import Study
 from benchmarks.reproduction.verdicts import judge, significant
-from gaplab.services.core.statistics import finite
 from gaplab.services.figures.words import number_of
-from gaplab.services.reports.numbers import MISSING
-from gaplab.services.reports.sentences import listed
+from gaplab.services.findings.statistics import finite
+from gaplab.services.findings.wording import MISSING, listed
 
 BEST = paper.FIT[2]
 ENGINES = {"mujoco": "MuJoCo", "physx": "PhysX", "pybullet": "PyBullet"}

@@ -14,9 +14,9 @@ from benchmarks.reproduction.statistics import Tested
 from benchmarks.reproduction.studies import Arm, Study
 from gaplab.schemas.comparisons import Test
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.statistics import compare, finite
 from gaplab.services.figures.words import number_of, spoken
-from gaplab.services.reports.numbers import probability, signed
+from gaplab.services.findings.statistics import compare, finite
+from gaplab.services.findings.wording import probability
 
 DATA = tomllib.loads(Path(__file__).with_name("page.toml").read_text(encoding="utf-8"))
 NO_TEST, NO_DIRECT = "none in the paper", "direct baseline"
@@ -140,7 +140,7 @@ def _shape(claim: Claim, study: Study) -> Examined:
         tested = statistics.above([gains], paper.LEAST_RISE if rises else 0.0, study.unit)
         evidence.append(Evidence(f"{spoken(arm.strategy)} {claim.kind}", tested))
         if len(recorded):
-            both = (signed(float(each.mean() / unit)) for each in (early, late))
+            both = (_signed(float(each.mean() / unit)) for each in (early, late))
             told.append(f"{spoken(arm.strategy)} {' and '.join(both)}")
     here = f"gain{of_direct} to {middle} samples, and from there to {last}: {'; '.join(told)}"
     return Examined(lacking, evidence, here, NO_TEST)
@@ -202,7 +202,7 @@ def _least(study: Study, pairs: Sequence[Pair]) -> str:
         return ""
     least, pair = min(known, key=lambda each: each[0])
     whose, unit = ("", 1.0) if np.isnan(study.unit) else (" of direct", study.unit)
-    return f"{'difference' if len(known) == 1 else 'least difference'} {signed(least / unit)}{whose} ({pair.words})"
+    return f"{'difference' if len(known) == 1 else 'least difference'} {_signed(least / unit)}{whose} ({pair.words})"
 
 
 def _paper_test(claim: Claim, pairs: Sequence[Pair], first: int, last: int) -> str:
@@ -222,3 +222,7 @@ def _lacking(study: Study, names: Sequence[str]) -> list[str]:
 
 def _ends(study: Study, count: int) -> str:
     return f"value after {number_of('sample', count)}: it ends after {study.last}"
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.3f}".replace("-", "\N{MINUS SIGN}")

@@ -10,10 +10,9 @@ from benchmarks.reproduction.studies import Arm, Study
 from benchmarks.reproduction.verdicts import significant
 from gaplab.schemas.differences import Values
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.statistics import both, holm
 from gaplab.services.figures.words import spoken
-from gaplab.services.reports.numbers import MISSING, probability
-from gaplab.services.reports.sentences import listed
+from gaplab.services.findings.statistics import both, holm
+from gaplab.services.findings.wording import MISSING, listed, probability
 from gaplab.services.specs.differences import SpecColumn, differences
 
 COUNTS = (0, 1, 2, 3, 5, 10)

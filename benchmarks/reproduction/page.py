@@ -14,8 +14,8 @@ from benchmarks.reproduction.controls import Row
 from benchmarks.reproduction.settings import table
 from benchmarks.reproduction.studies import Study
 from benchmarks.reproduction.verdicts import judge, worded
-from gaplab.services.core.equivalence import SIGNIFICANT
-from gaplab.services.core.trends import FEWEST_REPETITIONS
+from gaplab.services.findings.statistics import SIGNIFICANT
+from gaplab.services.findings.trends import FEWEST_REPETITIONS
 
 ROOT = Path(__file__).parents[2]
 TEXT: dict[str, str] = DATA["text"]

@@ -11,9 +11,9 @@ from benchmarks.reproduction.statistics import Difference, narrower
 from benchmarks.reproduction.studies import Arm, Study
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import best_of_searches, mean_and_deviation
-from gaplab.services.core.statistics import finite
 from gaplab.services.figures.words import spoken
-from gaplab.services.reports.numbers import MISSING
+from gaplab.services.findings.statistics import finite
+from gaplab.services.findings.wording import MISSING
 
 FIGURE_3 = (0, 2, 4, 6, 8)
 """Samples before those panels of the paper's Fig. 3, and none."""

@@ -6,7 +6,7 @@ from benchmarks.reproduction import paper
 from benchmarks.reproduction.studies import Arm, Study
 from gaplab.schemas.lifecycle import State
 from gaplab.services.figures.words import spoken
-from gaplab.services.reports.numbers import MISSING
+from gaplab.services.findings.wording import MISSING
 
 HEAD = (
     *("study", "robot", "simulators", "reality", "seed", "evaluations: controller / selection / tuning"),

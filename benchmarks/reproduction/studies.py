@@ -14,10 +14,10 @@ from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.records import ExperimentRead, MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.statistics import finite
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments import reading
+from gaplab.services.findings.statistics import finite
 from gaplab.services.results.curves import curves, values_of
 from gaplab.services.running import provenance
 from gaplab.services.store.queries import experiments, results
@@ -141,7 +141,7 @@ def read_study(store: Store, archives: Sequence[Path]) -> Study:
     """Import archives of studies or of single experiments, and return them as one study, named by the first.
 
     Raises:
-        SystemExit: a file is no archive, or the archives differ in robot, engines, reality, budget, tuner,
+        SystemExit: a file is not an archive, or the archives differ in robot, engines, reality, budget, tuner,
             optimizers or seed.
     """
     parts = [_part(store, archive) for archive in archives]

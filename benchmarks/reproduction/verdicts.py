@@ -8,9 +8,8 @@ from typing import NamedTuple
 from benchmarks.reproduction.claims import Claim, Evidence, Examined, examine
 from benchmarks.reproduction.statistics import pooled
 from benchmarks.reproduction.studies import Study
-from gaplab.services.core.equivalence import SIGNIFICANT
-from gaplab.services.core.statistics import holm
-from gaplab.services.reports.numbers import probability
+from gaplab.services.findings.statistics import SIGNIFICANT, holm
+from gaplab.services.findings.wording import probability
 
 OTHER_WAY = "the other way"
 """In the place of a p whose estimate points away from what the p would show."""

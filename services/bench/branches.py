@@ -6,6 +6,7 @@ from sqlalchemy import func, insert, select, update
 
 from gaplab.schemas.corrections import BranchRead
 from gaplab.schemas.lifecycle import Ending, State
+from gaplab.services.findings.event_sentences import step_sentence
 from gaplab.services.running.leases import Change
 from gaplab.services.running.repetition_leases import RepetitionLeases
 from gaplab.services.store.models import BranchRow, RepetitionRow, RequestRow, StepKind, StepRow
@@ -51,14 +52,18 @@ def list_branches(session: Session, experiment: str) -> tuple[BranchRead, ...]:
     query = select(row, repetition.number).join(repetition, repetition.id == row.repetition_id)
     found = session.execute(query.where(repetition.experiment_id == experiment).order_by(repetition.number, row.number))
 
-    def steps_of(branch: BranchRow) -> tuple[dict[str, Any], ...]:
+    def sentences(branch: BranchRow, repetition: int) -> tuple[str, ...]:
         of_it = (step.repetition_id == branch.repetition_id) & (step.branch == branch.number)
-        return tuple(map(_shown, session.scalars(select(step).where(of_it).order_by(step.place))))
+        closed = session.scalars(select(step).where(of_it).order_by(step.place))
+        return tuple(step_sentence(_shown(each), repetition) for each in closed)
 
-    return tuple(BranchRead.filled_from(each, repetition=number, steps=steps_of(each)) for each, number in found)
+    return tuple(
+        BranchRead.filled_from(each, repetition=number, sentences=sentences(each, number)) for each, number in found
+    )
 
 
 def _shown(step: StepRow) -> dict[str, Any]:
+    """Return a step as the body of its event."""
     fitness = {StepKind.TRANSFERRED: "simulated_fitness", StepKind.MEASURED: "fitness", StepKind.PROBED: "fitness"}
     found = {"kind": step.kind.value, "iteration": step.iteration, **step.body}
     found |= {fitness[step.kind]: step.fitness} if step.kind in fitness else {}

@@ -110,7 +110,7 @@ def check_times(observe_s: FloatArray, sensors: Sensors) -> None:
     """Check that a rollout is observed at times that ascend, the last of them above 0, and is sensed within them.
 
     Raises:
-        AssertionError: it is not, or times are no arrays of float64.
+        AssertionError: it is not, or times are not arrays of float64.
     """
     _check_seconds("observe_s", observe_s)
     _check_seconds("sensors.times_s", sensors.times_s)

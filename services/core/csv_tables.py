@@ -75,4 +75,4 @@ def rows_of(lines: Sequence[str]) -> Iterator[CsvRow]:
             if any(cells):
                 yield CsvRow(rows.line_num, cells)
     except csv.Error as error:
-        yield CsvRow(rows.line_num, [], f"the line is no CSV: {error}")
+        yield CsvRow(rows.line_num, [], f"the line is not CSV: {error}")

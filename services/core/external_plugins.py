@@ -1,6 +1,6 @@
 """External plug-ins: every module of the plug-in folders, imported as `gaplab_plugins.NAME`.
 
-A module that cannot be imported and a class that is no valid plug-in stop nothing: they are listed as unusable.
+A module that cannot be imported and a class that is not a valid plug-in stop nothing: they are listed as unusable.
 """
 
 import sys

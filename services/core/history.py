@@ -42,5 +42,5 @@ class History:
 
 
 def _size(fitness: float) -> float | None:
-    """Return the size of a fitness; None of nan, of an infinity and of 0, which are no scale."""
+    """Return the size of a fitness; None of nan, of an infinity and of 0, which are not scales."""
     return abs(fitness) or None if np.isfinite(fitness) else None

@@ -18,7 +18,7 @@ OWN = 0.3
 """Share of the scatter of an answer that is taken as its own, independent of the others."""
 
 FARTHEST = 3.0
-"""Deviations from the median at which an answer is cut; a robot that falls is no line."""
+"""Deviations from the median at which an answer is cut; a robot that falls is not a line."""
 
 
 def cutter(answers: FloatArray, noise: float) -> Callable[[FloatArray], FloatArray]:

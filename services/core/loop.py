@@ -200,7 +200,7 @@ def _select(setting: Setting, history: History, iteration: int, answers: Answers
 def _tune(setting: Setting, history: History, iteration: int, answers: Answers) -> Tuned:
     """Return simulators tuned on the strategy's lessons whose measurement succeeded; random ones if there are none.
 
-    The best simulator is tested on samples that are held out. The budget includes samples that are no lessons or whose
+    The best simulator is tested on samples that are held out. The budget includes samples that are not lessons or whose
     measurement failed; their rollouts count as saved.
     """
     strategy = setting.strategy

@@ -57,7 +57,7 @@ def from_file(path: Path, file: str, why: str) -> list[Unusable]:
         text = path.read_text(errors="replace")
     except OSError:
         text = ""
-    named = list(_named(text)) or [(None, None)]
+    named = list(_classes_in(text)) or [(None, None)]
     return [
         Unusable(file, name or Path(file.removesuffix("/__init__.py")).stem, kind, remedied(why))
         for name, kind in named
@@ -97,7 +97,7 @@ def _place(error: BaseException, folders: Iterable[Path]) -> str | None:
     return None
 
 
-def _named(text: str) -> Iterable[tuple[str | None, str | None]]:
+def _classes_in(text: str) -> Iterable[tuple[str | None, str | None]]:
     """Yield name and kind of each class that seems to be a plug-in; None for what the text does not tell."""
     classes = list(_CLASS.finditer(text))
     for place, match in enumerate(classes):
@@ -145,7 +145,7 @@ def _fault_of_name(plugin: type[Any], kind: str) -> str | None:
     if len(name) > LONGEST_NAME:
         return f"has a name of {len(name)} characters, but specs permit at most {LONGEST_NAME}: shorten it"
     if kind == "tunable" and (name != name.strip() or set("()") & set(name)):
-        return f"has the name {name!r}, but parentheses and outer spaces in a spec are no part of a name: rename it"
+        return f"has the name {name!r}, but parentheses and outer spaces in a spec are not part of a name: rename it"
     return None
 
 

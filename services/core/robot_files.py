@@ -35,8 +35,8 @@ Lines: TypeAlias = Annotated[
 
 _SHAPES = "a shape: its kind is box, sphere, capsule, cylinder or hull"
 _MESSAGES = {
-    "extra_forbidden": ("{} is no field here", "no such field"),
-    "unexpected_keyword_argument": ("{} is no field here", "no such field"),
+    "extra_forbidden": ("{} is not a field here", "no such field"),
+    "unexpected_keyword_argument": ("{} is not a field here", "no such field"),
     "union_tag_invalid": (f"{{}} must be {_SHAPES}", _SHAPES),
     "union_tag_not_found": (f"{{}} must be {_SHAPES}", _SHAPES),
 }
@@ -113,7 +113,7 @@ def stored_robot_file(text: str | bytes) -> RobotFile:
     Its world is not checked again: a robot whose experiments are stored stays readable if later checks are stricter.
 
     Raises:
-        InvalidSpec: it is no robot file.
+        InvalidSpec: it is not a robot file.
     """
     if len(text) > MOST_BYTES:
         message = f"the robot file has {len(text):,} bytes, but at most {MOST_BYTES:,} are permitted"
@@ -121,7 +121,7 @@ def stored_robot_file(text: str | bytes) -> RobotFile:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InvalidSpec([Violation("", None, f"the robot file is no JSON: {error}", "JSON in UTF-8")]) from error
+        raise InvalidSpec([Violation("", None, f"the robot file is not JSON: {error}", "JSON in UTF-8")]) from error
     if violations := list(_world_violations(content)):
         raise InvalidSpec(violations)
     try:
@@ -136,7 +136,7 @@ def _world_violations(content: Any) -> Iterator[Violation]:  # noqa: ANN401 - an
     if not isinstance(world, dict):
         return
     for name in world.keys() & _UNWRITTEN:
-        message = f"{name} is no field of a robot file: it would say how the world was edited"
+        message = f"{name} is not a field of a robot file: it would say how the world was edited"
         yield Violation(f"/world/{name}", None, message, "no such field")
     for name in ("bodies", "joints"):
         if isinstance(given := world.get(name), list) and len(given) > MOST_BODIES:

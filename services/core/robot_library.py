@@ -40,7 +40,7 @@ def learn(texts: Iterable[str]) -> None:
     """Remember robot files that a store or another process of gaplab had, and so checked.
 
     Raises:
-        InvalidSpec: one is no robot file.
+        InvalidSpec: one is not a robot file.
     """
     for file in map(stored_robot_file, texts):
         _known[file.sha256] = file

@@ -118,7 +118,9 @@ def _columns(line: int, headings: Sequence[str], robot: Robot, errors: FirstErro
         if often.pop((column.kind, column.place, column.row, column.sensor), 1) > 1:
             errors.append(CellError(line=line, column=column.name, message=f"{column.name} has several columns"))
     for name in _absent(found, robot):
-        errors.append(CellError(line=line, column=name, message=f"there is no column {name}", permitted=_told(robot)))
+        errors.append(
+            CellError(line=line, column=name, message=f"there is no column {name}", permitted=_permitted(robot))
+        )
 
 
 def _column(name: str, robot: Robot) -> SampleColumn | None:
@@ -161,7 +163,7 @@ def _numbers(
             continue
         if cell and not (_NUMBER.fullmatch(cell) and isfinite(float(cell))):
             hint = "; decimals have a point" if "," in cell else ""
-            message, wanted = f"{cell[:100]!r} is no number{hint}", "a finite number"
+            message, wanted = f"{cell[:100]!r} is not a number{hint}", "a finite number"
             errors.append(CellError(line=line, column=column.name, value=cell[:100], message=message, permitted=wanted))
         elif cell:
             numbers[column] = float(cell)
@@ -227,7 +229,7 @@ def _unknown(line: int, heading: str, robot: Robot) -> CellError:
     nearest = get_close_matches(heading, _names(robot), n=1, cutoff=0.5)
     hint = f" (did you mean {nearest[0]!r}?)" if nearest else ""
     message = f"unknown column {heading[:100]!r}{hint}"
-    return CellError(line=line, column=heading[:100], value=heading[:100], message=message, permitted=_told(robot))
+    return CellError(line=line, column=heading[:100], value=heading[:100], message=message, permitted=_permitted(robot))
 
 
 def _names(robot: Robot) -> list[str]:
@@ -235,7 +237,7 @@ def _names(robot: Robot) -> list[str]:
     return [*genes, "value", "value_1", "value_2", *robot.sensors.columns]
 
 
-def _told(robot: Robot) -> str:
+def _permitted(robot: Robot) -> str:
     genes = "gene_0" if robot.space.size == 1 else f"gene_0 to gene_{robot.space.size - 1}"
     sensors = robot.sensors
     read = f", SENSOR@TIME for {', '.join(sensors.names)} at {', '.join(sensors.times)} s"

@@ -49,7 +49,7 @@ def read_trace(text: str, pointer: str) -> Trace:
         raise InvalidSpec([Violation(pointer, f"{len(lines):,} lines", message, f"at most {MOST_LINES:,}")])
     rows = rows_of(lines)
     header = next(rows, CsvRow(1, []))
-    names, units = zip(*map(_named, header.cells or [""]), strict=True)
+    names, units = zip(*map(_name_and_unit, header.cells or [""]), strict=True)
     if missing := [name for name in COLUMNS if names.count(name) != 1]:
         message = header.error or f"the trace needs one column each of {', '.join(missing)}"
         found = first_of(lines)[:200]
@@ -66,7 +66,7 @@ def read_trace(text: str, pointer: str) -> Trace:
     return Trace(frozen(table[:, 0]), frozen(table[:, 1:4]), frozen(table[:, 4:]))
 
 
-def _named(heading: str) -> tuple[str, str]:
+def _name_and_unit(heading: str) -> tuple[str, str]:
     """Return the name and the unit of a column: `x [mm]`, `x (mm)` or `x`."""
     name, _, unit = heading.replace("(", "[").partition("[")
     return name.strip(), unit.strip(" ])")
@@ -106,7 +106,7 @@ def _numbers(line: int, cells: Sequence[str], places: Sequence[int], errors: lis
         if isfinite(number):
             yield number
         else:
-            errors.append(f"line {line}, {name}: {cell[:50]!r} is no finite number")
+            errors.append(f"line {line}, {name}: {cell[:50]!r} is not a finite number")
 
 
 def _nonsense(numbers: Sequence[Sequence[float]]) -> Iterator[str]:

@@ -40,7 +40,7 @@ def sound(simulator: Simulator, space: Space, source: str) -> Simulator:
         source: subject of the error's sentence, like `tuner 'search'`.
 
     Raises:
-        PluginBroken: its parameters are not one vector within the bounds, or its error is no number.
+        PluginBroken: its parameters are not one vector within the bounds, or its error is not a number.
     """
     parameters = space.check(simulator.parameters, source)
     try:
@@ -54,7 +54,7 @@ def sound(simulator: Simulator, space: Space, source: str) -> Simulator:
             weight=weight,
         )
     except (TypeError, ValueError) as error:
-        raise PluginBroken(f"{source} returned a simulator whose error, interval or weight is no number") from error
+        raise PluginBroken(f"{source} returned a simulator whose error, interval or weight is not a number") from error
 
 
 class Misfit:

@@ -1,4 +1,4 @@
-"""Whether the energy of a rollout explodes, as no motor and no fall can make it: then its numbers are no physics."""
+"""Whether the energy of a rollout explodes, as no motor and no fall can make it: then its numbers are not physics."""
 
 from functools import lru_cache
 

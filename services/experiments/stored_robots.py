@@ -29,8 +29,8 @@ def add_robot(store: Store, text: str | bytes) -> RobotRead:
     """Store a robot file, unless it is stored already, and return what it is; its name now means this robot.
 
     Raises:
-        InvalidRobotFile: it is no robot file, a plug-in has its name, or its usual controller or task cannot drive and
-            rate it; with every violation.
+        InvalidRobotFile: it is not a robot file, a plug-in has its name, or its usual controller or task cannot drive
+            and rate it; with every violation.
     """
     try:
         file = _checked(text)

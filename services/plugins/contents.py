@@ -116,10 +116,10 @@ def _imports(content: bytes, file: str) -> frozenset[str]:
         nodes = list(ast.walk(ast.parse(content)))
     except (SyntaxError, ValueError):  # so nothing can import it
         return frozenset()
-    return frozenset(name for node in nodes for name in _named(node, file.count("/")))
+    return frozenset(name for node in nodes for name in _modules_in(node, file.count("/")))
 
 
-def _named(node: ast.AST, depth: int) -> Iterator[str]:
+def _modules_in(node: ast.AST, depth: int) -> Iterator[str]:
     """Yield the modules of the folders that one statement names; `depth` is the number of folders above its file."""
     match node:
         case ast.Name(id=name) | ast.Attribute(attr=name) if name in _DYNAMIC:

@@ -1,4 +1,4 @@
-"""Files in the plug-in folders that are no plug-ins: they are named, so that nobody waits for them."""
+"""Files in the plug-in folders that are not plug-ins: they are named, so that nobody waits for them."""
 
 import sys
 from collections.abc import Iterator
@@ -16,20 +16,20 @@ IMPORTED = {".urdf", ".mjcf"}
 OTHERS = {".xacro", ".sdf", ".usd"}
 """Endings of descriptions of robots in other formats."""
 
-NOT_PYTHON = "it is no Python module; put data that a plug-in reads into its package"
-TO_IMPORT = "it is no Python module: gaplab robot import FILE, then gaplab robot add (docs/how-to/robot-file.md)"
+NOT_PYTHON = "it is not a Python module; put data that a plug-in reads into its package"
+TO_IMPORT = "it is not a Python module: gaplab robot import FILE, then gaplab robot add (docs/how-to/robot-file.md)"
 NOT_A_ROBOT = (
-    "it is no Python module, and no format that is imported: make a URDF or an MJCF of it, and import that "
+    "it is not a Python module, and not of a format that is imported: make a URDF or an MJCF of it, and import that "
     "(docs/how-to/robot-file.md), or describe the robot as a class (docs/how-to/robot.md)"
 )
-NO_PACKAGE = "the folder has no __init__.py, so it is no package"
+NO_PACKAGE = "the folder has no __init__.py, so it is not a package"
 FOR_OTHERS = "its name begins with _, so it is only for other files to import; rename it"
 DOTTED = "a module cannot be imported by a name with a dot; rename it, for example with _ in place of the dot"
 NO_CLASS = "it has no class of a plug-in; if others import it, begin its name with _"
 
 
 def ignored_files() -> tuple[IgnoredFile, ...]:
-    """Return the files and folders directly in the plug-in folders that are no plug-ins, each with the reason."""
+    """Return the files and folders directly in the plug-in folders that are not plug-ins, each with the reason."""
     return tuple(file for folder in external_plugins.folders() for file in _ignored(folder))
 
 

@@ -2,21 +2,11 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from gaplab.schemas.comparison_columns import UNPAIRED, shown_tests
-from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
+from gaplab.schemas.comparison_columns import NAMES, UNPAIRED, shown_tests
+from gaplab.schemas.comparisons import Comparison, Groups, Summary
+from gaplab.services.findings.wording import number
 from gaplab.services.reports.blocks import Grid
 from gaplab.services.reports.content import Facts
-from gaplab.services.reports.judged import SIGNIFICANT
-from gaplab.services.reports.numbers import MISSING, fixed, interval, probability, signed
-
-NAMES = {
-    "student": "Student",
-    "welch": "Welch",
-    "mann_whitney": "Mann-Whitney",
-    "paired_t": "Paired t",
-    "wilcoxon": "Wilcoxon",
-    "brown_forsythe": "Spread (Brown-Forsythe)",
-}
 
 
 def summaries(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
@@ -25,7 +15,7 @@ def summaries(facts: Facts, compared: Sequence[Comparison], caption: str) -> Gri
     for pair in compared:
         found |= {pair.first: pair.summary_first, pair.second: pair.summary_second}
     rows = tuple(
-        (facts.names[key], f"{one.n}", _estimate(one.mean), _estimate(one.interquartile_mean), fixed(one.sd))
+        (facts.names[key], f"{one.n}", one.mean.text, one.interquartile_mean.text, number(one.sd))
         for key, one in found.items()
     )
     return Grid(f"{caption}, with 95 % intervals", ("Experiment", "n", "Mean", "Interquartile mean", "SD"), rows)
@@ -40,40 +30,39 @@ def pairs(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
         "Cohen's d",
         "P(first > second)",
         "Trusted test",
-        "p",
-        "p (Holm)",
-        "Differs",
+        "p after Holm (raw)",
+        "The first is",
     )
     rows = tuple(
         (
             *_pair(facts, pair),
             pair.sizes,
-            f"{signed(pair.difference)} ({interval(pair.lower, pair.upper)})",
-            signed(pair.effect_size),
-            _estimate(pair.improvement),
+            pair.difference_text,
+            pair.effect_size_text,
+            pair.improvement.text,
             "paired t" if pair.shared_streams else "Welch",
-            *map(probability, (pair.trusted.p, pair.trusted.p_holm)),
-            MISSING if (p := pair.trusted.p_holm) is None else "yes" if p < SIGNIFICANT else "no",
+            pair.trusted.text,
+            pair.trusted.found.value,
             *([pair.equivalence.verdict.value] if pair.equivalence else []),
         )
         for pair in compared
     )
     margins = {pair.equivalence.margin for pair in compared if pair.equivalence}
-    return Grid(caption, (*head, *(f"Within ±{margin:.3g}" for margin in margins)), rows)
+    return Grid(caption, (*head, *(f"Within ±{number(margin)}" for margin in margins)), rows)
 
 
 def tests(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
-    """Return p of each test of all pairs, with p after Holm's correction in brackets."""
+    """Return p of each test of all pairs, after Holm's correction and raw."""
     shown = shown_tests(compared)
-    rows = tuple((*_pair(facts, pair), *_tests(pair, shown)) for pair in compared)
+    rows = tuple((*_pair(facts, pair), *_p_of(pair, shown)) for pair in compared)
     head = ("Pair", *(NAMES[test] for test in shown))
-    return Grid(f"{caption}: p, and in brackets p after Holm's correction", head, rows)
+    return Grid(f"{caption}: p after Holm's correction, and in brackets the raw p", head, rows)
 
 
 def pooled(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
     """Return the paper's tests of all pairs over a range."""
     rows = tuple(
-        (*_pair(facts, pair), f"{found.n_first}, {found.n_second}", signed(found.difference), *_tests(found, UNPAIRED))
+        (*_pair(facts, pair), found.sizes, found.difference_text, *_p_of(found, UNPAIRED))
         for pair in compared
         if (found := pair.pooled)
     )
@@ -84,13 +73,5 @@ def _pair(facts: Facts, pair: Comparison) -> tuple[str]:
     return (f"{facts.names[pair.first]} − {facts.names[pair.second]}",)
 
 
-def _tests(groups: Groups, names: Iterable[str]) -> Iterator[str]:
-    for name in names:
-        test: Test = getattr(groups, name)
-        yield MISSING if test.p is None else f"{probability(test.p)} ({probability(test.p_holm)})"
-
-
-def _estimate(found: Estimate) -> str:
-    if found.lower is None:
-        return fixed(found.value)
-    return f"{fixed(found.value)} ({interval(found.lower, found.upper)})"
+def _p_of(groups: Groups, names: Iterable[str]) -> Iterator[str]:
+    return (getattr(groups, name).text for name in names)

@@ -14,8 +14,8 @@ from gaplab.schemas.reports import VerdictRead
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.errors import NotFound
 from gaplab.services.experiments import checks
-from gaplab.services.reports.judged import Judged, judged_curves
-from gaplab.services.reports.verdict import judge
+from gaplab.services.findings.judged import Judged, judged_curves
+from gaplab.services.findings.verdict import judge
 from gaplab.services.results import curves as results
 from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.results.misfit import misfit

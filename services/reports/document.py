@@ -2,10 +2,10 @@
 
 from gaplab.schemas.records import StudyRead
 from gaplab.schemas.reports import VerdictRead
-from gaplab.services.core.comparisons import POOLED
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number_of, titled
+from gaplab.services.findings.sentences import POOLED
 from gaplab.services.reports import compared, tables
 from gaplab.services.reports.blocks import Block, Bullets, Drawing, Paragraph, Report, Section
 from gaplab.services.reports.content import Facts, facts_of

@@ -4,9 +4,9 @@ from gaplab.schemas.curves import from_before
 from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.words import number, number_of, spoken, titled, with_unit
+from gaplab.services.findings.wording import MISSING
 from gaplab.services.reports import tables
 from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Grid, Paragraph, Report, Section
-from gaplab.services.reports.numbers import MISSING
 from gaplab.services.reports.outcome import ExperimentOutcome
 from gaplab.services.reports.reproduction import reproduction
 

@@ -1,18 +1,17 @@
 """The tables of a report."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
-from typing import Any
 
 from gaplab.schemas.misfit import TunableDistribution
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.robot_library import label_of
-from gaplab.services.figures.words import number, number_of, spoken
+from gaplab.services.figures.words import number_of, spoken
+from gaplab.services.findings.judged import Judged
+from gaplab.services.findings.wording import MISSING, bracketed, number, share
 from gaplab.services.reports.blocks import Grid
 from gaplab.services.reports.content import Facts
-from gaplab.services.reports.judged import Judged
-from gaplab.services.reports.numbers import MISSING, fixed, interval
 from gaplab.services.specs.differences import SpecColumn, all_settings
 from gaplab.services.store.queries.costs import Work
 
@@ -29,11 +28,11 @@ def at_last(facts: Facts) -> Grid:
 def _at_last(one: Judged, baseline: float | None) -> tuple[str, ...]:
     if one.point is None:
         return (one.name, "0", *[MISSING] * 5)
-    share = f"{one.mean / baseline:.0%}" if baseline else MISSING
+    of_direct = share(one.mean / baseline) if baseline else MISSING
     end = one.end.trend.value.replace("_", " ") if one.end else MISSING
     since = f" since {one.end.since}" if one.end and end == "flat" else ""
-    numbers = (str(one.point.n), fixed(one.mean), fixed(one.point.sd), interval(one.point.lower, one.point.upper))
-    return (one.name, *numbers, share, end + since)
+    ends = bracketed(one.point.lower, one.point.upper).strip() or MISSING
+    return (one.name, str(one.point.n), number(one.mean), number(one.point.sd), ends, of_direct, end + since)
 
 
 def sensitivity(check: SensitivityRead) -> Grid:
@@ -43,9 +42,9 @@ def sensitivity(check: SensitivityRead) -> Grid:
         (
             spoken(found.name),
             f"{found.values[0]:g} to {found.values[-1]:g}",
-            number(found.effect) or MISSING,
-            MISSING if found.relative_effect is None else f"{found.relative_effect:.0%}",
-            number(found.roughness, 2) or MISSING,
+            number(found.effect),
+            share(found.relative_effect),
+            number(found.roughness, 2),
             found.verdict.value,
         )
         for found in check.tunables
@@ -91,7 +90,7 @@ def differing(facts: Facts) -> Iterator[Grid]:
     """Yield the settings that differ between the experiments."""
     if facts.differing and facts.differing.settings:
         head = ("Setting", *(facts.names[column.id] for column in facts.differing.columns))
-        rows = tuple((each.setting, *(_values(cell) for cell in each.values)) for each in facts.differing.settings)
+        rows = tuple((each.setting, *each.texts) for each in facts.differing.settings)
         yield Grid("Settings that differ", head, rows, words=True)
 
 
@@ -99,9 +98,7 @@ def settings(facts: Facts) -> Grid:
     """Return the settings that all experiments share; hidden parameters of reality are called so."""
     differs = {each.pointer for each in facts.differing.settings} if facts.differing else set()
     columns = SpecColumn(facts.id, facts.name, tuple(experiment.spec for experiment in facts.experiments))
-    rows = tuple(
-        (words, pointer, _values(values)) for pointer, words, values in all_settings(columns) if pointer not in differs
-    )
+    rows = tuple((words, pointer, text) for pointer, words, text in all_settings(columns) if pointer not in differs)
     shared = "Settings of all experiments" if len(facts.experiments) > 1 else "Settings"
     return Grid(shared, ("Setting", "Pointer", "Value"), rows, words=True)
 
@@ -146,27 +143,6 @@ def _pairs(what: str, versions: Mapping[str, str]) -> Iterable[tuple[str, str]]:
     return ((f"{what} {name}", version) for name, version in versions.items())
 
 
-def _values(values: Sequence[Any]) -> str:
-    return ", ".join(map(_value, values)) or MISSING
-
-
-def _value(value: Any) -> str:  # noqa: ANN401 - JSON
-    if isinstance(value, list) and value and isinstance(value[0], dict):
-        return f"{len(value):,}, listed in the spec"
-    if isinstance(value, list):
-        return ", ".join(map(_value, value))
-    if value is None or isinstance(value, bool):
-        return {None: "none or hidden", True: "yes", False: "no"}[value]
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def spread(found: Any) -> str:  # noqa: ANN401 - a Distribution or one of a tunable
-    """Return mean ± SD."""
-    if found.mean is None:
-        return MISSING
-    return f"{number(found.mean)} ± {number(found.sd)}" if found.sd is not None else number(found.mean)
-
-
 def _elapsed(start: datetime | None, end: datetime | None) -> str:
     return MISSING if start is None or end is None else _duration((end - start).total_seconds())
 
@@ -192,7 +168,7 @@ def misfit(facts: Facts) -> Iterator[Grid]:
             name,
             str(point.iteration),
             str(point.error.n),
-            *(spread(each) for each in (point.error, point.held_out_error, point.gap)),
+            *(each.text for each in (point.error, point.held_out_error, point.gap)),
         )
         for name, point in last
     )
@@ -209,7 +185,7 @@ def identified(facts: Facts) -> Iterator[Grid]:
             facts.names[id_],
             spoken(each.name),
             each.verdict.value,
-            MISSING if each.remaining is None else f"{each.remaining:.0%}",
+            share(each.remaining),
             "; ".join(each.helps) or MISSING,
         )
         for id_, read in facts.misfits.items()
@@ -221,6 +197,4 @@ def identified(facts: Facts) -> Iterator[Grid]:
 
 
 def _tuned(found: TunableDistribution) -> tuple[str, ...]:
-    at_bound = (found.at_lower or 0.0) + (found.at_upper or 0.0)
-    bounds = f"{found.lower:g} to {found.upper:g}"
-    return spoken(found.name), spread(found), bounds, f"{at_bound:.0%}"
+    return spoken(found.name), found.text, f"{found.lower:g} to {found.upper:g}", found.at_bounds or MISSING

@@ -3,24 +3,13 @@
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from gaplab.schemas.comparison_columns import COLUMNS, UNPAIRED, row, shown_tests
-from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
+from gaplab.schemas.comparison_columns import COLUMNS, NAMES, UNPAIRED, row, shown_tests
+from gaplab.schemas.comparisons import Comparison, Groups, Summary
 from gaplab.services.core.csv_tables import csv_text
-
-NAMES = {
-    "student": "Student",
-    "welch": "Welch",
-    "mann_whitney": "Mann--Whitney",
-    "paired_t": "Paired $t$",
-    "wilcoxon": "Wilcoxon",
-    "brown_forsythe": "Brown--Forsythe",
-}
+from gaplab.services.findings.wording import number, probabilities
 
 WORDS = {"First", "Second", "Experiment", "Verdict"}
 """Columns of words, which are set to the left."""
-
-SMALLEST_P = 0.001
-"""Smallest p-value that is written as a number."""
 
 _SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -30,6 +19,9 @@ _SPECIAL = {
     ">": r"\textgreater{}",
     "|": r"\textbar{}",
 } | {sign: f"\\{sign}" for sign in "&%$#_{}"}
+
+_NUMBER = re.compile(r"(< )?[+\N{MINUS SIGN}]?\d[\d.e\N{MINUS SIGN}]*")
+_SIGNS = {ord("\N{EN DASH}"): "--", ord("\N{MINUS SIGN}"): "-"}
 
 
 def comparisons_csv(comparisons: Sequence[Comparison]) -> str:
@@ -51,16 +43,16 @@ def _pairs(comparisons: Sequence[Comparison], unit: str) -> str:
     head = ["First", "Second", "$n$", "Difference", "$d$", "$P(>)$", *(NAMES[test] for test in tests)]
     head += ["Verdict"] if margins else []
     rows = [
-        [*_names(pair), *_sizes(pair, pair), _estimate(pair.improvement), *_tests(pair, tests), *_verdict(pair)]
+        [*_names(pair), *_sizes(pair), _math(pair.improvement.text), *_p_of(pair, tests), *_verdict(pair)]
         for pair in comparisons
     ]
     caption = [
         f"{_what(comparisons[0], unit)}: differences with 90\\,\\% intervals",
         "Cohen's $d$",
         "$P(>)$, the probability that a repetition of the first is fitter, with its 95\\,\\% interval",
-        "two-sided $p$-values, in brackets with Holm's correction over all pairs",
+        "two-sided $p$-values with Holm's correction over all pairs, in brackets without",
         *(["paired tests by repetition where two experiments share random streams"] if "paired_t" in tests else []),
-        *[f"equivalence within $\\pm{margin:.3g}$ by two one-sided tests" for margin in margins],
+        *[f"equivalence within $\\pm{number(margin)}$ by two one-sided tests" for margin in margins],
     ]
     return _table("; ".join(caption), head, rows)
 
@@ -71,7 +63,7 @@ def _experiments(comparisons: Sequence[Comparison], unit: str) -> str:
         found[pair.first] = pair.first_name, pair.summary_first
         found[pair.second] = pair.second_name, pair.summary_second
     rows = [
-        [_name(name), str(one.n), _estimate(one.mean), _estimate(one.interquartile_mean), _plain(one.sd)]
+        [_name(name), str(one.n), *map(_math, (one.mean.text, one.interquartile_mean.text, number(one.sd)))]
         for name, one in found.values()
     ]
     caption = f"{_what(comparisons[0], unit)}, with 95\\,\\% intervals"
@@ -82,7 +74,7 @@ def _pooled(comparisons: Sequence[Comparison]) -> Iterator[str]:
     pooled = [(pair, pair.pooled) for pair in comparisons if pair.pooled]
     if not pooled:
         return
-    rows = [[*_names(pair), *_sizes(tests, None), *_tests(tests, UNPAIRED)] for pair, tests in pooled]
+    rows = [[*_names(pair), *_sizes(tests), *_p_of(tests, UNPAIRED)] for pair, tests in pooled]
     caption = f"The same pairs, {escaped(pooled[0][1].caution)}; $p$-values as above"
     yield _table(caption, ["First", "Second", "$n$", "Difference", "$d$", *(NAMES[test] for test in UNPAIRED)], rows)
 
@@ -123,43 +115,19 @@ def _names(pair: Comparison) -> list[str]:
     return [_name(pair.first_name), _name(pair.second_name)]
 
 
-def _sizes(groups: Groups, pair: Comparison | None) -> list[str]:
-    interval = _interval(pair.lower, pair.upper) if pair else ""
-    sizes = pair.sizes if pair else f"{groups.n_first}, {groups.n_second}"
-    return [sizes, _signed(groups.difference) + interval, _signed(groups.effect_size)]
+def _sizes(groups: Groups) -> list[str]:
+    return [groups.sizes, *map(_math, (groups.difference_text, groups.effect_size_text))]
 
 
-def _tests(groups: Groups, names: Iterable[str]) -> list[str]:
-    tests: list[Test] = [getattr(groups, name) for name in names]
-    return [_both(test.p, test.p_holm) for test in tests]
-
-
-def _both(p: float | None, p_holm: float | None) -> str:
-    return "--" if p is None else f"{_probability(p)} ({_probability(p_holm)})"
+def _p_of(groups: Groups, names: Iterable[str]) -> list[str]:
+    return [_math(getattr(groups, name).text) for name in names]
 
 
 def _verdict(pair: Comparison) -> list[str]:
     found = pair.equivalence
-    return [f"{found.verdict.value}, {_both(found.p, found.p_holm)}"] if found else []
+    return [f"{found.verdict.value}, {_math(probabilities(found.p, found.p_holm))}"] if found else []
 
 
-def _estimate(found: Estimate) -> str:
-    return _plain(found.value) + _interval(found.lower, found.upper)
-
-
-def _interval(lower: float | None, upper: float | None) -> str:
-    return "" if lower is None or upper is None else f" $[{lower:.2f}, {upper:.2f}]$"
-
-
-def _plain(value: float | None) -> str:
-    return "--" if value is None else f"${value:.2f}$"
-
-
-def _signed(value: float | None) -> str:
-    return "--" if value is None else f"${value:+.2f}$"
-
-
-def _probability(p: float | None) -> str:
-    if p is None:
-        return "--"
-    return f"$<{SMALLEST_P}$" if p < SMALLEST_P else f"${p:.3f}$"
+def _math(text: str) -> str:
+    """Return a number in words of the service, set in math mode; an undefined one is a dash."""
+    return _NUMBER.sub(lambda found: f"${found[0]}$", text).translate(_SIGNS)

@@ -1,21 +1,22 @@
 """Comparisons of stored experiments, computed by the core."""
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Fitness
 from gaplab.schemas.records import common_count
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.comparisons import Compared, compare_all
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.robot_library import label_of
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.fitness import fitness_of
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments
-from gaplab.services.figures.words import evaluations
+from gaplab.services.findings import sentences
+from gaplab.services.findings.comparisons import Compared, compare_all
 from gaplab.services.results.curves import values_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
@@ -73,9 +74,10 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
             message = "a comparison needs two or more experiments, and this names one"
             raise InvalidSpec([Violation("study", list(ids), message)])
         values = values_of(session, rows, fitness)
-        final = _common_count(session, rows) if to_evaluations is None else to_evaluations
+        shared = common_count(view_experiments(session, rows)) or 0
         within = None if margin is None else _in_units(session, rows, margin)
-        concealed = hidden(session, rows)
+        settings = _settings(session, rows)
+    final = shared if to_evaluations is None else to_evaluations
     first = final if from_evaluations is None else from_evaluations
     if not 0 <= first <= final:
         message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
@@ -85,15 +87,10 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
         _check_the_end(rows, compared, to_evaluations)
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
     pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
-    by_id = {row.id: row for row in rows}
-    told = {"fitness": fitness, "where": _where(first, final, rows)}
-    warned = (tuple(warnings(by_id[pair.first], by_id[pair.second], concealed)) for pair in pairs)
+    where = sentences.where(first, final, *(row.known for row in rows if row.tunes))
+    told = {"fitness": fitness, "where": where, "shared_evaluations": shared}
+    warned = (tuple(_warnings(settings[pair.first], settings[pair.second])) for pair in pairs)
     return tuple(pair.model_copy(update={"warnings": each, **told}) for pair, each in zip(pairs, warned, strict=True))
-
-
-def _where(first: int, last: int, rows: Sequence[ExperimentRow]) -> str:
-    counted = evaluations(last, *(row.known for row in rows if row.tunes))
-    return f"after {counted}" if first == last else f"mean of each repetition over {first} to {counted}"
 
 
 def _check_the_end(rows: Sequence[ExperimentRow], compared: Sequence[Compared], last: int) -> None:
@@ -112,10 +109,6 @@ def _check_the_end(rows: Sequence[ExperimentRow], compared: Sequence[Compared], 
 def _compared(row: ExperimentRow, recorded: FloatArray) -> Compared:
     spec = spec_of(row.spec)
     return Compared(row.id, row.name, recorded, not takes_samples(spec), spec.seed, spec.strategy.name)
-
-
-def _common_count(session: Session, rows: Sequence[ExperimentRow]) -> int:
-    return common_count(view_experiments(session, rows)) or 0
 
 
 def _in_units(session: Session, rows: Sequence[ExperimentRow], margin: Margin) -> float:
@@ -141,28 +134,45 @@ def _direct(rows: Sequence[ExperimentRow]) -> list[ExperimentRow]:
     return [row for row in rows if is_direct(spec_of(row.spec))]
 
 
-def warnings(first: ExperimentRow, second: ExperimentRow, hidden: Set[str]) -> Iterator[str]:
-    """Yield why two experiments should not be compared: other robots, other tasks, or other realities.
+def warnings_of(store: Store, ids: Sequence[str]) -> tuple[str, ...]:
+    """Return why any two of the experiments that ids mean should not be compared, each reason once.
 
-    The parameters of reality of the experiments with `hidden` ids may not be shown yet.
+    Raises:
+        NotFound: there is nothing with one of the ids.
     """
-    one, other = spec_of(first.spec), spec_of(second.spec)
+    with store.reading() as session:
+        settings = _settings(session, experiments.meant(session, ids))
+    return tuple(dict.fromkeys(text for pair in combinations(settings.values(), 2) for text in _warnings(*pair)))
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """What must be equal in two experiments for a comparison of their strategies."""
+
+    id: str
+    study: str
+    spec: ResolvedSpec
+    is_hidden: bool
+
+
+def _settings(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, _Setting]:
+    concealed = hidden(session, rows)
+    return {row.id: _Setting(row.id, row.study_id, spec_of(row.spec), row.id in concealed) for row in rows}
+
+
+def _warnings(first: _Setting, second: _Setting) -> Iterator[str]:
+    """Yield why two experiments should not be compared: other robots, other tasks, or other realities."""
+    one, other = first.spec, second.spec
     if one.robot != other.robot:
-        robots = _both(label_of(one.robot), label_of(other.robot))
-        yield f"different robots{robots}: their fitness does not mean the same"
+        yield sentences.unlike("robots", label_of(one.robot), label_of(other.robot))
     elif one.task != other.task:
-        tasks = _both(one.task.name if one.task else "its own", other.task.name if other.task else "its own")
-        yield f"different tasks{tasks}: their fitness does not mean the same"
-    if first.study_id == second.study_id:
+        yield sentences.unlike("tasks", *(spec.task.name if spec.task else "its own" for spec in (one, other)))
+    if first.study == second.study:
         return
-    if _setup(one) == _setup(other) and not hidden.isdisjoint((first.id, second.id)):
-        yield "realities are hidden until the experiments have ended, so they may be different"
+    if _setup(one) == _setup(other) and (first.is_hidden or second.is_hidden):
+        yield sentences.HIDDEN
     elif _reality(one) != _reality(other):
-        yield "different realities: a difference may come from the reality, not from the strategy"
-
-
-def _both(first: str, second: str) -> str:
-    return f" ({first}; {second})" if first != second else ""
+        yield sentences.OTHER_REALITY
 
 
 def _setup(spec: ResolvedSpec) -> tuple[object, ...]:

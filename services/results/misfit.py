@@ -1,26 +1,26 @@
 """The misfit of an experiment, from its stored simulators and measurements."""
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import nan
 from statistics import fmean
 from typing import Any
 
 import numpy as np
 
-from gaplab.schemas.misfit import Distribution, MisfitRead
+from gaplab.schemas.misfit import MisfitPoint, MisfitRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
-from gaplab.services.core.identification import Means, overfitting, verdicts
-from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.core.repeats import pooled_variance
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
-from gaplab.services.core.unreproduced import doubt, unreproduced
+from gaplab.services.findings import simulator_sentences as sentences
+from gaplab.services.findings.identification import Means, verdicts
+from gaplab.services.findings.misfit import Tuning, doubt, misfit_point
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import installed_robot, unit
@@ -29,7 +29,7 @@ from gaplab.services.store.queries.tunings import BestSimulator, MeasuredIterati
 from gaplab.services.store.session import Store
 
 DISTRIBUTIONS = ("error", "expected_error", "held_out_error", "gap")
-NUMBERS = (*Distribution.model_fields, "at_lower", "at_upper", "spread", "interval", "posterior")
+NUMBERS = ("n", "mean", "sd", "least", "greatest", "at_lower", "at_upper", "spread", "interval", "posterior")
 
 
 def misfit(store: Store, experiment_id: str) -> MisfitRead:
@@ -57,33 +57,29 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     )
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
-    told = remarks(points, unit(spec), error_unit, row.known)
-    unseen = overfitting(points[-1], error_unit) if points else ""
     latest = by_iteration[points[-1].iteration] if points else []
-    wrong = _unreproduced(row.id, robot, latest, error_unit)
+    wrong = sentences.unreproduced(row.id, latest, None if robot is None else robot.sensors, error_unit)
     doubted = doubt(latest, simulated=spec.reality.kind == "simulated")
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
         error_unit=error_unit,
         points=points,
-        remarks=tuple(filter(None, [wrong, _known(measured), *told, unseen])),
+        remarks=tuple(filter(None, [wrong, *_remarks(points, measured, (unit(spec), error_unit), row.known)])),
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
         verdicts=verdicts(points, samples, _means(spec, robot), doubted),
+        note=sentences.IDENTIFIED_NOTE,
     )
 
 
-def _known(measured: MeasuredIterations) -> str:
-    counts = ((measured.known, "tuned on"), (measured.known_held_out, "held out"))
-    told = ", ".join(f"{count} {what}" for count, what in counts if count)
-    return f"samples from before the experiment: {told}" if told else ""
-
-
-def _unreproduced(id: str, robot: Robot | None, latest: Sequence[Tuning], error_unit: str) -> str:
-    found = unreproduced(latest, None if robot is None else robot.sensors, error_unit)
-    return f"{found}. `gaplab try-tunables {id}` tries further tunables, and `search`" if found else ""
+def _remarks(
+    points: Sequence[MisfitPoint], measured: MeasuredIterations, units: tuple[str, str], known: int
+) -> Iterator[str]:
+    yield sentences.from_earlier(measured.known, measured.known_held_out)
+    yield from sentences.remarks(points, *units, known)
+    yield sentences.overfitting(points[-1], units[1]) if points else ""
 
 
 def misfit_csv(found: MisfitRead) -> str:

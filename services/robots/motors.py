@@ -132,7 +132,7 @@ def _motors(
         elif joint.name in seen:
             notes.refuse(f"actuator {name} is the second one of joint {joint.name}")
         elif int(model.actuator_gaintype[at]) != 0 or int(model.actuator_biastype[at]) > 1:
-            notes.refuse(f"actuator {name} is no motor, position or velocity actuator")
+            notes.refuse(f"actuator {name} is not a motor, position or velocity actuator")
         else:
             seen.add(joint.name)
             yield joint.name, _motor(model, at, name, joint, options, notes)
@@ -152,7 +152,7 @@ def _motor(
     matches = {"position": gain == stiffness, "velocity": gain == damping, "torque": True}
     dynamics = int(model.actuator_dyntype[at])
     if not matches[kind] or gear == 0 or model.actuator_biasprm[at, 0] != 0 or dynamics not in FILTERS:
-        notes.refuse(f"actuator {name} is no motor, position or velocity actuator")
+        notes.refuse(f"actuator {name} is not a motor, position or velocity actuator")
         return joint
     if dynamics:
         notes.lose("activation dynamics are lost: {}", name)

@@ -185,7 +185,7 @@ def _converted(path: Path, notes: Notes) -> bytes:
         scene: Any = import_module("trimesh").load_scene(path)
         mesh = scene.convert_units("meters").to_mesh()
     except Exception as error:  # noqa: BLE001 - trimesh and collada raise anything for a broken file
-        notes.refuse(f"{path} is no DAE that can be read: {' '.join(str(error).split()) or type(error).__name__}")
+        notes.refuse(f"{path} is not a DAE that can be read: {' '.join(str(error).split()) or type(error).__name__}")
         return b""
     if not 1 <= len(mesh.faces) <= MOST_FACES:
         notes.refuse(f"{path} has {len(mesh.faces)} faces, but 1 to {MOST_FACES} are permitted")

@@ -62,7 +62,7 @@ def tree(text: str) -> Element:
     A prefix need not be declared: ROS does not ask for it.
 
     Raises:
-        SyntaxError: it is no XML; the message has the line.
+        SyntaxError: it is not XML; the message has the line.
     """
     text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)  # some files declare a version of XML that does not exist
     text = _DASHES.sub(lambda found: re.sub("-(?=-)", "- ", found[1]), text)

@@ -90,7 +90,7 @@ def permitted(session: Session, under: Provenance, refused: Mapping[str, str] = 
     begun = row.claimable.is_(True) & row.computed_with.is_not(None)
     used = session.scalars(select(row.computed_with).where(begun).distinct())
     same = row.computed_with.in_([text for text in used if text is not None and _holds(text, under)])
-    told = [text for text in _told(session) if refusals.still_holds(text, refused)]
+    told = [text for text in _refusals_of_plugins(session) if refusals.still_holds(text, refused)]
     usable = row.refused_by.is_(None) | row.refused_by.not_in(told)
     return (row.spec_version <= under.spec_version) & (row.computed_with.is_(None) | same) & usable
 
@@ -131,7 +131,7 @@ def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None
 def refuse(session: Session, under: Provenance, refused: Mapping[str, str] = NONE) -> None:
     """Note once, on each waiting experiment that may not be claimed with this provenance, why that is."""
     row = ExperimentRow
-    outdated = [text for text in _told(session) if not refusals.still_holds(text, refused)]
+    outdated = [text for text in _refusals_of_plugins(session) if not refusals.still_holds(text, refused)]
     untold = row.refused_by.is_(None) | row.refused_by.in_(outdated)
     waiting = row.claimable.is_(True) & untold & row.computed_with.is_not(None) & ~permitted(session, under, refused)
     experiments = session.execute(select(row.id, row.spec, row.computed_with).where(waiting).order_by(row.id)).all()
@@ -159,7 +159,7 @@ def tell_refused(session: Session, experiment_id: str, under: Provenance, refuse
     refuse(session, under, refused)
 
 
-def _told(session: Session) -> list[str]:
+def _refusals_of_plugins(session: Session) -> list[str]:
     """Return the texts by which waiting experiments tell of plug-ins that some supervisor cannot use."""
     row = ExperimentRow
     told = select(row.refused_by).where(row.claimable.is_(True), row.refused_by.is_not(None)).distinct()

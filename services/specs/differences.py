@@ -50,22 +50,31 @@ def differences(columns: Sequence[SpecColumn]) -> SpecDiff:
     values = {path: tuple(_distinct(path, table) for table in tables) for path in pointers}
     hidden = {path for path in values if any(_is_hidden(path, cell) for cell in values[path])}
     differing = {path for path in values if _differs([cell for cell in values[path] if not _is_hidden(path, cell)])}
+    equal, concealed = len(values) - len(differing | hidden), sorted(hidden - differing, key=_order)
     return SpecDiff(
         columns=tuple(DiffColumn(id=column.id, name=column.name, experiments=len(column.specs)) for column in columns),
         settings=tuple(
-            SettingRead(pointer=pointers[path], setting=in_words(path), values=values[path])
+            SettingRead(
+                pointer=pointers[path],
+                setting=in_words(path),
+                values=values[path],
+                texts=tuple(map(text_of, values[path])),
+            )
             for path in sorted(differing, key=_order)
         ),
-        equal=len(values) - len(differing | hidden),
-        hidden=tuple(pointers[path] for path in sorted(hidden - differing, key=_order)),
+        equal=equal,
+        note=_note(equal, len(concealed)),
+        hidden=tuple(pointers[path] for path in concealed),
     )
 
 
-def all_settings(column: SpecColumn) -> tuple[tuple[str, str, Values], ...]:
-    """Return the pointer, the words and the distinct values of each setting of a column, in the order of reading."""
+def all_settings(column: SpecColumn) -> tuple[tuple[str, str, str], ...]:
+    """Return the pointer of each setting of a column, the setting and its values in words, in the order of reading."""
     table = [dict(_settings(spec)) for spec in column.specs]
     pointers = _pointers(table)
-    return tuple((pointers[path], in_words(path), _distinct(path, table)) for path in sorted(pointers, key=_order))
+    return tuple(
+        (pointers[path], in_words(path), text_of(_distinct(path, table))) for path in sorted(pointers, key=_order)
+    )
 
 
 def in_words(path: Path) -> str:
@@ -74,6 +83,26 @@ def in_words(path: Path) -> str:
     if path[0] in {"tunables", "reality"}:
         return " of ".join(reversed(spoken[1:] if path[0] == "tunables" and len(spoken) > 1 else spoken))
     return " of the ".join(reversed(spoken))
+
+
+def _note(equal: int, hidden: int) -> str:
+    later = f" Parameters of reality are compared once they may be shown: {hidden} are hidden." if hidden else ""
+    return f"{equal} other settings are equal.{later}"
+
+
+def text_of(values: Values) -> str:
+    """Return the distinct values of a setting in words; a dash where there is none."""
+    return ", ".join(map(_value, values)) or "\N{EN DASH}"
+
+
+def _value(value: Any) -> str:  # noqa: ANN401 - JSON
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return f"{len(value):,}, listed in the spec"
+    if isinstance(value, list):
+        return " + ".join(map(_value, value)) or "none"
+    if value is None or isinstance(value, bool):
+        return {None: "none or hidden", True: "yes", False: "no"}[value]
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _settings(stored: Mapping[str, Any]) -> Iterator[tuple[Path, tuple[str, Any]]]:

@@ -62,7 +62,7 @@ def parse(url: str) -> URL:
     """Return a database URL with its driver.
 
     Raises:
-        StoreUnavailable: it is no URL, or of another kind of database; the message has no part of a password.
+        StoreUnavailable: it is not a URL, or of another kind of database; the message has no part of a password.
     """
     try:
         parsed = make_url(url)

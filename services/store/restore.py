@@ -49,7 +49,7 @@ def restore(url: str, source: Path) -> Restored:
 
     Raises:
         Unsupported: the database is a Postgres; the message says what restores one.
-        StoreUnavailable: a service runs on the database, or the file is no backup that this version can use.
+        StoreUnavailable: a service runs on the database, or the file is not a backup that this version can use.
         StoreDamaged: the backup is damaged.
         OSError: the file is absent, or the database's folder cannot be written.
     """
@@ -108,9 +108,9 @@ def _check(source: Path, copy: Path) -> str:
             (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone() or (None,)
             connection.execute("SELECT 1 FROM experiment, repetition LIMIT 1")
         except sqlite3.OperationalError as error:
-            raise StoreUnavailable(f"{source} is no database of gaplab: {error}") from error
+            raise StoreUnavailable(f"{source} is not a database of gaplab: {error}") from error
         if revision is None:
-            raise StoreUnavailable(f"{source} is no database of gaplab: its schema has no revision")
+            raise StoreUnavailable(f"{source} is not a database of gaplab: its schema has no revision")
         if is_later([revision]):
             msg = f"{source} is of a later version of gaplab: its revision is {revision}, this version knows {REVISION}"
             raise StoreUnavailable(msg)

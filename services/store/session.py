@@ -78,7 +78,7 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        with self._named(writes=True), self._writer.begin() as session:
+        with self._counting_errors(writes=True), self._writer.begin() as session:
             yield session
 
     @contextmanager
@@ -88,7 +88,7 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        with self._named(), self._reader.begin() as session:
+        with self._counting_errors(), self._reader.begin() as session:
             yield session
 
     def write(self, work: Callable[Concatenate[Session, P], T], /, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -99,7 +99,7 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        with self._named(writes=True):
+        with self._counting_errors(writes=True):
             for attempt in range(1, _TRIES):
                 try:
                     with self._writer.begin() as session:
@@ -145,7 +145,7 @@ class Store:
             self._guard.change(other_schema(revisions))
 
     @contextmanager
-    def _named(self, *, writes: bool = False) -> Iterator[None]:
+    def _counting_errors(self, *, writes: bool = False) -> Iterator[None]:
         """Name and count errors of the database, and note whether a transaction that writes had one."""
         try:
             self._guard.admit()

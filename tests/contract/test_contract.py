@@ -184,8 +184,8 @@ STRATEGY = BROKEN.format(gene="0.5")
         ("_draft.py", STRATEGY, "its name begins with _, so it is only for other files to import"),
         ("hidden.py", STRATEGY.replace("class Broken", "class _Hidden"), "its class _Hidden begins with _"),
         ("my.strategy.py", STRATEGY, "a module cannot be imported by a name with a dot"),
-        ("text.txt", STRATEGY, "it is no Python module; put data"),
-        ("folder/strategy.py", STRATEGY, "the folder has no __init__.py, so it is no package"),
+        ("text.txt", STRATEGY, "it is not a Python module; put data"),
+        ("folder/strategy.py", STRATEGY, "the folder has no __init__.py, so it is not a package"),
     ],
 )
 def test_a_file_whose_plug_in_is_not_imported_says_why(tmp_path: Path, place: str, text: str, says: str) -> None:

@@ -42,7 +42,7 @@ def test_the_settings_that_differ_are_those_that_the_service_found(archive: Any,
     expect(table.locator("tbody tr")).to_have_count(len(found["settings"]))
     assert table.locator("tbody code").all_inner_texts() == [each["pointer"] for each in found["settings"]]
     strategies = table.locator("tbody tr", has_text="/strategy").locator("td").all_inner_texts()
-    assert strategies[-3:] == [each["strategy"].replace("_", " ") for each in study["experiments"][:3]]
+    assert strategies[-3:] == [each["strategy"] for each in study["experiments"][:3]]
     expect(page.get_by_text(f"{found['equal']} other settings are equal.")).to_be_visible()
 
 

@@ -135,7 +135,7 @@ def test_without_a_database_none_is_made(tmp_path: Path) -> None:
 
 
 def test_what_is_no_database_is_not_copied(tmp_path: Path) -> None:
-    (tmp_path / "text.db").write_text("this is no database" * 100)
+    (tmp_path / "text.db").write_text("this is not a database" * 100)
 
     with pytest.raises(StoreUnavailable, match="not a database"):
         backup(f"sqlite:///{tmp_path / 'text.db'}", tmp_path / "copy.db")

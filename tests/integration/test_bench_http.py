@@ -362,7 +362,7 @@ def test_an_attachment_keeps_its_name_in_any_script(client: Client) -> None:
 def test_a_table_of_samples_is_checked_and_used(client: Client, tmp_path: Path) -> None:
     file = tmp_path / "runs.csv"
     file.write_text("gene_0,value\n0.25,0.41\n1.5,x\n")
-    with pytest.raises(InvalidSamples, match=r"runs.csv:3, value: 'x' is no number") as wrong:
+    with pytest.raises(InvalidSamples, match=r"runs.csv:3, value: 'x' is not a number") as wrong:
         client.bench.check_samples(file, "toy_function")
     assert [(each.line, each.column) for each in wrong.value.errors] == [(3, "value")]
     file.write_text("gene_0,value\n0.25,0.41\n")
@@ -512,7 +512,7 @@ def test_a_driver_ends_at_once_where_no_gaplab_is() -> None:
     page = MockTransport(lambda _: Response(200, html="<p>welcome</p>"))
     with (
         Client("http://127.0.0.1:1", transport=page) as client,
-        pytest.raises(ServiceUnreachable, match="is no gaplab"),
+        pytest.raises(ServiceUnreachable, match="is not gaplab"),
     ):
         next(client.requests("x"))
 

@@ -517,7 +517,7 @@ def test_events_of_what_is_no_gaplab_are_not_waited_for() -> None:
 
     with (
         Client("http://gaplab.example", transport=network) as client,
-        pytest.raises(ServiceUnreachable, match="is no gaplab of this version"),
+        pytest.raises(ServiceUnreachable, match="is not gaplab of this version"),
     ):
         next(client.events())
 
@@ -528,7 +528,7 @@ def test_kinds_of_figures_of_what_is_no_gaplab_are_a_sentence() -> None:
 
     with Client("http://gaplab.example", transport=network) as client:
         while answers:
-            with pytest.raises(ServiceUnreachable, match="is no gaplab of this version"):
+            with pytest.raises(ServiceUnreachable, match="is not gaplab of this version"):
                 client.figure_kinds()
 
 

@@ -15,7 +15,7 @@ from gaplab.api.clients.client import Client
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.comparisons import Comparison, Equivalence, Estimate, Summary, Test, Trusted
 from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex, escaped
-from gaplab.services.results.comparisons import compare
+from gaplab.services.results.comparisons import compare, warnings_of
 from gaplab.services.store.session import Store
 from tests import experiments
 from tests.commands import Gaplab
@@ -85,14 +85,15 @@ def test_transferred_controllers_alone_and_the_best_of_them_stand_beside_the_rec
 
 
 def test_latex_prints_names_as_they_are_and_rounds_p_as_papers_do() -> None:
-    test = Test(statistic=3.0, p=0.0001, p_holm=0.0003)
-    estimate, nothing = Estimate(value=0.125, lower=0.05, upper=0.2), Estimate()
+    test = Test(statistic=3.0, p=0.0001, p_holm=0.0003, text="< 0.001 (raw < 0.001)")
+    estimate, nothing = Estimate(value=0.125, lower=0.05, upper=0.2, text="0.125 [0.05, 0.2]"), Estimate(text="–")
     equivalence = Equivalence(margin=0.03, test="welch", p=0.2, p_holm=0.4, verdict="undecided", words="")
     summary = Summary(n=9, sd=0.5, mean=estimate, interquartile_mean=nothing)
     pair = Comparison(
         first="a", second="b", first_name="half & half_100%", second_name=r"a\b{c}^~", from_evaluations=3,
-        to_evaluations=5, n_first=9, n_second=9, difference=-0.25, effect_size=None, student=test,
-        welch=test.model_copy(update={"p_holm": 0.0412}), mann_whitney=Test(),
+        to_evaluations=5, n_first=9, n_second=9, sizes="9, 9", difference=-0.25, effect_size=None,
+        difference_text="−0.25 [−0.5, 0]", effect_size_text="–", student=test,
+        welch=test.model_copy(update={"text": "0.041 (raw < 0.001)"}), mann_whitney=Test(text="–"),
         lower=-0.5, upper=0.0, improvement=estimate, shared_streams=False, streams="", n_paired=0,
         trusted=Trusted(test="welch"), paired_t=Test(),
         wilcoxon=Test(), brown_forsythe=test, summary_first=summary, summary_second=summary,
@@ -102,11 +103,9 @@ def test_latex_prints_names_as_they_are_and_rounds_p_as_papers_do() -> None:
     table = comparisons_latex([pair], "m/s")
 
     assert r"half \& half 100\% & a\textbackslash{}b\{c\}\textasciicircum{}\textasciitilde{} & 9, 9 & " in table
-    assert r" & 9, 9 & $-0.25$ $[-0.50, 0.00]$ & -- & $0.12$" in table
-    assert (
-        r"& $0.12$ $[0.05, 0.20]$ & $<0.001$ ($<0.001$) & $<0.001$ ($0.041$) & -- & $<0.001$ ($<0.001$) & und" in table
-    )
-    assert r"undecided, $0.200$ ($0.400$) \\" in table
+    assert r" & 9, 9 & $-0.25$ [$-0.5$, $0$] & -- & $0.125$ [$0.05$, $0.2$]" in table
+    small = r"$< 0.001$ (raw $< 0.001$)"
+    assert rf"& {small} & $0.041$ (raw $< 0.001$) & -- & {small} & undecided, $0.400$ (raw $0.200$) \\" in table
     assert "mean of each repetition over 3 to 5 real-world evaluations" in table
     assert r"equivalence within $\pm0.03$" in table
     assert table.count(r"\begin{table}") == 2
@@ -185,10 +184,12 @@ def test_what_differs_besides_the_strategy_is_said(
     assert hidden.startswith("realities are hidden until the experiments have ended")
     assert told(plain, random) == told(plain, open_) == []
     assert told(plain, slippery) == [
-        "different robots (toy_function; slippery): their fitness does not mean the same",
+        "different robots (slippery; toy_function): their fitness does not mean the same",
     ]
+    assert warnings_of(sqlite_store, [plain, random, slippery, icy]) == (*told(plain, slippery), *told(plain, icy))
     assert told(plain, icy) == ["different realities: a difference may come from the reality, not from the strategy"]
-    assert "! different robots (toy_function; slippery)" in gaplab("compare", plain, slippery).out
+    assert "! different robots (slippery; toy_function)" in gaplab("compare", plain, slippery).out
+    assert "! different robots (slippery; toy_function)" in gaplab("diff", plain, slippery).out
 
 
 def test_all_ways_to_ask_begin_at_the_same_count(ids: list[str], gaplab: Gaplab, url: str, sqlite_store: Store) -> None:
@@ -216,7 +217,7 @@ def test_a_margin_is_given_once_and_is_above_0(ids: list[str], gaplab: Gaplab, s
     for margin in ("0", "nan", "inf", "much", "-3%"):
         wrong = gaplab("compare", *ids, f"--margin={margin}")
         assert wrong.code == Exit.USAGE
-        assert "is no margin above 0" in wrong.err.replace("\n│ ", "")
+        assert "is not a margin above 0" in wrong.err.replace("\n│ ", "")
 
 
 def test_a_number_that_no_experiment_has_is_refused_with_those_they_have(ids: list[str], gaplab: Gaplab) -> None:
@@ -233,6 +234,6 @@ def test_a_range_that_is_none_is_refused_in_words(ids: list[str], gaplab: Gaplab
     )  # fmt: skip
 
     assert wrong.code == Exit.USAGE
-    assert "'late' is no number of real-world evaluations" in wrong.err.replace("\n│ ", "")
+    assert "'late' is not a number of real-world evaluations" in wrong.err.replace("\n│ ", "")
     assert backwards.code == alone.code == Exit.INVALID
     assert "this names one" in alone.err

@@ -20,10 +20,9 @@ def test_events_are_printed_a_line_each(sqlite_store: Store, gaplab: Gaplab) -> 
     _, everything, _ = gaplab("events")
 
     assert code == 0
-    assert out.splitlines()[-1].endswith(f"{id_} completed")
-    assert re.search(
-        rf"^ +\d+ \d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d {id_}/0 measured iteration 2, fitness 0.3333$", out, re.M
-    )
+    assert out.splitlines()[-1].endswith(f"{id_} Completed")
+    at = rf"\d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d {id_}"
+    assert re.search(rf"^ +\d+ {at} Repetition 0, iteration 2: measured in reality, 0.333$", out, re.M)
     assert len(out.splitlines()) == 18
     assert len(probed.splitlines()) == 2
     assert len(everything.splitlines()) == 19

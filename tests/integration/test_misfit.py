@@ -42,7 +42,7 @@ def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store: Stor
     assert (last.tunables[0].name, last.tunables[0].mean, last.tunables[0].upper) == ("static_friction", 0.1, 1.5)
     assert [each.gap.n for each in found.points] == [2, 0, 0]  # it failed in reality, then in simulation
     assert found.points[0].gap.mean == pytest.approx(1 / 3)
-    assert found.remarks[0].startswith("at 2 real-world evaluations the best simulators err by 1e-150 m/s a sample")
+    assert found.remarks[0].startswith("at 2 real-world evaluations the best simulators err by 1e−150 m/s a sample")
 
 
 def test_repetitions_that_are_under_way_count_as_far_as_they_are(store: Store) -> None:

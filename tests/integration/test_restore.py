@@ -109,7 +109,7 @@ def spoil(file: Path, damage: str) -> None:
     elif damage == "half of it":
         file.write_bytes(content[: len(content) // 2])
     elif damage == "text":
-        file.write_text("this is no database" * 100)
+        file.write_text("this is not a database" * 100)
     else:
         statement = {
             "a row": "DELETE FROM experiment",

@@ -293,9 +293,9 @@ def test_robots_are_listed_with_the_local_time_of_their_storing(gaplab: Gaplab, 
     [
         (
             "<robot name='a1'/>",
-            "{0} is no robot file but a URDF; first: gaplab robot import {0}",
+            "{0} is not a robot file but a URDF; first: gaplab robot import {0}",
         ),
-        (MJCF, "{0} is no robot file but an MJCF; first: gaplab robot import {0}"),
+        (MJCF, "{0} is not a robot file but an MJCF; first: gaplab robot import {0}"),
         ("{", "{0} is not JSON: Expecting property name enclosed in double quotes: line 1 column 2 (char 1)"),
     ],
 )

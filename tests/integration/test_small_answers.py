@@ -158,4 +158,4 @@ def test_a_file_that_is_no_plug_in_is_named(plugin_folder: Path, gaplab: Gaplab)
     assert set(found) == {"data/", "extra.py", "robot.sdf", "robot.urdf"}
     assert "gaplab robot import FILE, then gaplab robot add (docs/how-to/robot-file.md)" in found["robot.urdf"]
     assert "make a URDF or an MJCF of it" in found["robot.sdf"]
-    assert "robot.urdf is not used: it is no Python module" in gaplab("catalogue").out
+    assert "robot.urdf is not used: it is not a Python module" in gaplab("catalogue").out

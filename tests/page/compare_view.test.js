@@ -15,12 +15,11 @@ document.head = { append: (script) => script.dispatchEvent(new Event("load")) };
 
 const { plot } = await import("../../api/dashboard/lib/plot.js");
 const { chooser } = await import("../../api/dashboard/views/compare/chooser.js");
-const { figure } = await import("../../api/dashboard/views/compare/figure.js");
+const { figure } = await import("../../api/dashboard/views/compare/curves.js");
 const { curves, otherFigures } = await import("../../api/dashboard/views/study/figures.js");
 const { misfit } = await import("../../api/dashboard/views/study/misfit.js");
 const { significance } = await import("../../api/dashboard/views/compare/significance.js");
-const { CURVE_KINDS, FIGURE_KINDS } = await import("../../api/dashboard/lib/event_kinds.js");
-const { KINDS } = await import("../../api/dashboard/lib/event_words.js");
+const { CURVE_KINDS } = await import("../../api/dashboard/lib/event_kinds.js");
 
 const settled = () => new Promise((resume) => { setTimeout(resume, 5); });
 
@@ -34,11 +33,6 @@ function serving(answer) {
   };
   return paths;
 }
-
-test("the kinds of events that change figures exist, and a rewritten log is among them", () => {
-  assert.deepEqual([...CURVE_KINDS, ...FIGURE_KINDS].filter((kind) => !KINDS.includes(kind)), []);
-  for (const kind of ["corrected", "voided", "decided"]) assert.ok(CURVE_KINDS.includes(kind));
-});
 
 test("a figure that failed is not replaced by the former one when the window changes its size", async () => {
   const place = new FakeNode("div");
@@ -57,12 +51,12 @@ test("a figure that failed is not replaced by the former one when the window cha
 });
 
 const EXPERIMENT = { name: "one", state: "RUNNING", level: false, fitness: { evaluations: 10 } };
-const TEST = { p: 0.5, p_holm: 0.5 };
-const ESTIMATE = { value: 1, lower: null, upper: null };
+const TEST = { found: "n. s.", text: "0.500 (raw 0.500)" };
+const ESTIMATE = { text: "1" };
 const SUMMARY = { n: 2, mean: ESTIMATE, interquartile_mean: ESTIMATE, sd: 1 };
 const PAIR = {
-  first: "a", second: "b", where: "after 1 real-world evaluation (and 12 from before)", n_first: 2, n_second: 2, difference: 0, effect_size: 0, lower: null, upper: null, improvement: ESTIMATE,
-  shared_streams: false, streams: "apart", summary_first: SUMMARY, summary_second: SUMMARY, trusted: TEST, student: TEST, welch: TEST, mann_whitney: TEST, brown_forsythe: TEST,
+  first: "a", second: "b", from_evaluations: 10, to_evaluations: 10, shared_evaluations: 10, where: "after 1 real-world evaluation (and 12 from before)", sizes: "2, 2",
+  difference_text: "0", effect_size_text: "0", improvement: ESTIMATE, shared_streams: false, streams: "apart", summary_first: SUMMARY, summary_second: SUMMARY, trusted: TEST, student: TEST, welch: TEST, mann_whitney: TEST, brown_forsythe: TEST,
 };
 
 /** Return the section of tests in a view, whose loading the test begins. */
@@ -81,7 +75,7 @@ test("one range is asked for, and the others once their table is unfolded", asyn
   const { part, loading } = comparing();
   const paths = serving(() => [200, [PAIR]]);
   await loading.load();
-  assert.deepEqual(paths, ["comparisons?study=a&study=b&from=10&to=10"]);
+  assert.deepEqual(paths, ["comparisons?study=a&study=b"]);
   const every = part.element.querySelector("details.every");
   const before = loading.now;
   every.setAttribute("open", "");
@@ -107,7 +101,7 @@ test("what an event did not change stays, and the focus stays where something ch
   await loading.load();
   assert.equal(part.element.querySelector("table.matrix"), matrix);
   part.element.querySelector("details.each").querySelector("summary").focus();
-  serving(() => [200, [{ ...PAIR, n_first: 3 }]]);
+  serving(() => [200, [{ ...PAIR, sizes: "3, 2" }]]);
   await loading.load();
   assert.notEqual(part.element.querySelector("table.matrix"), matrix);
   assert.equal(document.activeElement, part.element.querySelector("details.each").querySelector("summary"));
@@ -146,7 +140,7 @@ async function choosing() {
   const cache = { addStudy() {}, studyName: () => null };
   const view = { cache, signal: new AbortController().signal, choice: { experiments: [] }, change: ({ experiments }) => chosen.push(...experiments) };
   serving(() => [200, { items: ["a", "b", "c"].map(study) }]);
-  const { element } = chooser(view);
+  const element = chooser(view);
   const [field, options] = [element.querySelector("input"), element.querySelector("ul")];
   const press = (key) => field.dispatchEvent(Object.assign(new Event("keydown"), { key }));
   field.focus();
@@ -192,8 +186,8 @@ test("the figure of a comparison is loaded at once for a choice, and with its se
 test("the misfit is saved below a prefix too", async () => {
   let load;
   const [place] = misfit({ experiment: { id: "e" }, sections: { add: (_element, _kinds, given) => { load = given; } }, signal: new AbortController().signal });
-  const distribution = { mean: 1, sd: null, n: 1 };
-  serving(() => [200, { points: [{ iteration: 1, error: distribution, held_out_error: distribution, gap: distribution, tunables: [] }], remarks: [], unit: "m/s", error_unit: "m/s", verdicts: [], held_out: 0 }]);
+  const distribution = { text: "1", n: 1 };
+  serving(() => [200, { points: [{ iteration: 1, error: distribution, held_out_error: distribution, gap: distribution, tunables: [] }], remarks: [], unit: "m/s", error_unit: "m/s", verdicts: [], held_out: 0, note: "" }]);
   await load();
   assert.deepEqual(place.querySelectorAll("a").map((link) => link.getAttribute("href")), ["experiments/e/misfit?format=csv"]);
 });

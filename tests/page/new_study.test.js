@@ -125,7 +125,7 @@ test("a name with quotes is safe in a shell and in a program", () => {
   assert.ok(pythonLines("http:/x/", `{"name": "'''"}`).includes(`json.loads("{\\"name\\": \\"'''\\"}")`));
 });
 
-test("a pasted experiment becomes a study of one strategy, and what is no spec is told", () => {
+test("a pasted experiment becomes a study of one strategy, and what is not a spec is told", () => {
   assert.deepEqual(studyOf({ strategy: "random", seed: 1 }), { seed: 1, strategies: ["random"] });
   assert.deepEqual(studyOf({ strategies: ["random"] }), { strategies: ["random"] });
   assert.deepEqual(specIn('{"seed": 18446744073709551615}'), { seed: 18446744073709551615n });

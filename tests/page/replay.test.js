@@ -80,7 +80,7 @@ test("a body between two frames is between their places, and turned the short wa
   near(transformed(body, [1, 0, 0]), [1 + HALF, HALF, 0]);
 });
 
-test("shapes move with their bodies, stand without one, and the ground is no solid shape", () => {
+test("shapes move with their bodies, stand without one, and the ground is not a solid shape", () => {
   const [box, ball] = shapePoses(WORLD, bodyPoses(WORLD, [0, 1, 2], 1));
   near(transformed(box, [0, 0, 0]), [2, 1, 0]);
   near(transformed(ball, [0, 0, 0]), [5, 5, 5]);

@@ -3,12 +3,11 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { isFunction, isPhysical, unitsOf, worldsText } from "../../api/dashboard/lib/robots.js";
 
-const { eventText } = await import("../../api/dashboard/lib/event_words.js");
 const { lastIteration } = await import("../../api/dashboard/views/replay.js");
 const { actions, editing, keeping, refusal } = await import("../../api/dashboard/views/study/actions.js");
 const { pastEvents } = await import("../../api/dashboard/views/study/events.js");
 const { gathered, waitingText } = await import("../../api/dashboard/views/study/head.js");
-const { measurements, stepText } = await import("../../api/dashboard/views/study/measurements.js");
+const { measurements } = await import("../../api/dashboard/views/study/measurements.js");
 
 /** A study with experiments in these states, of each of which `failed` repetitions have failed. */
 const study = (states, failed = 0) => ({ id: "s", name: "s", tags: [], experiments: states.map((state) => ({ study: "s", state, progress: { failed } })) });
@@ -56,33 +55,6 @@ test("an extension whose cost is not confirmed changes nothing, and keeps its di
 
   assert.match(extension.textContent, /Nothing was changed/);
   assert.deepEqual([loads, closed], [0, 0]);
-});
-
-test("events are sentences, and a kind that is newer than the page has its name", () => {
-  const event = { kind: "repetition_failed", repetition: 3, body: { reason: "a foot fell off" } };
-  assert.equal(eventText(event), "Repetition 3 failed: a foot fell off");
-  assert.equal(eventText({ kind: "measured", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: failed in reality");
-  assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: null, left_out: true } }), "Repetition 0, iteration 2: the controller is not measured, as the spec says");
-  assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: failed in reality");
-  assert.equal(eventText({ kind: "requested", repetition: 0, body: { iteration: 2, kind: "probe" } }), "Repetition 0, iteration 2: a measurement of the transferred controller is requested");
-  assert.equal(eventText({ kind: "voided", repetition: 0, body: { iteration: 2, operator: "Ada", reason: "the floor was wet" } }), "Repetition 0, iteration 2: the measurement by Ada is void: the floor was wet");
-  const judged = (kind) => eventText({ kind, repetition: 0, body: { iteration: 2, operator: "Ada", by: "Bea", reason: "it was wet" } });
-  assert.equal(judged("voided"), "Repetition 0, iteration 2: the measurement by Ada is void, says Bea: it was wet");
-  assert.equal(judged("corrected"), "Repetition 0, iteration 2: the measurement by Ada was corrected by Bea: it was wet");
-  assert.equal(judged("decided"), "Repetition 0, iteration 2: Bea decided about the answer by Ada: it was wet");
-  assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: 0.5 } }), "Repetition 0, iteration 2: the controller reaches 0.5 in reality");
-  assert.equal(eventText({ kind: "transferred", repetition: 0, body: { iteration: 2, simulated_fitness: null } }), "Repetition 0, iteration 2: controller evolved, the physics failed in simulation");
-  assert.match(eventText({ kind: "tuned", repetition: 0, body: { iteration: 1, squared_error: 0.00001 } }), /sum of squared errors 1\.0e-5$/);
-  assert.equal(eventText({ kind: "something_new" }), "something new");
-});
-
-test("an edit names its tags, if the event has them", () => {
-  const edited = (body) => eventText({ kind: "edited", body });
-  assert.equal(edited({ fields: ["add_tags"], add_tags: ["gait", "wet"], remove_tags: [] }), "Edited: added the tags gait, wet");
-  assert.equal(edited({ fields: ["name", "remove_tags"], remove_tags: ["wet"] }), "Edited: name; removed the tag wet");
-  assert.equal(edited({ fields: ["tags"], add_tags: ["a_b"], remove_tags: ["wet"], }), "Edited: added the tag a_b; removed the tag wet");
-  assert.equal(edited({ fields: ["tags"], tags: ["gait"] }), "Edited: set the tag gait");
-  assert.deepEqual([edited({ fields: ["name", "remove_tags"] }), edited({ fields: ["tags"], add_tags: [], remove_tags: [] })], ["Edited: name, remove tags", "Edited: tags"]);
 });
 
 test("samples from before are the first measurements, and on the first page alone", async () => {
@@ -145,11 +117,6 @@ test("an experiment says in a sentence what it waits for", () => {
   assert.equal(waitingText([request]), "It waits for a measurement on the bench “leg”: sample of iteration 3, repetition 0 (taken by Bo).");
   assert.match(waitingText([request, request]), /, and for 1 other\.$/);
   assert.match(waitingText([request, request, request], true), /, and for more than 2 others\.$/);
-});
-
-test("steps of a closed branch are told as their events, with the repeats", () => {
-  assert.equal(stepText({ kind: "measured", iteration: 2, genome: [1], fitness: 0.5, repeats: [0.4, 0.6] }, 1), "Repetition 1, iteration 2: measured in reality, 0.5 (0.4, 0.6)");
-  assert.equal(stepText({ kind: "tuned", iteration: 2, simulators: [{ parameters: [1], squared_error: 0.25 }] }, 1), "Repetition 1, iteration 2: simulators tuned, sum of squared errors 0.25");
 });
 
 test("worlds are the engines, or the bench", () => {

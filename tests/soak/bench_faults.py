@@ -62,7 +62,7 @@ def _are_many(operator: Operator, request: Any) -> None:
 
 
 def _talks_nonsense(operator: Operator, request: Any) -> None:
-    """Answer with what is no measurement, and die."""
+    """Answer with what is not a measurement, and die."""
     if taken := operator.take(request["id"]):
         for changes in NONSENSE:
             operator.answer(taken, verb="nonsense", **changes)

@@ -27,6 +27,7 @@ ROOMS = {
     "robots": (("core", "engines"), {"numpy", "scipy", "pydantic", "lxml"}),
     "store": (("core",), {"sqlalchemy", "psycopg"}),
     "figures": ((), {"plotly", "matplotlib"}),
+    "findings": (("core", "figures"), {"numpy", "scipy"}),
     "specs": (("core", "engines"), {"numpy"}),
     "plugins": (("core", "engines", "specs"), set()),
     "contract": (("core", "engines", "specs", "plugins"), {"numpy"}),
@@ -35,8 +36,8 @@ ROOMS = {
         {"sqlalchemy", "lark", "markdown_it"},
     ),
     "running": (("core", "engines", "store", "specs", "plugins", "experiments"), {"sqlalchemy"}),
-    "bench": (("core", "store", "specs", "experiments", "running", "settings"), {"sqlalchemy", "yaml"}),
-    "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
+    "bench": (("core", "store", "findings", "specs", "experiments", "running", "settings"), {"sqlalchemy", "yaml"}),
+    "results": (("core", "store", "figures", "findings", "specs", "experiments"), {"numpy"}),
     "replay": (
         ("core", "store", "specs", "plugins", "experiments", "waiting_line"),
         {"numpy", "scipy", "cachetools", "PIL", "av"},
@@ -47,7 +48,10 @@ ROOMS = {
         {"numpy", "pydantic"},
     ),
     "reports": (
-        ("core", "engines", "store", "figures", "specs", "experiments", "running", "bench", "results", "replay"),
+        (
+            *("core", "engines", "store", "figures", "findings", "specs", "experiments", "running", "bench"),
+            *("results", "replay"),
+        ),
         {"numpy", "jinja2", "fpdf", "matplotlib", "PIL"},
     ),
 }
@@ -70,7 +74,7 @@ ARROWS = {
         for room, (below, others) in ROOMS.items()
     },
     "services": (
-        ("schemas", "services.core", "services.plugins", "services.store"),
+        ("schemas", "services.core", "services.findings", "services.plugins", "services.store"),
         {"pydantic", "pydantic_settings", "sqlalchemy"},
     ),
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
@@ -170,7 +174,7 @@ def test_the_guide_names_the_rooms_in_their_order_and_those_that_write_sql() -> 
 
 
 def test_states_are_written_in_one_place() -> None:
-    """`move` alone, which uses the table of permitted moves; what is inserted or imported is no move."""
+    """`move` alone, which uses the table of permitted moves; what is inserted or imported is not a move."""
     writers = set()
     for path in MODULES:
         if path.parts[0] in {"services", "workers", "api"} and path.parts[1] != "archives":

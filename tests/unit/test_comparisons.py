@@ -10,15 +10,18 @@ from hypothesis import strategies as st
 from numpy.random import default_rng
 from scipy import stats
 
-from gaplab.api.commands import comparison_tables as terminal
 from gaplab.schemas.comparison_columns import COLUMNS, NUMBERS, PAIRED, TESTS, TEXTS, row, shown_tests
-from gaplab.schemas.comparisons import EquivalenceVerdict
-from gaplab.services.core.comparisons import Compared, compare_all, shares_streams
-from gaplab.services.core.equivalence import difference_interval, equivalence_p
-from gaplab.services.core.intervals import improvement, summary
-from gaplab.services.core.statistics import holm
-from gaplab.services.reports import compared as report
-from gaplab.services.results import comparison_tables as latex
+from gaplab.schemas.comparisons import EquivalenceVerdict, Estimate, Found
+from gaplab.services.findings.comparisons import (
+    Compared,
+    compare_all,
+    difference_interval,
+    equivalence_p,
+    found_by,
+    shares_streams,
+)
+from gaplab.services.findings.intervals import improvement, summary
+from gaplab.services.findings.statistics import holm
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from tests.experiments import toy
@@ -237,7 +240,7 @@ def test_resamples_that_all_agree_give_no_interval_rather_than_certainty() -> No
     apart = improvement(np.arange(5.0), np.arange(5.0) + 10, paired=False, intervals=True)
 
     assert (apart.value, apart.lower, apart.upper) == (0.0, None, None)
-    assert summary(np.ones(5), intervals=True).mean.model_dump() == {"value": 1.0, "lower": None, "upper": None}
+    assert summary(np.ones(5), intervals=True).mean == Estimate(value=1.0, text="1")
 
 
 values_ = st.lists(st.floats(allow_infinity=False, width=32) | st.just(0.5), max_size=6).map(
@@ -282,6 +285,39 @@ def test_paired_tests_are_shown_only_of_pairs_that_share_their_streams() -> None
     assert shown_tests(sharing) == TESTS
 
 
-@pytest.mark.parametrize("renderer", [terminal, report, latex])
-def test_each_table_names_every_test(renderer: Any) -> None:
-    assert tuple(renderer.NAMES) == TESTS
+@pytest.mark.parametrize(
+    ("test", "p_holm", "shared", "found"),
+    [
+        ("welch", 0.01, False, Found.HIGHER),
+        ("welch", 0.05, False, Found.OPEN),
+        ("welch", None, False, Found.UNDEFINED),
+        ("paired_t", 0.01, False, Found.UNPAIRED),
+        ("paired_t", 0.01, True, Found.HIGHER),
+        ("brown_forsythe", 0.01, False, Found.NARROWER),
+    ],
+)
+def test_a_pair_differs_below_a_level_and_the_first_is_higher_or_narrower(
+    test: str, p_holm: float | None, shared: bool, found: Found
+) -> None:
+    experiments = [
+        compared("a", drawn(1.3)),
+        compared("b", drawn(1.0, seed=2, sd=0.2), strategy="a" if shared else "b"),
+    ]
+    (pair,) = compare_all(experiments, 0, 0, intervals=False)
+
+    assert found_by(pair, pair, test, p_holm) is found
+    assert pair.differs
+    assert pair.trusted.found is pair.welch.found or shared
+
+
+def test_tests_and_sizes_are_written_once() -> None:
+    (pair,) = compare_all([compared("a", drawn(1.3)), compared("b", drawn(1.0, seed=2))], 0, 0, margin=1.0)
+
+    assert pair.welch.text == pair.trusted.text == "< 0.001 (raw < 0.001)"
+    assert pair.difference_text.startswith("+0.")
+    assert pair.sizes == "40, 40"
+    assert pair.equivalence is not None
+    assert (
+        pair.equivalence.words
+        == "equivalent within ±1 (p < 0.001, raw < 0.001), though different (p < 0.001, raw < 0.001)"
+    )

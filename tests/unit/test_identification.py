@@ -8,10 +8,11 @@ import pytest
 
 from gaplab.schemas.misfit import Identification, MisfitPoint
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.identification import FEWEST, Means, overfitting, verdicts
-from gaplab.services.core.misfit import Tuning, misfit_point
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.abc_smc import _moved
+from gaplab.services.findings.identification import FEWEST, Means, verdicts
+from gaplab.services.findings.misfit import Tuning, misfit_point
+from gaplab.services.findings.simulator_sentences import overfitting
 
 SPACE = Space.box([0.0], [2.0])
 

@@ -107,7 +107,7 @@ def test_what_has_no_poses_is_told(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="has no topics of poses"):
         mcap_to_csv(foxglove(tmp_path / "log.mcap", "/log", schema="foxglove.Log"))
     (tmp_path / "no.mcap").write_bytes(b"time_s,x\n0,0\n" * 20)
-    with pytest.raises(ValueError, match=r"no\.mcap is no MCAP file that can be read"):
+    with pytest.raises(ValueError, match=r"no\.mcap is not an MCAP file that can be read"):
         mcap_to_csv(tmp_path / "no.mcap")
 
 

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.core.space import Space
+from gaplab.services.findings.misfit import Tuning, misfit_point
+from gaplab.services.findings.simulator_sentences import remarks
 
 SPACE = Space.box([0.0, 1.0], [1.0, 3.0])
 NAMES = ("grip", "bounce")

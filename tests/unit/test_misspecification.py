@@ -11,8 +11,6 @@ from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import NO_READINGS, frozen
 from gaplab.services.core.discrepancies.readings import Readings
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
-from gaplab.services.core.identification import Means, verdicts
-from gaplab.services.core.misfit import Tuning, misfit_point
 from gaplab.services.core.misspecification import SURPRISING, fit_of, widened
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensors import Sensors
@@ -21,7 +19,9 @@ from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.gauss_newton import GaussNewton
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Fit, Sample, Simulator
-from gaplab.services.core.unreproduced import doubt, unreproduced
+from gaplab.services.findings.identification import Means, verdicts
+from gaplab.services.findings.misfit import Tuning, doubt, misfit_point
+from gaplab.services.findings.simulator_sentences import unreproduced
 
 SPACE = Space.box([0.0, 10.0], [1.0, 30.0])
 SENSORS = Sensors(("roll", "height"), ("rad", "m"), frozen([0.02, 0.005]), frozen([0.5, 1.0, 1.5]))
@@ -120,7 +120,7 @@ def tuning(surprise: float) -> Tuning:
 def test_it_is_said_how_far_off_and_where_most_and_identified_is_not() -> None:
     tunings = [tuning(0.02), tuning(0.04), tuning(0.4)]
 
-    said = unreproduced(tunings, SENSORS, "× noise")
+    said = unreproduced("abc", tunings, SENSORS, "× noise")
 
     assert said.startswith(
         "no simulator reproduces the samples: the best err by 10 × noise a sample, where noise and rough physics would "
@@ -131,8 +131,8 @@ def test_it_is_said_how_far_off_and_where_most_and_identified_is_not() -> None:
     grip, mass = verdicts(points, [2], Means(), doubt(tunings, simulated=True))
     assert (grip.verdict, mass.verdict) == (Identification.DOUBTFUL, Identification.NOT)
     assert grip.sentence.startswith("grip: doubtful, for no simulator reproduces the samples; ")
-    assert unreproduced([tuning(0.02), tuning(0.4), tuning(0.4)], SENSORS, "× noise") == ""
-    assert unreproduced([replace(tuning(0.02), fit=None)], SENSORS, "× noise") == ""
+    assert unreproduced("abc", [tuning(0.02), tuning(0.4), tuning(0.4)], SENSORS, "× noise") == ""
+    assert unreproduced("abc", [replace(tuning(0.02), fit=None)], SENSORS, "× noise") == ""
 
 
 def test_a_tunable_is_identified_only_where_the_model_was_tested_and_is_credible() -> None:

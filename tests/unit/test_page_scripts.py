@@ -8,7 +8,6 @@ from pathlib import Path
 
 from deno import find_deno_bin
 
-from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import PERMITTED, State
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.robots import robots
@@ -76,7 +75,7 @@ def test_names_of_plugins_would_be_found() -> None:
 
 def test_scripts_import_each_other_in_no_circle() -> None:
     left = {path: imported(path) for path in SCRIPTS}
-    assert left[PAGE / "views" / "compare" / "pairs.js"]
+    assert left[PAGE / "views" / "compare" / "pair_tables.js"]
 
     while left:
         free = [path for path, others in left.items() if not any(other in left for other in others)]
@@ -97,10 +96,3 @@ def test_the_page_permits_the_actions_that_the_service_permits(tmp_path: Path) -
 def test_the_page_knows_every_state(tmp_path: Path) -> None:
     assert exported(tmp_path, "lib/state_badge.js", "STATES") == [state.value for state in State]
     assert exported(tmp_path, "lib/state_badge.js", "ENDED") == [state.value for state in State if state.ended]
-
-
-def test_the_page_has_words_for_every_event(tmp_path: Path) -> None:
-    kinds = exported(tmp_path, "lib/event_words.js", "KINDS")
-
-    assert isinstance(kinds, list)
-    assert set(kinds) == {kind.value for kind in EventKind}

@@ -103,7 +103,7 @@ REFUSED: dict[str, tuple[Callable[[Any], None], str, str]] = {
     "mass": (edit(*BASE, "mass_kg", to=0), "/world/bodies/0/mass_kg", "above 0, not 0"),
     "text": (edit(*BASE, "mass_kg", to="1"), "/world/bodies/0/mass_kg", 'a finite number, not "1"'),
     "nan": (edit(*BASE, "mass_kg", to=float("nan")), "/world/bodies/0/mass_kg", "a finite number"),
-    "field": (edit(*BASE, "colour", to="red"), "/world/bodies/0/colour", "colour is no field here"),
+    "field": (edit(*BASE, "colour", to="red"), "/world/bodies/0/colour", "colour is not a field here"),
     "kind": (edit(*BASE, "shape", 0, "shape", "kind", to="cone"), "/world/bodies/0/shape/0/shape", "box, sphere"),
     "size": (edit(*BASE, "shape", 0, "shape", "size_m", 1, to=-1), "/world/bodies/0/shape/0/shape/size_m", "1e-06 to"),
     "vertices": (
@@ -146,7 +146,7 @@ REFUSED: dict[str, tuple[Callable[[Any], None], str, str]] = {
     "delay": (edit(*WORLD, "noise", to={"latency_s": 11}), "/world/noise/latency_s", "0 to 10"),
     "bodies": (edit(*WORLD, "bodies", to=[]), "/world/bodies", "1 to 200 bodies"),
     "joints": (edit(*WORLD, "joints", to=[{}] * 14_000), "/world/joints", "at most 200, not 14,000"),
-    "edits": (edit(*WORLD, "origin", to=None), "/world/origin", "no field of a robot file"),
+    "edits": (edit(*WORLD, "origin", to=None), "/world/origin", "not a field of a robot file"),
     "version": (edit("format_version", to=2), "/format_version", "at most 1"),
     "name": (edit("name", to="A robot"), "/name", "must match"),
     "unmotored": (edit(*WORLD, "joints", to=[]), "/world/joints", "at least one has a motor"),
@@ -180,5 +180,5 @@ def test_the_first_hundred_violations_are_told() -> None:
 def test_a_text_that_is_too_long_or_no_json_is_refused() -> None:
     with pytest.raises(InvalidSpec, match=r"2,000,001 bytes.*at most 2,000,000"):
         read_robot_file(b" " * (MOST_BYTES + 1))
-    with pytest.raises(InvalidSpec, match="no JSON"):
+    with pytest.raises(InvalidSpec, match="not JSON"):
         read_robot_file("{")

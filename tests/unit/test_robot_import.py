@@ -374,9 +374,9 @@ def test_limits_of_controls_and_torques_that_a_motor_has_not_are_said(tmp_path: 
 def test_actuators_that_a_world_has_not_are_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(InvalidRobot, match="second is the second one of joint ja"):
         small(tmp_path, '<motor name="second" joint="ja"/>')
-    with pytest.raises(InvalidRobot, match="actuator odd is no motor, position or velocity actuator"):
+    with pytest.raises(InvalidRobot, match="actuator odd is not a motor, position or velocity actuator"):
         small(tmp_path, '<damper name="odd" joint="jc" kv="1" ctrlrange="0 1"/>')
-    with pytest.raises(InvalidRobot, match="actuator odd is no motor, position or velocity actuator"):
+    with pytest.raises(InvalidRobot, match="actuator odd is not a motor, position or velocity actuator"):
         small(tmp_path, '<intvelocity name="odd" joint="jc" kp="1" actrange="-1 1"/>')
 
 
@@ -512,7 +512,7 @@ def test_a_file_that_is_neither_is_refused(tmp_path: Path) -> None:
     ("before", "after", "reason"),
     [
         ('effort="7"', 'effort="-7"', "line 5: joint hinge: limit effort '-7' is below 0"),
-        ('velocity="3"', 'velocity="fast"', "line 5: joint hinge: limit velocity 'fast' is no finite number"),
+        ('velocity="3"', 'velocity="fast"', "line 5: joint hinge: limit velocity 'fast' is not a finite number"),
         (
             'lower="-1" upper="2"',
             'lower="2" upper="-1"',
@@ -522,7 +522,7 @@ def test_a_file_that_is_neither_is_refused(tmp_path: Path) -> None:
         (
             'xyz="0 1 0"/>',
             'xyz="0 0 0"/>',
-            "line 4: joint hinge: axis xyz '0 0 0' is no direction; give one like '0 1 0'",
+            "line 4: joint hinge: axis xyz '0 0 0' is not a direction; give one like '0 1 0'",
         ),
         ('mass value="1"', 'mass value="-1"', "line 1: link base: mass value '-1' is below 0"),
         ('ixx=".1"', 'ixx="-.1"', "line 2: link base: inertia ixx '-.1' is below 0"),

@@ -106,7 +106,7 @@ EMPTY = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/C
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        (POINTER, r"foot\.dae is no DAE that can be read: DaeMalformedError: .*line 1"),
+        (POINTER, r"foot\.dae is not a DAE that can be read: DaeMalformedError: .*line 1"),
         (EMPTY, r"foot\.dae has 0 faces, but 1 to 200000 are permitted$"),
     ],
 )

@@ -126,7 +126,7 @@ def test_a_reading_of_a_repeat_without_a_value_is_refused() -> None:
 
 def test_errors_say_what_is_permitted() -> None:
     found = read_samples('gene_0,value\n1.5,"0,4"\n', TOY).errors
-    assert [each.message for each in found] == ["'0,4' is no number; decimals have a point"]
+    assert [each.message for each in found] == ["'0,4' is not a number; decimals have a point"]
     (found_gene,) = read_samples("gene_0,value\n1.5,0.4\n", TOY).errors
     assert (found_gene.value, found_gene.permitted) == ("1.5", "0 to 1")
 
@@ -168,7 +168,7 @@ def test_a_cell_without_an_end_is_an_error_of_its_line() -> None:
 
     assert [place for place, _ in errors("gene_0,value\n1.5,0.4\n" + endless)] == [2, 13_110]
     (error,) = read_samples(endless, TOY).errors
-    assert error.message == "the line is no CSV: field larger than field limit (131072)"
+    assert error.message == "the line is not CSV: field larger than field limit (131072)"
 
 
 def test_the_client_reads_a_file_for_a_spec(tmp_path: Path) -> None:
@@ -180,7 +180,7 @@ def test_the_client_reads_a_file_for_a_spec(tmp_path: Path) -> None:
     resolved = resolve_experiment(toy(reality={"kind": "physical", "samples": samples}))
     assert len(setting(resolved, 0).known_samples) == 1
     file.write_text("gene_0,value\n2,3\n3,x\n")
-    with pytest.raises(gaplab.InvalidSamples, match=r"runs.csv:2, gene_0: .*\nruns.csv:3, value: 'x' is no number"):
+    with pytest.raises(gaplab.InvalidSamples, match=r"runs.csv:2, gene_0: .*\nruns.csv:3, value: 'x' is not a number"):
         gaplab.read_samples(file, "toy_function")
 
 

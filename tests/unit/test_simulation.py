@@ -24,7 +24,7 @@ from tests.fakes import install
 
 
 class Endless(ToyFunction):
-    """A robot whose fitness is no number on the right of its space."""
+    """A robot whose fitness is not a number on the right of its space."""
 
     name = "endless"
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from gaplab.services.core.statistics import brown_forsythe, compare, compare_paired, effect_size, holm
+from gaplab.services.findings.statistics import brown_forsythe, compare, compare_paired, effect_size, holm
 
 FIRST = np.array([1.2, 1.4, 1.1, 1.3, 1.5])
 SECOND = np.array([1.0, 0.9, 1.2, 1.1])

@@ -212,9 +212,9 @@ ENDLESS = '"' + "0123456789\n" * 20_000
     [
         ("", "one column each of time_s, x, y, z, qx, qy, qz, qw"),
         ("time_s,x,y,z\n0,0,0,0\n", "one column each of qx, qy, qz, qw"),
-        (table(x="left"), "line 3, x: 'left' is no finite number"),
-        (table(z="nan"), "line 3, z: 'nan' is no finite number"),
-        (table(qw=""), "line 3, qw: '' is no finite number"),
+        (table(x="left"), "line 3, x: 'left' is not a finite number"),
+        (table(z="nan"), "line 3, z: 'nan' is not a finite number"),
+        (table(qw=""), "line 3, qw: '' is not a finite number"),
         (table(time_s=0.0), "pose 2: time_s must ascend, and 0.0 follows 0.0"),
         (
             table().replace("time_s", "time_s [min]").replace("x,", "x (ft),", 1).replace("qw", "qw [rad]"),
@@ -226,8 +226,8 @@ ENDLESS = '"' + "0123456789\n" * 20_000
         (table(qw=2), "pose 2: qx, qy, qz, qw have size 2; permitted: 1"),
         (",".join(COLUMNS), "the trace has 0 poses; at least 2 are needed"),
         (table().replace("0.2,0.0,0", "5000,0,0").replace("\n0.2", "\n5000"), "at most 3600 s are permitted"),
-        (f"{table()}\n{ENDLESS}", r"line 13112: the line is no CSV: field larger than field limit \(131072\)"),
-        (ENDLESS, r"line 13108: the line is no CSV: field larger than field limit"),
+        (f"{table()}\n{ENDLESS}", r"line 13112: the line is not CSV: field larger than field limit \(131072\)"),
+        (ENDLESS, r"line 13108: the line is not CSV: field larger than field limit"),
     ],
 )
 def test_what_is_no_trace_is_refused_with_its_line(text: str, message: str) -> None:

@@ -138,8 +138,8 @@ def test_parts_that_the_robot_lacks_are_refused_with_the_permitted_names() -> No
     ("label", "why"),
     [
         ("mas(trunk)", r"unknown tunable 'mas' \(did you mean 'mass'\?\)"),
-        ("mass(trunk", "is no label of a tunable; write name"),
-        ("mass(trunk)x", "is no label of a tunable"),
+        ("mass(trunk", "is not a label of a tunable; write name"),
+        ("mass(trunk)x", "is not a label of a tunable"),
         ("mass(trunk, left)", "'left' in 'mass\\(trunk, left\\)' has no name; write option=value"),
         ("mass(trunk, az=value)", "unknown option of 'mass' 'az'.*permitted: of, as"),
         ("mass(trunk, as=scales)", "as must be one of scale, value"),

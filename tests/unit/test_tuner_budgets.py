@@ -126,7 +126,7 @@ def test_simulators_of_a_tuner_are_stored_as_arrays_and_numbers() -> None:
 
 
 class Wordy(SearchTuner):
-    """Returns an error that is no number."""
+    """Returns an error that is not a number."""
 
     name = "wordy"
 
@@ -137,7 +137,7 @@ class Wordy(SearchTuner):
 
 def test_an_error_of_a_tuner_that_is_no_number_is_refused() -> None:
     with pytest.raises(
-        PluginBroken, match=r"'wordy' .* returned a simulator whose error, interval or weight is no number"
+        PluginBroken, match=r"'wordy' .* returned a simulator whose error, interval or weight is not a number"
     ):
         list(repetition(small_setting(tuner=Wordy())))
 

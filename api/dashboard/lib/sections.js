@@ -10,7 +10,7 @@ const RETRY_MS = 1000;
 /**
  * @typedef {object} Section
  * @property {HTMLElement} element
- * @property {Set<string>} kinds of events that change it
+ * @property {Set<string> | null} kinds of events that change it; null: all
  * @property {() => Promise<Page.Loaded>} load
  * @property {boolean} isStale
  * @property {boolean} isInSight
@@ -79,7 +79,7 @@ export function sections(signal) {
     add(element, kinds, loadSection) {
       if (!element.hasChildNodes()) element.append(loading());
       const flags = { isStale: true, isInSight: false, isBusy: false, isFilled: false, runs: 0 };
-      const section = { element, kinds: new Set(kinds), load: loadSection, ...flags };
+      const section = { element, kinds: kinds && new Set(kinds), load: loadSection, ...flags };
       all.set(element, section);
       observer.observe(element);
       return () => {
@@ -89,7 +89,7 @@ export function sections(signal) {
     },
     reload(events) {
       for (const section of all.values()) {
-        if (!events.length || events.some(({ kind }) => section.kinds.has(kind))) reload(section);
+        if (!events.length || !section.kinds || events.some(({ kind }) => section.kinds?.has(kind))) reload(section);
       }
     },
   };

@@ -63,6 +63,7 @@ declare namespace Api {
     iteration: number;
     reason: string;
     steps: Array<Record<string, any>>;
+    sentences: Array<string>;
     closed_at: string;
   }
   interface BudgetRead {
@@ -125,13 +126,17 @@ declare namespace Api {
     to_evaluations: number;
     n_first: number;
     n_second: number;
+    sizes: string;
     difference: number | null;
     effect_size: number | null;
+    difference_text: string;
+    effect_size_text: string;
     student: Test;
     welch: Test;
     mann_whitney: Test;
     fitness: Fitness;
     where: string;
+    shared_evaluations: number;
     caution: string | null;
     lower: number | null;
     upper: number | null;
@@ -212,6 +217,7 @@ declare namespace Api {
     sd: number | null;
     least: number | null;
     greatest: number | null;
+    text: string;
   }
   interface DoubtsRead {
     doubts: Array<string>;
@@ -242,6 +248,7 @@ declare namespace Api {
     value: number | null;
     lower: number | null;
     upper: number | null;
+    text: string;
   }
   interface EstimateRead {
     experiments: Array<ExperimentCost>;
@@ -267,6 +274,7 @@ declare namespace Api {
     repetition: number | null;
     body: Record<string, any>;
     at: string;
+    sentence: string;
   }
   interface ExperimentCost {
     name: string;
@@ -343,6 +351,7 @@ declare namespace Api {
     mean: number;
     sd: number | null;
   }
+  type Found = "higher" | "lower" | "wider" | "narrower" | "n. s." | "too few values that vary" | "not paired";
   interface Framing {
     scale: number;
     height_m: number;
@@ -409,6 +418,7 @@ declare namespace Api {
     held_out: number;
     noise: number | null;
     verdicts: Array<TunableVerdict>;
+    note: string;
   }
   interface NotesRead {
     html: string;
@@ -442,8 +452,11 @@ declare namespace Api {
   interface Pooled {
     n_first: number;
     n_second: number;
+    sizes: string;
     difference: number | null;
     effect_size: number | null;
+    difference_text: string;
+    effect_size_text: string;
     student: Test;
     welch: Test;
     mann_whitney: Test;
@@ -707,6 +720,7 @@ declare namespace Api {
     pointer: string;
     setting: string;
     values: Array<Array<any>>;
+    texts: Array<string>;
   }
   interface Shape {
     kind: "box" | "sphere" | "capsule" | "cylinder" | "hull" | "plane";
@@ -735,6 +749,8 @@ declare namespace Api {
     columns: Array<DiffColumn>;
     settings: Array<SettingRead>;
     equal: number;
+    note: string;
+    warnings: Array<string>;
     hidden: Array<string>;
   }
   interface SpecError {
@@ -808,10 +824,12 @@ declare namespace Api {
     lease_s: number;
   }
   interface Test {
-    statistic: number | null;
-    degrees_of_freedom: number | null;
     p: number | null;
     p_holm: number | null;
+    found: Found;
+    text: string;
+    statistic: number | null;
+    degrees_of_freedom: number | null;
   }
   interface TimeLeft {
     low_s: number;
@@ -849,9 +867,11 @@ declare namespace Api {
     sentence: string;
   }
   interface Trusted {
-    test: "welch" | "paired_t";
     p: number | null;
     p_holm: number | null;
+    found: Found;
+    text: string;
+    test: "welch" | "paired_t";
   }
   interface TunableDistribution {
     n: number;
@@ -859,11 +879,13 @@ declare namespace Api {
     sd: number | null;
     least: number | null;
     greatest: number | null;
+    text: string;
     name: string;
     lower: number;
     upper: number;
     at_lower: number | null;
     at_upper: number | null;
+    at_bounds: string;
     spread: number | null;
     interval: number | null;
     posterior: number | null;

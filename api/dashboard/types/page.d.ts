@@ -44,7 +44,7 @@ declare namespace Page {
   type Loaded = "failed" | "pending" | void;
 
   interface Sections {
-    add(element: HTMLElement, kinds: string[], load: () => Promise<Loaded>): () => void;
+    add(element: HTMLElement, kinds: string[] | null, load: () => Promise<Loaded>): () => void;
     reload(events: ServerEvent[]): void;
   }
 
@@ -103,11 +103,6 @@ declare namespace Page {
     signal: AbortSignal;
     sections: Sections;
     change(changes: Partial<Comparison>): Promise<void>;
-  }
-
-  interface ComparePart {
-    element: HTMLElement;
-    update(): void;
   }
 
   /** The first and the last number of real-world evaluations. */

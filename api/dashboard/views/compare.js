@@ -12,9 +12,7 @@ import { addressOf, comparisonOf } from "./compare/address.js";
 import { experimentCache } from "./compare/cache.js";
 import { chooser } from "./compare/chooser.js";
 import { chosenList } from "./compare/chosen.js";
-import { controls } from "./compare/controls.js";
-import { figure } from "./compare/figure.js";
-import { remarks } from "./compare/remarks.js";
+import { controls, figure } from "./compare/curves.js";
 import { settings } from "./compare/settings.js";
 import { significance } from "./compare/significance.js";
 
@@ -40,19 +38,19 @@ export async function show(root, parameters, signal) {
       if (!signal.aborted) update();
     },
   };
-  const parts = [chooser, chosenList, remarks, controls, figure, significance, settings].map((make) => make(view));
-  const [search, chosen, warnings, ...others] = parts.map(({ element }) => element);
-  const results = h("div", { class: "results" }, ...others);
+  const [chosen, differing] = [chosenList(view), settings(view)];
+  const shown = [controls(view), figure(view), significance(view), differing];
+  const results = h("div", { class: "results" }, ...shown.map(({ element }) => element));
   const nothing = empty("Choose experiments above: one, two, or all of a study. The address then holds the comparison, to be shared.");
   const update = () => {
     const { experiments } = view.choice;
     results.hidden = !cache.known(experiments).length;
     nothing.hidden = experiments.length > 0;
-    for (const part of parts) part.update();
+    for (const part of [chosen, ...shown]) part.update();
   };
   await loadChoice(view, studies);
   root.replaceChildren(h("div", { class: "titled" }, h("h1", {}, "Compare"), copyButton("Copy the link", () => location.href)),
-    search, chosen, warnings, results, nothing);
+    chooser(view), chosen.element, differing.warnings, results, nothing);
   update();
   const refresh = async (/** @type {Page.ServerEvent[]} */ events) => {
     const { experiments } = view.choice;

@@ -37,7 +37,7 @@ class Discrepancy(Plugin):
 
     def residuals(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
         """Return `(n, m, r)`: differences whose squares sum to the terms, if it `squares`; arguments as of `terms`."""
-        raise NotImplementedError(f"{self.name} is no sum of squares")
+        raise NotImplementedError(f"{self.name} is not a sum of squares")
 
     def noise(self, measured: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG002 - for those that know it
         """Return the variance of a residual if the simulator is right; 0 if it is unknown; arguments as of `terms`."""

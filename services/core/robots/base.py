@@ -116,8 +116,8 @@ class Robot(Plugin):
     def told(robot: "Robot") -> dict[str, Any]:
         """Return what the catalogue tells of a robot, but for its engine."""
         return {
-            "controller": _named(robot.usual_controller),
-            "task": _named(robot.usual_task),
+            "controller": _as_json(robot.usual_controller),
+            "task": _as_json(robot.usual_task),
             "unit": robot.unit,
             "genes": robot.space.size,
             "tunables": list(robot.usual_tunables),
@@ -127,5 +127,5 @@ class Robot(Plugin):
         }
 
 
-def _named(ref: PluginRef | None) -> dict[str, Any] | None:
+def _as_json(ref: PluginRef | None) -> dict[str, Any] | None:
     return None if ref is None else ref.model_dump(mode="json")

@@ -69,7 +69,7 @@ def _options(label: str, pointer: str) -> dict[str, Any]:
     if "(" not in label and ")" not in label:
         return {}
     if (parts := LABEL.fullmatch(label.strip())) is None:
-        message = f"{label!r} is no label of a tunable; write name(part) or name(part, option=value)"
+        message = f"{label!r} is not a label of a tunable; write name(part) or name(part, option=value)"
         raise InvalidSpec([Violation(pointer, label, message, "name(part, option=value)")])
     options: dict[str, Any] = {}
     for number, text in enumerate(part.strip() for part in parts["options"].split(",") if part.strip()):

@@ -153,14 +153,14 @@ def number_of(value: Value) -> float:
     """Return the number that a query names.
 
     Raises:
-        InvalidSpec: it is no number.
+        InvalidSpec: it is not a number.
     """
     try:
         number = float(value.text)
     except ValueError:
         number = float("nan")
     if not isfinite(number):
-        raise refusal(value, f"{value.text!r} is no number, like 0.5")
+        raise refusal(value, f"{value.text!r} is not a number, like 0.5")
     return number
 
 
@@ -195,4 +195,4 @@ def _moment_of(value: Value) -> tuple[datetime, timedelta]:
         at = at.replace(tzinfo=UTC) if at.tzinfo is None else at.astimezone(UTC)
         return at, timedelta(days=1) if len(word) == len("2026-11-05") else timedelta(minutes=1)
     except (ValueError, OverflowError) as error:
-        raise refusal(value, f"{word!r} is no time, like 2026-11-05, 2026-11-05T09:00 or -7d") from error
+        raise refusal(value, f"{word!r} is not a time, like 2026-11-05, 2026-11-05T09:00 or -7d") from error

@@ -114,7 +114,7 @@ def parse(query: str) -> Tree | None:
     """Return the tree of a query; None if it is blank.
 
     Raises:
-        InvalidSpec: the query is no sentence of the language; its pointer is `q`.
+        InvalidSpec: the query is not a sentence of the language; its pointer is `q`.
     """
     if not query.strip():
         return None

@@ -30,7 +30,7 @@ class Coordinate:
 
     Attributes:
         label: name with the unit.
-        values: the value of each line: numbers, or words for a setting that is no number; None if it has none.
+        values: the value of each line: numbers, or words for a setting that is not a number; None if it has none.
         lower: value at the bottom; None for the least value.
         upper: value at the top; None for the greatest value.
         wide: logarithmic, if the values need it.

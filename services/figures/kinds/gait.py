@@ -33,7 +33,7 @@ def gait_figure(replay: Replay, *, title: str | None = None) -> FigureDefinition
             _over_time("Speed (m/s)", replay, [(name, world.speeds_m_s) for name, world in worlds], time),
         ),
         caption=_caption(replay, worlds),
-        alt=f"{own}. {_told(replay, worlds)}",
+        alt=f"{own}. {_description(replay, worlds)}",
         share_x=True,
         table=_table(replay, worlds),
         nothing="the physics failed",
@@ -84,7 +84,7 @@ def _caption(replay: Replay, worlds: Sequence[Named]) -> str:
     )
 
 
-def _told(replay: Replay, worlds: Sequence[Named]) -> str:
+def _description(replay: Replay, worlds: Sequence[Named]) -> str:
     parts = []
     for name, world in worlds:
         shares = [

@@ -68,7 +68,7 @@ def simulators_figure(
     else:
         panels = [_alone(shown, dimensions, at, truth or {}) for at in range(len(dimensions))]
     if not shown:
-        panels = [replace(panel, marks=()) for panel in panels]  # reality alone is no result
+        panels = [replace(panel, marks=()) for panel in panels]  # reality alone is not a result
     return FigureDefinition(
         name="simulators",
         title=heading(title),

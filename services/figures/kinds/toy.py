@@ -32,7 +32,7 @@ def toy_figure(toys: Sequence[ToyIteration], *, title: str | None = None) -> Fig
         title=heading(own if title is None else title),
         panels=tuple(_panel(each, titled=several) for each in toys),
         caption=_caption(toys),
-        alt="The fitness of each gene, in reality and in simulation. " + " ".join(map(_told, toys)),
+        alt="The fitness of each gene, in reality and in simulation. " + " ".join(map(_description, toys)),
         columns=2 if several else 1,
         table=_table(toys),
         nothing="not computed yet",
@@ -87,7 +87,7 @@ def _caption(toys: Sequence[ToyIteration]) -> str:
     hidden = "Reality's function is shown once the experiment has ended."
     parts += ["Dashed: reality." if toys[0].truth is not None else hidden]
     parts += ["The arrow goes from the simulated to the real fitness of the transferred controller."]
-    return " ".join([*parts, *(map(_told, toys) if len(toys) == 1 else ())])
+    return " ".join([*parts, *(map(_description, toys) if len(toys) == 1 else ())])
 
 
 def _is_cut(toy: ToyIteration) -> bool:
@@ -97,7 +97,7 @@ def _is_cut(toy: ToyIteration) -> bool:
     return bool(values) and not low <= min(values) <= max(values) <= high
 
 
-def _told(toy: ToyIteration) -> str:
+def _description(toy: ToyIteration) -> str:
     parts = [f"after {number_of('sample', len(toy.samples))}"]
     if toy.error is not None:
         parts.append(f"the best simulator errs by {number(toy.error)} a sample")

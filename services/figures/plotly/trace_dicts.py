@@ -64,7 +64,7 @@ def short(value: Number) -> Number:
 
 def _scatter(name: str, look: Style, x: Sequence[Number], y: Sequence[Number], mode: str) -> Trace:
     places = {"x": [short(each) for each in x], "y": [short(each) for each in y]}
-    return _named(name, look) | {"type": "scatter"} | places | {"mode": mode}
+    return _legend_of(name, look) | {"type": "scatter"} | places | {"mode": mode}
 
 
 def _line(line: Line) -> Trace:
@@ -151,11 +151,11 @@ def _across(name: str, look: Style, x: Sequence[float], y: Sequence[float]) -> T
 def _area(name: str, look: Style, x: Sequence[Number], y: Sequence[Number]) -> Trace:
     fill = {"fill": "toself", "fillcolor": tint(look.color, 0.07 if look.ink else 0.13)}
     line = {"line": {"color": look.color, "width": 0}}
-    return _quiet(_named(name, look)) | _scatter(name, look, x, y, "lines") | line | fill
+    return _quiet(_legend_of(name, look)) | _scatter(name, look, x, y, "lines") | line | fill
 
 
 def _bars(bars: Bars) -> Trace:
-    return _named(bars.name, bars.style) | {
+    return _legend_of(bars.name, bars.style) | {
         "type": "bar",
         "orientation": "h",
         "base": [short(begin) for begin, _, _ in bars.intervals],
@@ -167,7 +167,7 @@ def _bars(bars: Bars) -> Trace:
     }
 
 
-def _named(name: str, look: Style) -> Trace:
+def _legend_of(name: str, look: Style) -> Trace:
     shown = {"name": text(name), "legendgroup": text(name)} if name else {"name": ""}
     return shown | ({"meta": {"ink": True}} if look.ink else {})
 

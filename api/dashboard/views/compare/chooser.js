@@ -15,7 +15,6 @@ const MOST = 100;  // the service's limit for one figure
  * Return the field with the list of matches.
  *
  * @param {Page.CompareView} view
- * @returns {Page.ComparePart}
  */
 export function chooser(view) {
   const options = h("ul", { id: "found", role: "listbox", "aria-label": "Found", class: "found", hidden: true });
@@ -89,8 +88,7 @@ export function chooser(view) {
     clearTimeout(timer);
     searching?.abort();
   });
-  const element = h("div", { class: "chooser" }, h("label", { for: "chooser" }, "Add experiments"), h("div", { class: "combobox" }, field, options), message);
-  return { element, update: () => {} };
+  return h("div", { class: "chooser" }, h("label", { for: "chooser" }, "Add experiments"), h("div", { class: "combobox" }, field, options), message);
 }
 
 /**

@@ -4,13 +4,13 @@
 import { byId, h, refill } from "../../lib/dom.js";
 import { fixed, fromBefore } from "../../lib/format.js";
 import { stateBadge } from "../../lib/state_badge.js";
-import { letter } from "./ranges.js";
+import { letter } from "./pair_tables.js";
 
 /**
  * Return the list of the chosen experiments, in the order of the figure's legend.
  *
  * @param {Page.CompareView} view
- * @returns {Page.ComparePart}
+ * @returns {Page.Updatable}
  */
 export function chosenList(view) {
   const { cache } = view;

@@ -68,7 +68,7 @@ function deleting({ name, query }, reload, signal) {
 function askForName({ q, sort }, reload, signal) {
   openDialog({
     title: "Save as a view",
-    text: `All users of the service see it. It lists ${q}; the choices of state and strategy are no part of it.`,
+    text: `All users of the service see it. It lists ${q}; the choices of state and strategy are not part of it.`,
     fields: [{ name: "name", label: "Name", value: "", required: true, maxlength: 60, autocomplete: "off", hint: "the view that has this name is replaced" }],
     action: "Save",
     act: async ({ name }) => {

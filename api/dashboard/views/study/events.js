@@ -3,7 +3,6 @@
 
 import { get } from "../../lib/api.js";
 import { button, h } from "../../lib/dom.js";
-import { eventText, KINDS } from "../../lib/event_words.js";
 import { ageOf } from "../../lib/live.js";
 
 const BATCH = 60;  // events that are shown at first, and more on demand
@@ -43,7 +42,7 @@ export function eventList(page) {
     while (list.childElementCount > MOST) list.lastElementChild?.remove();
     if (list.childElementCount === MOST) more.hidden = true;
   };
-  page.sections.add(body, KINDS, async () => {
+  page.sections.add(body, null, async () => {
     if (!body.contains(list)) {
       await showEarlier();
       body.replaceChildren(list, more);
@@ -84,5 +83,5 @@ export function pastEvents(load, latest) {
 
 /** @param {Api.EventRead} event */
 function entry(event) {
-  return h("li", { class: event.kind, dataset: { number: event.number } }, h("span", {}, eventText(event)), " ", ageOf(event.at));
+  return h("li", { class: event.kind, dataset: { number: event.number } }, h("span", {}, event.sentence), " ", ageOf(event.at));
 }

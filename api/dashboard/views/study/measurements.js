@@ -7,7 +7,6 @@ import { answerText, isAtRest, isWanted, requestWords, stateText } from "../../l
 import { h, refill, select } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { REWRITES } from "../../lib/event_kinds.js";
-import { eventText } from "../../lib/event_words.js";
 import { count, number } from "../../lib/format.js";
 import { empty } from "../../lib/placeholders.js";
 import { framed, table } from "../../lib/table.js";
@@ -92,17 +91,9 @@ export function branches(page) {
 }
 
 /** @param {Api.BranchRead} branch */
-function branch({ repetition, number, iteration, reason, steps, closed_at: at }) {
-  const title = `Branch ${number} of repetition ${repetition}, from iteration ${iteration}: ${count(steps.length)} ${steps.length === 1 ? "step" : "steps"}`;
+function branch({ repetition, number, iteration, reason, sentences, closed_at: at }) {
+  const title = `Branch ${number} of repetition ${repetition}, from iteration ${iteration}: ${count(sentences.length)} ${sentences.length === 1 ? "step" : "steps"}`;
   return h("details", { class: "branch" },
     h("summary", {}, title, h("span", { class: "note" }, ` ${reason} · closed ${new Date(at).toLocaleString()}`)),
-    framed(title, h("ol", { class: "events" }, ...steps.map((step) => h("li", {}, stepText(step, repetition))))));
-}
-
-/** Return a step in the words of its event. @param {Record<string, any>} step @param {number} repetition */
-export function stepText({ kind, simulators, ...body }, repetition) {
-  const error = simulators?.[0]?.squared_error;
-  const values = body.repeats?.length ? ` (${body.repeats.join(", ")})` : "";
-  const told = { kind, repetition, body: { ...body, ...(error === undefined ? {} : { squared_error: error }) } };
-  return `${eventText(/** @type {Api.EventRead} */ (told))}${values}`;
+    framed(title, h("ol", { class: "events" }, ...sentences.map((sentence) => h("li", {}, sentence)))));
 }

@@ -9,10 +9,11 @@ Source: gaplab.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
 
 from gaplab.schemas.misfit import Identification, MisfitPoint, TunableDistribution, TunableVerdict
-from gaplab.services.core.misfit import OFTEN
+from gaplab.services.findings import simulator_sentences as told
+from gaplab.services.findings.misfit import OFTEN, Doubt
+from gaplab.services.findings.wording import listed, share
 
 FEWEST = 5
 """Fewest repetitions whose spread says something. Of five uniform draws, 1 % look identified; of three, 7 %."""
@@ -25,24 +26,6 @@ PARTLY = 0.6
 
 FALLING = 0.8
 """Share of its value at half the samples, or fewer, below which uncertainty still falls."""
-
-OVERFITTED = 2.0
-"""Error on held-out samples, over that on the samples tuned on, from which simulators are overfitted."""
-
-
-class Doubt(Enum):
-    """Why agreement may not be truth, in words."""
-
-    WRONG = "for no simulator reproduces the samples"
-    SOME = "for the samples raise some doubt about the model"
-    UNTESTED = "for nothing tells noise from a wrong model"
-
-
-HELPS = {
-    Doubt.WRONG: "a tunable for what the model lacks",
-    Doubt.SOME: "more samples, or a tunable for what the model lacks",
-    Doubt.UNTESTED: "repeats of a measurement, or the discrepancy readings",
-}
 
 
 @dataclass(frozen=True)
@@ -76,17 +59,8 @@ def verdicts(
     latest, most = tuned[-1]
     earlier = [tunables for tunables, count in tuned if 2 * count <= most]
     halves = earlier[-1] if earlier else [None] * len(latest)
-    told = tuple(_verdict(now, then, most, means) for now, then in zip(latest, halves, strict=True))
-    return told if doubt is None else tuple(_doubted(each, doubt) for each in told)
-
-
-def overfitting(point: MisfitPoint, unit: str) -> str:
-    """Return the error on held-out samples beside that on the others, in a sentence; "" without held-out samples."""
-    new, old = point.held_out_error.mean, point.error.mean
-    if new is None or old is None:
-        return ""
-    found = f"on held-out samples the best simulators err by {new:.2g} {unit}, on those tuned on by {old:.2g}"
-    return f"{found}: they fit their samples better than new ones" if new > OVERFITTED * old else found
+    found = tuple(_verdict(now, then, most, means) for now, then in zip(latest, halves, strict=True))
+    return found if doubt is None else tuple(_doubted(each, doubt) for each in found)
 
 
 def remaining(found: TunableDistribution) -> float | None:
@@ -108,7 +82,7 @@ def _verdict(
         name=now.name,
         verdict=verdict,
         remaining=left,
-        sentence=_sentence(now, verdict, left),
+        sentence=told.identified(now, verdict, left),
         helps=() if verdict is Identification.IDENTIFIED else tuple(_helps(now, then, samples, means)),
     )
 
@@ -118,8 +92,8 @@ def _doubted(found: TunableVerdict, doubt: Doubt) -> TunableVerdict:
     if found.verdict not in doubted:
         return found
     verdict = Identification.DOUBTFUL if doubt is Doubt.WRONG else Identification.PARTLY
-    sentence = found.sentence.replace(found.verdict.value, f"{verdict.value}, {doubt.value}", 1)
-    return found.model_copy(update={"verdict": verdict, "sentence": sentence, "helps": (HELPS[doubt],)})
+    sentence = found.sentence.replace(found.verdict.value, f"{verdict.value}, for {doubt.value}", 1)
+    return found.model_copy(update={"verdict": verdict, "sentence": sentence, "helps": (told.AGAINST[doubt],)})
 
 
 def _judged(left: float | None) -> Identification:
@@ -128,16 +102,6 @@ def _judged(left: float | None) -> Identification:
     if left <= IDENTIFIED:
         return Identification.IDENTIFIED
     return Identification.PARTLY if left <= PARTLY else Identification.NOT
-
-
-def _sentence(now: TunableDistribution, verdict: Identification, left: float | None) -> str:
-    repetitions = f"{now.n} repetition{'s' if now.n != 1 else ''}"
-    if left is None:
-        few = f"{repetitions} {'is' if now.n == 1 else 'are'} too few to compare"
-        return f"{now.name}: unknown, for {few}, and the tuner gives no intervals"
-    deviation = f" \N{PLUS-MINUS SIGN} {now.sd:.2g}" if now.sd is not None else ""
-    value = f"{now.mean:.2g}{deviation} over {repetitions}"
-    return f"{now.name}: {verdict.value}; {value}, with {100 * left:.0f} % of the uncertainty before any sample"
 
 
 def _helps(now: TunableDistribution, then: TunableDistribution | None, samples: float, means: Means) -> Iterator[str]:
@@ -151,17 +115,17 @@ def _helps(now: TunableDistribution, then: TunableDistribution | None, samples: 
     """
     left, before = remaining(now), None if then is None else remaining(then)
     if left is None:
-        yield f"at least {FEWEST} repetitions"
+        yield told.REPETITIONS.format(FEWEST)
     if means.readings:
-        yield f"the discrepancy {' or '.join(means.readings)}: a fitness is one number a sample, sensors say more"
+        yield told.READINGS.format(listed(means.readings, "or"))
     if left is None and means.intervals:
-        yield f"a tuner with intervals: {' or '.join(means.intervals)}"
+        yield told.INTERVALS.format(listed(means.intervals, "or"))
     if left is not None and before is not None and samples > 2:
         if left < FALLING * before:
-            yield f"more samples: {100 * before:.0f} % were left at half of them"
+            yield told.STILL_FALLING.format(share(before))
         else:
-            yield "another strategy, or a fixed value: more samples of this kind have not helped"
+            yield told.OTHER_SAMPLES
     elif samples <= 2:
-        yield "more samples"
+        yield told.MORE_SAMPLES
     if (now.at_lower or 0.0) + (now.at_upper or 0.0) >= OFTEN:
-        yield "wider bounds, if they make sense: it often ends at one"
+        yield told.WIDER_BOUNDS

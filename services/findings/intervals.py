@@ -17,8 +17,9 @@ import scipy
 from gaplab.schemas.comparisons import Estimate, Summary
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.curves import CONFIDENCE, curve_point
-from gaplab.services.core.statistics import both, constant, finite
 from gaplab.services.core.streams import stream
+from gaplab.services.findings.statistics import both, constant, finite
+from gaplab.services.findings.wording import estimate
 
 RESAMPLES = 2_000
 MOST_PAIRS_OF_VALUES = 1_000_000
@@ -56,10 +57,10 @@ def improvement(first: FloatArray, second: FloatArray, *, paired: bool, interval
     first, second = both(first, second) if paired else (finite(first), finite(second))
     pairs = len(first) * len(second)
     if not pairs:
-        return Estimate()
+        return _estimate(None, (None, None))
     share = float(scipy.stats.mannwhitneyu(first, second, method="asymptotic").statistic) / pairs
     if not intervals or pairs > MOST_PAIRS_OF_VALUES:
-        return Estimate(value=share)
+        return _estimate(share, (None, None))
     return _estimate(share, _ends_of_improvement(first.tobytes(), second.tobytes(), paired))
 
 
@@ -113,4 +114,4 @@ def _counts(drawn: Any, n: int) -> FloatArray:  # noqa: ANN401 - whole numbers
 
 
 def _estimate(value: float | None, ends: Ends) -> Estimate:
-    return Estimate(value=value, lower=ends[0], upper=ends[1])
+    return Estimate(value=value, lower=ends[0], upper=ends[1], text=estimate(value, *ends))

@@ -1,14 +1,63 @@
-"""The sentences of a verdict."""
+"""The sentences about pairs of experiments and about curves."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.comparisons import Comparison, EquivalenceVerdict
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.reports import Trend, TrendRead
-from gaplab.services.core.trends import FEWEST_REPETITIONS, CurveEnd
 from gaplab.services.figures.words import evaluations, number_of
-from gaplab.services.reports.judged import SIGNIFICANT, Judged, differs, is_equivalent
+from gaplab.services.findings.judged import Judged
+from gaplab.services.findings.statistics import SIGNIFICANT
+from gaplab.services.findings.trends import FEWEST_REPETITIONS, CurveEnd
+from gaplab.services.findings.wording import interval, listed, number, p_in_words, share, signed
+
+POOLED = (
+    "pooled as in the paper: the values of one repetition at several numbers of evaluations are not independent, so "
+    "each p is too small; trust the tests with one value for each repetition"
+)
+
+HIDDEN = "realities are hidden until the experiments have ended, so they may be different"
+OTHER_REALITY = "different realities: a difference may come from the reality, not from the strategy"
+
+
+def where(first: int, last: int, *known: int) -> str:
+    """Return at which numbers of real-world evaluations experiments are compared; some have samples from before."""
+    counted = evaluations(last, *known)
+    return f"after {counted}" if first == last else f"mean of each repetition over {first} to {counted}"
+
+
+def streams(one: tuple[int, str], other: tuple[int, str]) -> str:
+    """Return why two experiments, each with its seed and its strategy, share their random streams, or not."""
+    if one == other:
+        return (
+            f"both draw the random numbers of seed {one[0]} and the strategy {one[1]}, so repetitions of one number "
+            "may be correlated"
+        )
+    different = [
+        what for what, first, second in zip(("seeds", "strategies"), one, other, strict=True) if first != second
+    ]
+    return f"independent random numbers: different {listed(different)}"
+
+
+def unlike(what: str, one: str, other: str) -> str:
+    """Return that two experiments have different robots or tasks, with the names of these unless they are equal."""
+    names = f" ({'; '.join(sorted((one, other)))})" if one != other else ""
+    return f"different {what}{names}: their fitness does not mean the same"
+
+
+def equivalence(
+    pair: Comparison, verdict: EquivalenceVerdict, margin: float, p: tuple[float | None, float | None]
+) -> str:
+    """Return a verdict on the equivalence of a pair, with its p before and after Holm's correction."""
+    different = f"different ({p_in_words(pair.trusted.p, pair.trusted.p_holm)})"
+    within = f"within ±{number(margin)}"
+    if verdict is EquivalenceVerdict.EQUIVALENT:
+        return f"equivalent {within} ({p_in_words(*p)}){f', though {different}' if pair.differs else ''}"
+    if verdict is EquivalenceVerdict.DIFFERENT:
+        return different
+    why = "too few values that vary" if p[1] is None else p_in_words(*p)
+    return f"undecided: not shown to differ, nor to be equivalent {within} ({why})"
 
 
 def unreproduced(told: Mapping[str, str], names: Mapping[str, str]) -> Iterator[str]:
@@ -27,9 +76,9 @@ def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], where: str)
     if any(one.point is not None and one.point.n < FEWEST_REPETITIONS for one in learned):
         yield f"Fewer than {FEWEST_REPETITIONS} repetitions are too few to compare strategies."
         return
-    differing = sum(map(differs, compared))
+    differing = sum(pair.differs for pair in compared)
     ahead = f"at {where}; {learned[0].name} has the highest mean."
-    if compared and all(map(is_equivalent, compared)):
+    if compared and all(pair.is_equivalent for pair in compared):
         yield f"No difference between strategies {_within(compared)} {ahead}"
     elif not differing:
         yield f"No strategy is shown to differ from another {ahead}"
@@ -64,33 +113,34 @@ def ranking(
 def _of_best(pairs: Sequence[Comparison], names: Mapping[str, str], best: str) -> Iterator[str]:
     """Yield from which strategies the one with the highest mean differs, and to which it is equivalent."""
     others = [(pair, names[pair.second if pair.first == best else pair.first]) for pair in pairs]
-    if different := [other for pair, other in others if differs(pair)]:
+    if different := [other for pair, other in others if pair.differs]:
         yield f"It differs significantly from {listed(different)}."
-    if alike := [other for pair, other in others if is_equivalent(pair)]:
+    if alike := [other for pair, other in others if pair.is_equivalent]:
         yield f"Its difference from {listed(alike)} is {_within(pairs)}."
-    if open_ := [other for pair, other in others if not differs(pair) and not is_equivalent(pair)]:
+    if open_ := [other for pair, other in others if not pair.differs and not pair.is_equivalent]:
         yield f"It is not shown to differ from {listed(open_)}, which may be as good."
 
 
 def _within(pairs: Sequence[Comparison]) -> str:
     margin = next(pair.equivalence.margin for pair in pairs if pair.equivalence)
-    return f"within ±{margin:.3g}"
+    return f"within ±{number(margin)}"
 
 
 def _disagreements(pairs: Sequence[Comparison], names: Mapping[str, str]) -> Iterator[str]:
     """Yield the pairs on which other tests of the same kind, unpaired or paired, disagree with the trusted one."""
     for pair in pairs:
-        unpaired = {"Student's t": pair.student.p_holm, "Mann-Whitney": pair.mann_whitney.p_holm}
-        tests = {"Wilcoxon": pair.wilcoxon.p_holm} if pair.shared_streams else unpaired
-        other = [name for name, p in tests.items() if p is not None and (p < SIGNIFICANT) != differs(pair)]
+        unpaired = {"Student's t": pair.student, "Mann-Whitney": pair.mann_whitney}
+        tests = {"Wilcoxon": pair.wilcoxon} if pair.shared_streams else unpaired
+        known = {name: test for name, test in tests.items() if test.p_holm is not None}
+        other = [name for name, test in known.items() if test.differs != pair.differs]
         if other and pair.trusted.p_holm is not None:
             found, p = (
                 ("differ", f"p of at least {SIGNIFICANT}")
-                if differs(pair)
+                if pair.differs
                 else ("are not shown to differ", f"p below {SIGNIFICANT}")
             )
             both = f"{names[pair.first]} and {names[pair.second]}"
-            yield f"{both} {found} by the test that the verdict goes by, although {' and '.join(other)} has a {p}."
+            yield f"{both} {found} by the test that the verdict goes by, although {listed(other)} has a {p}."
 
 
 def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: Sequence[Comparison]) -> Iterator[str]:
@@ -98,7 +148,7 @@ def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: 
     for baseline in judged:
         if not baseline.curve.direct or baseline.mean <= 0 or not learned:
             continue
-        shares = [f"{one.name} {one.mean / baseline.mean:.0%}" for one in learned]
+        shares = [f"{one.name} {share(one.mean / baseline.mean)}" for one in learned]
         yield f"Share of the fitness of {baseline.name}, {_with_interval(baseline)}: {', '.join(shares)}."
         key = baseline.curve.experiment
         known = {
@@ -107,9 +157,9 @@ def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: 
             for pair in pairs
             if {pair.first, pair.second} == {key, one.curve.experiment} and pair.trusted.p_holm is not None
         }
-        if same := [name for name, pair in known.items() if is_equivalent(pair)]:
+        if same := [name for name, pair in known.items() if pair.is_equivalent]:
             yield f"No difference from {baseline.name} {_within(pairs)}: {listed(same)}."
-        if open_ := [name for name, pair in known.items() if not differs(pair) and not is_equivalent(pair)]:
+        if open_ := [name for name, pair in known.items() if not pair.differs and not pair.is_equivalent]:
             yield f"Not shown to differ from {baseline.name}: {listed(open_)}."
 
 
@@ -118,9 +168,9 @@ def spread(learned: Sequence[Judged]) -> Iterator[str]:
     spreads = [(one.name, one.point.sd, one.mean) for one in learned if one.point and one.point.sd is not None]
     if spreads:
         name, sd, mean = max(spreads, key=lambda each: each[1])
-        share = f", {sd / abs(mean):.0%} of its mean" if mean else ""
+        of_mean = f", {share(sd / abs(mean))} of its mean" if mean else ""
         unit = learned[0].curve.unit
-        yield f"Repetitions vary most with {name}: their standard deviation is {sd:.3f} {unit}{share}."
+        yield f"Repetitions vary most with {name}: their standard deviation is {number(sd)} {unit}{of_mean}."
 
 
 def end_of_curve(one: Judged, end: CurveEnd) -> str:
@@ -128,7 +178,7 @@ def end_of_curve(one: Judged, end: CurveEnd) -> str:
     if end.trend is Trend.TOO_FEW or end.gain is None:
         counts = f"{number_of('repetition', end.n)} at {evaluations(end.last, one.curve.known)}"
         return f"{one.name}: {counts} are too few to say whether it still rises."
-    gain = f"{end.gain:+.3f} {one.curve.unit}, 95 % interval {end.lower:+.3f} to {end.upper:+.3f}"
+    gain = f"{signed(end.gain)} {one.curve.unit}, {interval(end.lower, end.upper, signed)}"
     words = {
         Trend.RISING: "still rises; continuing is worthwhile",
         Trend.FALLING: "falls: later controllers are worse in reality",
@@ -145,13 +195,15 @@ def continuing(trends: Sequence[TrendRead]) -> Iterator[str]:
         yield "Too few repetitions or evaluations to say whether continuing is worthwhile."
         return
     if of[Trend.RISING]:
-        yield f"Still rising: {_named(of[Trend.RISING])}."
+        yield f"Still rising: {_names_of(of[Trend.RISING])}."
     if flat := of[Trend.FLAT]:
         since = max(trend.since or 0 for trend in flat)
-        subject = "Flat" if len(trends) == 1 else "All flat" if len(flat) == len(trends) else f"Flat: {_named(flat)},"
+        subject = (
+            "Flat" if len(trends) == 1 else "All flat" if len(flat) == len(trends) else f"Flat: {_names_of(flat)},"
+        )
         yield f"{subject} since iteration {since}; not worth continuing."
     if of[Trend.UNCLEAR] and not of[Trend.RISING]:
-        subject = "It" if len(trends) == 1 else _named(of[Trend.UNCLEAR])
+        subject = "It" if len(trends) == 1 else _names_of(of[Trend.UNCLEAR])
         yield f"{subject} may still rise; more repetitions would tell."
 
 
@@ -169,14 +221,9 @@ def incomplete(experiments: Sequence[ExperimentRead], names: Mapping[str, str]) 
 def _with_interval(one: Judged) -> str:
     assert one.point is not None
     lower, upper = one.point.lower, one.point.upper
-    interval = f"95 % interval {lower:.3f} to {upper:.3f}, " if lower is not None else ""
-    return f"{one.mean:.3f} {one.curve.unit} ({interval}n = {one.point.n})"
+    ends = f"{interval(lower, upper)}, " if lower is not None else ""
+    return f"{number(one.mean)} {one.curve.unit} ({ends}n = {one.point.n})"
 
 
-def _named(trends: Sequence[TrendRead]) -> str:
+def _names_of(trends: Sequence[TrendRead]) -> str:
     return listed([trend.name for trend in trends])
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return names, at least one, as a sentence has them: `a, b and c`."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -6,7 +6,7 @@ repetitions do not hide it. Its 95 % interval is Student's.
 A curve is flat since k if, for every count j from k to T - 1, the interval of the mean gain from j to T contains 0, and
 the interval of the gain from k ends below `SMALL` of the mean fitness at T. At least `FEWEST_EVALUATIONS` evaluations
 must lie between k and T. The second condition is needed because an interval of few repetitions contains 0 whatever the
-curve does. The intervals are not corrected for the number of starts: "since k" describes the curve, and is no test.
+curve does. The intervals are not corrected for the number of starts: "since k" describes the curve, and is not a test.
 
 Source: gaplab.
 """

@@ -12,6 +12,10 @@ import scipy
 
 from gaplab.schemas.comparisons import Test
 from gaplab.services.core.arrays import FloatArray, known
+from gaplab.services.findings.wording import probabilities
+
+SIGNIFICANT = 0.05
+"""Level below which a corrected p says that two groups differ, or are equivalent."""
 
 ROUNDING = 1e-12
 """Variation, relative to the largest value, that counts as rounding."""
@@ -102,7 +106,8 @@ def holm(p_values: Sequence[float | None]) -> tuple[float | None, ...]:
 def corrected(family: Sequence[Test]) -> tuple[Test, ...]:
     """Return the tests of a family with Holm's corrected p."""
     p_values = holm([test.p for test in family])
-    return tuple(test.model_copy(update={"p_holm": p}) for test, p in zip(family, p_values, strict=True))
+    told = [{"p_holm": p, "text": probabilities(test.p, p)} for test, p in zip(family, p_values, strict=True)]
+    return tuple(test.model_copy(update=each) for test, each in zip(family, told, strict=True))
 
 
 def finite(values: FloatArray) -> FloatArray:

@@ -9,16 +9,20 @@ Source: gaplab.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
-from gaplab.schemas.curves import from_before
 from gaplab.schemas.misfit import Distribution, MisfitPoint, TunableDistribution
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
+from gaplab.services.core.misspecification import CREDIBLE, SURPRISING
+from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.space import Space
 from gaplab.services.core.types import Fit
+from gaplab.services.findings import wording
 
 AT_BOUND = 0.01
 """Largest distance from a bound, as a share of the distance between the bounds, that counts as at the bound."""
@@ -31,6 +35,24 @@ PRIOR_95 = 0.95
 
 OFTEN = 0.5
 """Share of repetitions at a bound from which a remark says so."""
+
+
+class Doubt(Enum):
+    """Why agreement may not be truth."""
+
+    WRONG = "no simulator reproduces the samples"
+    SOME = "the samples raise some doubt about the model"
+    UNTESTED = "nothing tells noise from a wrong model"
+
+
+class SensorError(NamedTuple):
+    """How far the readings of a sensor are off in the best simulators: root mean square over times and repetitions."""
+
+    name: str
+    unit: str
+    noises: float  # the error in units of the sensor's noise
+    value: float  # the error in its unit
+    worst_s: float  # the time at which it is largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,34 +125,68 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
     )
 
 
-def remarks(points: Sequence[MisfitPoint], unit: str, error_unit: str | None = None, known: int = 0) -> tuple[str, ...]:
-    """Return the latest point that has an error in sentences; none before the first sample.
+def surprise(tunings: Sequence[Tuning]) -> float | None:
+    """Return the surprise that at least half of the repetitions that know theirs reach; None if none knows."""
+    known_ = sorted(each.fit.surprise for each in tunings if each.fit is not None)
+    return known_[(len(known_) - 1) // 2] if known_ else None
 
-    Args:
-        points: misfit of each iteration.
-        unit: unit of fitness.
-        error_unit: unit of errors; by default that of fitness.
-        known: number of samples from before the experiment.
-    """
-    with_error = [each for each in points if each.error.n]
-    if not with_error:
-        return ()
-    last, first = with_error[-1], points[0]
-    stuck = [sentence for each in last.tunables for sentence in _stuck(each)]
-    return (_remaining(last, unit if error_unit is None else error_unit, known), *_gaps(first, last, unit), *stuck)
+
+def doubt(tunings: Sequence[Tuning], *, simulated: bool) -> Doubt | None:
+    """Return the doubt about the model; None without any, and for a simulated reality that has no noise."""
+    found = surprise(tunings)
+    if found is None:
+        return None if simulated else Doubt.UNTESTED
+    if found <= SURPRISING:
+        return Doubt.WRONG
+    return Doubt.SOME if found <= CREDIBLE else None
+
+
+def sensor_errors(fits: Sequence[Fit], sensors: Sensors | None) -> list[SensorError]:
+    """Return how far the readings of each sensor are off, the largest in units of noise first; empty if unknown."""
+    rows = [fit.reading_errors for fit in fits if fit.reading_errors.size]
+    if sensors is None or not rows or rows[0].size != sensors.size:
+        return []
+    squares = np.square(rows).reshape(len(rows), len(sensors.times_s), len(sensors.names))
+    by_time = np.sqrt(_mean(squares, 0))
+    by_sensor = np.sqrt(_mean(by_time**2, 0))
+    places = np.argsort(-np.nan_to_num(by_sensor, nan=-1.0), kind="stable").tolist()
+    worst = np.argmax(np.nan_to_num(by_time, nan=-1.0), axis=0)
+    return [
+        SensorError(
+            sensors.names[place],
+            sensors.units[place],
+            float(by_sensor[place]),
+            float(by_sensor[place] * sensors.noises[place]),
+            float(sensors.times_s[worst[place]]),
+        )
+        for place in places
+    ]
+
+
+def _mean(values: FloatArray, axis: int) -> FloatArray:
+    """Return the mean over an axis without nan; 0 where nothing is known."""
+    there = np.isfinite(values)
+    return np.asarray(np.where(there, values, 0.0).sum(axis) / np.maximum(there.sum(axis), 1))
 
 
 def _tunable_distribution(
     name: str, values: FloatArray, lower: float, upper: float, interval: float | None, posterior: float | None
 ) -> TunableDistribution:
     near, found = AT_BOUND * (upper - lower), _distribution(values)
+    at_lower = float((values <= lower + near).mean()) if len(values) else None
+    at_upper = float((values >= upper - near).mean()) if len(values) else None
     return TunableDistribution(
         **found.model_dump(),
         name=name,
         lower=lower,
         upper=upper,
-        at_lower=float((values <= lower + near).mean()) if len(values) else None,
-        at_upper=float((values >= upper - near).mean()) if len(values) else None,
+        at_lower=at_lower,
+        at_upper=at_upper,
+        at_bounds=", ".join(
+            f"{wording.share(there)} at {wording.number(bound)}"
+            for bound, there in ((lower, at_lower), (upper, at_upper))
+            if there
+        ),
         spread=None if found.sd is None else found.sd / (PRIOR_SD * (upper - lower)),
         interval=interval,
         posterior=posterior,
@@ -154,34 +210,5 @@ def _distribution(values: Sequence[float] | FloatArray) -> Distribution:
         sd=sd,
         least=float(there.min()) if len(there) else None,
         greatest=float(there.max()) if len(there) else None,
-    )
-
-
-def _remaining(point: MisfitPoint, unit: str, known: int) -> str:
-    error = point.error
-    deviation = f"SD {error.sd:.2g}, " if error.sd is not None else ""
-    counted = f"{_many(point.iteration, 'real-world evaluation')}{from_before(known)}"
-    return (
-        f"at {counted} the best simulators err by {error.mean:.2g} {unit} "
-        f"a sample ({deviation}{error.least:.2g} to {error.greatest:.2g} over {_many(error.n, 'repetition')})"
-    )
-
-
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
-
-
-def _gaps(first: MisfitPoint, last: MisfitPoint, unit: str) -> tuple[str, ...]:
-    if last.gap.mean is None:
-        return ()
-    before = f", and by {first.gap.mean:.2g} before tuning" if first.gap.mean is not None and not first.error.n else ""
-    return (f"the controller evolved in them differs by {last.gap.mean:.2g} {unit} in reality{before}",)
-
-
-def _stuck(tuned: TunableDistribution) -> tuple[str, ...]:
-    sides = (("lower", tuned.lower, tuned.at_lower), ("upper", tuned.upper, tuned.at_upper))
-    return tuple(
-        f"{tuned.name} is at its {side} bound, {bound:g}, in {100 * share:.0f} % of {_many(tuned.n, 'repetition')}"
-        for side, bound, share in sides
-        if share is not None and share >= OFTEN
+        text=wording.spread(mean, sd),
     )

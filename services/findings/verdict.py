@@ -7,10 +7,12 @@ from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Curve
 from gaplab.schemas.records import ExperimentRead, common_count
 from gaplab.schemas.reports import Trend, TrendRead, VerdictRead
-from gaplab.services.core.trends import FEWEST_EVALUATIONS, FEWEST_REPETITIONS, SMALL, CurveEnd
 from gaplab.services.figures.words import evaluations
-from gaplab.services.reports import sentences
-from gaplab.services.reports.judged import SIGNIFICANT, Judged, judged_curves
+from gaplab.services.findings import sentences
+from gaplab.services.findings.judged import Judged, judged_curves
+from gaplab.services.findings.statistics import SIGNIFICANT
+from gaplab.services.findings.trends import FEWEST_EVALUATIONS, FEWEST_REPETITIONS, SMALL, CurveEnd
+from gaplab.services.findings.wording import share
 
 NOTHING = "There are no results yet."
 
@@ -26,7 +28,7 @@ RULES = (
     "repetition, with its 95 % interval by Student's t.",
     "A curve is flat since k, and not worth continuing, if the interval of the gain from k, and from every later "
     "number of evaluations, to the last one contains 0, and the interval of the gain from k ends below "
-    f"{SMALL:.0%} of the mean fitness; k is at least {FEWEST_EVALUATIONS} evaluations before the last. A curve is "
+    f"{share(SMALL)} of the mean fitness; k is at least {FEWEST_EVALUATIONS} evaluations before the last. A curve is "
     f"rising or falling if the interval of the gain over the last {FEWEST_EVALUATIONS} evaluations is above or below "
     "0. Otherwise more repetitions would tell.",
     "No simulator is said to reproduce the samples if at least half of the repetitions are surprised: of 40 plausible "

@@ -5,14 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaplab.schemas.comparisons import Comparison, EquivalenceVerdict
 from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.records import ExperimentRead
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.trends import CurveEnd, curve_end
 from gaplab.services.figures.words import distinct_names
-
-SIGNIFICANT = 0.05
+from gaplab.services.findings.trends import CurveEnd, curve_end
 
 
 @dataclass(frozen=True)
@@ -50,16 +47,6 @@ def judged_curves(
     names = distinct_names([(curve.name, curve.strategy, curve.experiment) for curve in curves])
     found = zip(names, curves, experiments, strict=True)
     return tuple(_judged(name, curve, experiment, count) for name, curve, experiment in found)
-
-
-def differs(pair: Comparison) -> bool:
-    """Return whether a pair differs significantly, by its trusted test after Holm's correction."""
-    return (p := pair.trusted.p_holm) is not None and p < SIGNIFICANT
-
-
-def is_equivalent(pair: Comparison) -> bool:
-    """Return whether a pair is shown to be equivalent within the margin that was asked for."""
-    return pair.equivalence is not None and pair.equivalence.verdict is EquivalenceVerdict.EQUIVALENT
 
 
 def _judged(name: str, curve: Curve, experiment: ExperimentRead, count: int | None) -> Judged:

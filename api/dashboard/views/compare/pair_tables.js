@@ -1,0 +1,178 @@
+// @ts-check
+/** What the service says of pairs: as a matrix, as tables, and as files. */
+
+import { getFile } from "../../lib/api.js";
+import { copyButton } from "../../lib/copy.js";
+import { h } from "../../lib/dom.js";
+import { downloadLink } from "../../lib/downloads.js";
+import { threeDigits } from "../../lib/format.js";
+import { loading } from "../../lib/placeholders.js";
+import { framed, table } from "../../lib/table.js";
+import { TESTS } from "./address.js";
+
+const EVERY = "Every pair, at every range, by every test";
+export const UNPAIRED = /** @type {const} */ (["student", "welch", "mann_whitney"]);
+const PAIRED = /** @type {const} */ (["paired_t", "wilcoxon"]);
+const AFTER_HOLM = "p after Holm (raw)";
+
+/** @type {Partial<Record<Api.Found, Api.Found>>} */
+const OPPOSITE = { higher: "lower", lower: "higher", wider: "narrower", narrower: "wider" };
+const BETTER = { kind: "better", sign: "▲" };
+const WORSE = { kind: "worse", sign: "▼" };
+/** @type {Partial<Record<Api.Found, typeof BETTER>>} */
+const LOOKS = { higher: BETTER, wider: BETTER, lower: WORSE, narrower: WORSE, "n. s.": { kind: "alike", sign: "≈" } };
+const UNKNOWN = { kind: "unknown", sign: "–" };
+
+/**
+ * Return the letters of an experiment by its place in the comparison: A to Z, then AA and so on.
+ *
+ * @param {number} index
+ * @returns {string}
+ */
+export function letter(index) {
+  const rest = Math.floor(index / 26);
+  return (rest ? letter(rest - 1) : "") + String.fromCharCode(65 + (index % 26));
+}
+
+/**
+ * Return a range in words.
+ *
+ * @param {Page.Range} range
+ */
+export const rangeText = ([from, to]) => (from === to ? `${from}` : `${from}–${to}`);
+
+/**
+ * Return the matrix over one range: the row against the column. The numbers of a pair stand once, above the diagonal.
+ *
+ * @param {Page.CompareView} view
+ * @param {string[]} ids
+ * @param {Api.Comparison[]} pairs
+ */
+export function matrix({ cache, choice }, ids, pairs) {
+  const letterOf = (/** @type {string} */ id) => letter(choice.experiments.indexOf(id));
+  const names = cache.namesOf(choice.experiments);
+  const pairOf = (/** @type {string} */ first, /** @type {string} */ second) => pairs.find((pair) => pair.first === first && pair.second === second);
+  const title = `The row against the column, ${pairs[0].where}`;
+  const head = h("tr", {}, h("td", {}), ...ids.map((id) => h("th", { scope: "col", title: names.get(id) }, letterOf(id))));
+  const rows = ids.map((row) => h("tr", {}, h("th", { scope: "row" }, h("b", {}, letterOf(row)), ` ${names.get(row)}`),
+    ...ids.map((column) => cell(pairOf(row, column), pairOf(column, row), choice.test))));
+  const made = h("table", { class: "matrix", "aria-labelledby": "matrix-title" }, h("thead", {}, head), h("tbody", {}, ...rows));
+  return [h("p", { class: "note", id: "matrix-title" }, title), framed(title, made)];
+}
+
+/**
+ * @param {Api.Comparison | undefined} pair the row and the column, in the service's order
+ * @param {Api.Comparison | undefined} mirrored the column and the row
+ * @param {Page.Comparison["test"]} test
+ */
+function cell(pair, mirrored, test) {
+  const judged = (pair ?? mirrored)?.[test];
+  if (!judged) return h("td", { class: "self" }, h("span", { class: "away" }, "itself"));
+  const found = pair ? judged.found : OPPOSITE[judged.found] ?? judged.found;
+  const { kind, sign } = LOOKS[found] ?? UNKNOWN;
+  if (kind === "unknown") return h("td", { class: kind }, found);
+  return h("td", { class: kind }, h("span", { class: "verdict" }, h("span", { "aria-hidden": "true" }, `${sign} `), found), pair ? numbers(pair, test) : null);
+}
+
+/** @type {(pair: Api.Comparison, test: Page.Comparison["test"]) => Page.Child} */
+function numbers(pair, test) {
+  const { effect_size_text: effect, equivalence, shared_streams: isShared, streams } = pair;
+  const within = equivalence?.verdict === "equivalent" && h("small", { class: "within", title: equivalence.words }, `≡ within ±${threeDigits(equivalence.margin)}`);
+  return [h("small", {}, `p ${pair[test].text}`), h("small", {}, `d = ${effect}`), test === "trusted" && isShared && h("small", { title: streams }, "paired"), within];
+}
+
+/**
+ * Return a table of the experiments: mean, interquartile mean and standard deviation.
+ *
+ * @param {Page.CompareView} view
+ * @param {Api.Comparison[]} pairs
+ * @param {boolean} open whether the table is unfolded
+ */
+export function summaries({ choice: { experiments }, cache }, pairs, open) {
+  const names = cache.namesOf(experiments);
+  const found = new Map(pairs.flatMap((pair) => [[pair.first, pair.summary_first], [pair.second, pair.summary_second]]));
+  const rows = experiments.flatMap((id, index) => {
+    const one = found.get(id);
+    return one ? [[`${letter(index)} ${names.get(id)}`, String(one.n), one.mean.text, one.interquartile_mean.text, threeDigits(one.sd)]] : [];
+  });
+  const head = ["Experiment", "n", "Mean [95 %]", "Interquartile mean [95 %]", "SD"];
+  return h("details", { open, class: "pairs each" }, h("summary", {}, "Each experiment, with intervals"), table("Each experiment", head, rows));
+}
+
+/**
+ * Return a table of the pairs: each range by the chosen test, and the numbers of the last range by all tests.
+ *
+ * @param {Page.CompareView} view
+ * @param {Page.RangeResult[]} results
+ * @param {boolean} open whether the table is unfolded
+ */
+export function pairsTable({ choice: { test, experiments }, cache }, results, open) {
+  const label = labelOf(experiments, cache);
+  const chosen = results[results.length - 1];
+  const sorted = [...results].sort((one, other) => one.range[0] - other.range[0] || one.range[1] - other.range[1]);
+  const isShared = chosen.pairs.some((pair) => pair.shared_streams);
+  const hasMargin = chosen.pairs.some((pair) => pair.equivalence);
+  const tests = /** @type {const} */ ([...UNPAIRED, ...(isShared ? PAIRED : []), "brown_forsythe"]);
+  const columns = ["Pair", ...sorted.map(({ range }) => `${range[0] === range[1] ? "At" : "Mean of"} ${rangeText(range)}`),
+    `Difference at ${rangeText(chosen.range)} [90 %]`, "d", "P(first > second) [95 %]", "n", ...(hasMargin ? ["Equivalence"] : []),
+    ...tests.map((name) => `${TESTS[name].short}, ${AFTER_HOLM}`), "Random streams"];
+  const rows = chosen.pairs.map((pair, index) => [
+    label(pair), ...sorted.map(({ pairs }) => result(pairs[index][test])), pair.difference_text, pair.effect_size_text, pair.improvement.text,
+    pair.sizes, ...(hasMargin ? [pair.equivalence?.words ?? "–"] : []), ...tests.map((name) => pair[name].text), pair.streams,
+  ]);
+  return h("details", { open, class: "pairs every" }, h("summary", {}, EVERY), table("Pairs", columns, rows));
+}
+
+/** @param {Pick<Api.Test, "found" | "text">} test */
+function result({ found, text }) {
+  const { kind, sign } = LOOKS[found] ?? UNKNOWN;
+  return h("span", { class: kind }, `${sign} ${found}`, kind === "unknown" ? "" : `, p ${text}`);
+}
+
+/**
+ * Return the table of the pairs while it is folded and not loaded.
+ *
+ * @param {() => void} unfolded
+ */
+export const foldedPairs = (unfolded) => h("details", { class: "pairs every", ontoggle: unfolded }, h("summary", {}, EVERY), loading());
+
+/**
+ * Return the paper's pooled tests over a range; nothing at a single number.
+ *
+ * @param {Page.CompareView} view
+ * @param {Api.Comparison[]} pairs
+ * @param {boolean} open whether the table is unfolded
+ */
+export function pooledTable({ choice: { experiments }, cache }, pairs, open) {
+  const label = labelOf(experiments, cache);
+  const rows = pairs.flatMap((pair) => {
+    const { pooled } = pair;
+    return pooled ? [[label(pair), pooled.sizes, pooled.difference_text, pooled.effect_size_text, ...UNPAIRED.map((name) => pooled[name].text)]] : [];
+  });
+  if (!rows.length) return null;
+  const head = ["Pair", "n", "Difference", "d", ...UNPAIRED.map((name) => `${TESTS[name].short}, ${AFTER_HOLM}`)];
+  return h("details", { open, class: "pairs pooled" }, h("summary", {}, "The paper’s tests, pooled over the range"),
+    h("p", { class: "caution" }, `⚠ ${pairs[0].pooled?.caution}`), table("Pooled", head, rows));
+}
+
+/** @type {(experiments: string[], cache: Page.CompareView["cache"]) => (pair: Api.Comparison) => string} */
+function labelOf(experiments, cache) {
+  const names = cache.namesOf(experiments);
+  const one = (/** @type {string} */ id) => `${letter(experiments.indexOf(id))} ${names.get(id)}`;
+  return (pair) => `${one(pair.first)} − ${one(pair.second)}`;
+}
+
+/** @type {[label: string, format: string, name: string][]} */
+const FORMATS = [["CSV", "csv", "gaplab-comparisons.csv"], ["LaTeX", "latex", "gaplab-comparisons.tex"]];
+
+/**
+ * Return buttons that copy the tests of all pairs over a range, and links that save them.
+ *
+ * @param {Page.Query} asked what the comparison was asked for
+ */
+export function files(asked) {
+  const copies = FORMATS.map(([label, format]) =>
+    copyButton(`Copy as ${label}`, async () => (await getFile("/comparisons", { ...asked, format })).text()));
+  const links = FORMATS.map(([label, format, name]) => downloadLink(label, "/comparisons", { ...asked, format }, name));
+  return h("p", { class: "files exports" }, ...copies.flatMap((button) => [button, " "]), "Save as ", ...links.flatMap((link) => [link, " "]));
+}
