@@ -9,7 +9,7 @@ from fastapi.middleware.gzip import GZipMiddleware
 
 from gaplab.api.http import documentation, problems
 from gaplab.api.http.access import Access
-from gaplab.api.http.dependencies import WRITERS, reload_plugins, take_place
+from gaplab.api.http.dependencies import WRITERS, take_place
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import SPARE, BodyLimit, RequestLimit, Streams, most_requests
 from gaplab.api.http.metrics import Metrics, RequestCounter
@@ -95,10 +95,6 @@ MODULES = (
 """The modules of the API, in the order of the documentation."""
 
 
-WITHOUT_PLUGINS = (views, events, health)
-"""The modules whose answers do not depend on plug-ins; before others answer, edited plug-ins are imported again."""
-
-
 def create_app(
     store: Store, settings: Settings | None = None, limits: Limits | None = None, notify: Notify | None = None
 ) -> FastAPI:
@@ -136,8 +132,7 @@ def create_app(
     app.add_middleware(RequestCounter, metrics=app.state.metrics)
     problems.install(app)
     for module in MODULES:
-        reloading = [] if module in WITHOUT_PLUGINS else [Depends(reload_plugins)]
-        app.include_router(module.router, dependencies=[Depends(take_place), *reloading])
+        app.include_router(module.router, dependencies=[Depends(take_place)])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

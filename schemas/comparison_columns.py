@@ -43,7 +43,6 @@ _PATHS = (
 COLUMNS = tuple(path.removesuffix(".value").replace(".", "_") for path in _PATHS)
 _NAMES = {"first", "first_name", "second", "second_name", "fitness"}
 TEXTS = frozenset({*_NAMES, "trusted_test", "equivalence_test", "equivalence_verdict"})
-NUMBERS = tuple(name for name in COLUMNS if name not in TEXTS | {"shared_streams"})
 
 
 def shown_tests(pairs: Sequence[Comparison]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Name, Statistic
+from gaplab.schemas.base import Frozen, Id, Name, Statistic, Unit
 from gaplab.schemas.curves import Fitness
 
 
@@ -154,6 +154,7 @@ class Comparison(Groups, Pair):
     """
 
     fitness: Fitness = Fitness.RECORDED
+    unit: Unit = Field(default="", description="of fitness", examples=["m/s"])
     where: str = Field(default="", description="these numbers", examples=["after 5 real-world evaluations"])
     shared_evaluations: int = Field(
         default=0, description="last number of real-world evaluations that all compared experiments share"

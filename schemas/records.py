@@ -32,6 +32,7 @@ class TimeLeft(Frozen):
 
     low_s: float = Field(examples=[2400.0])
     high_s: float = Field(examples=[4200.0])
+    text: str = Field(examples=["40 to 70 min"])
 
 
 class StepRead(Frozen):
@@ -64,15 +65,15 @@ class Progress(Frozen):
     rollouts_saved: int = Field(
         description="budgeted rollouts that were not simulated, because they cannot change a number"
     )
-    seconds_left: float | None = Field(
-        default=None,
-        description="estimate of the remaining time, inside `time_left`; null while unknown, 0 at the end",
-        examples=[3120.0],
-    )
     time_left: TimeLeft | None = Field(
         default=None, description="interval of the remaining time; null until enough is measured, and at the end"
     )
     steps: tuple[StepRead, ...] = Field(default=(), description="what repetitions have begun")
+    share: float = Field(description="share of the work that is done, between 0 and 1, by rollouts", examples=[0.37])
+    text: str = Field(
+        description="completed work and the steps under way, in words",
+        examples=["12 of 40 repetitions; 138 of 400 iterations; 4,363,000 of 12,000,000 rollouts; tuning 3: 41 %"],
+    )
 
 
 class FitnessRead(Frozen):

@@ -6,6 +6,9 @@ from pydantic import Field
 
 from gaplab.schemas.base import Examples, Frozen, Real, Statistic, Unit
 
+TRACE_COLUMNS = ("time_s", "x", "y", "z", "qx", "qy", "qz", "qw")
+"""Columns of a trace in CSV: seconds on a clock of its own, metres, and a quaternion."""
+
 Hash = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 """SHA-256 of the content of an attachment, in hexadecimal."""
 

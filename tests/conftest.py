@@ -22,8 +22,8 @@ import pytest
 from hypothesis import settings
 
 from gaplab import migrations
-from gaplab.services.core import external_plugins
-from gaplab.services.plugins import folders
+from gaplab.services.plugins import loading
+from gaplab.services.specs import assembly, robots
 from gaplab.services.store.session import Store
 from tests import postgres as servers
 from tests import statements
@@ -225,20 +225,34 @@ def ray(shared_ray: ExitStack) -> None:
 
 
 @pytest.fixture
-def put(tmp_path: Path) -> Iterator[Any]:
-    """Writes files into a plug-in folder, and lets this process import all of them again."""
-    folders.find()
+def plug_ins() -> Iterator[Callable[..., None]]:
+    """Imports the plug-ins of folders, as the next process with these folders does."""
+    before = loading.here()
+
+    def restart(*folders: Path) -> None:
+        loading.load(folders)
+        assembly._warm_engine.cache_clear()
+        robots._own_unit.cache_clear()
+
+    yield restart
+    restart(*(before.folders if before else ()))
+
+
+@pytest.fixture
+def put(tmp_path: Path, plug_ins: Callable[..., None]) -> Any:
+    """Writes files into a plug-in folder, and imports what is in all such folders, as the next process does."""
+    homes: list[Path] = []
 
     def write(folder: str = "mine", /, **files: str) -> Path:
         home = tmp_path / folder
         home.mkdir(exist_ok=True)
         for name, text in files.items():
             (home / f"{name}.py").write_text(text)
-        external_plugins.set_folders((*external_plugins.folders(), home))
+        homes.append(home)
+        plug_ins(*homes)
         return home
 
-    yield write
-    external_plugins.set_folders(())
+    return write
 
 
 @pytest.fixture

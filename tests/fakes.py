@@ -1,7 +1,6 @@
 """Stand-ins of a few lines: simulations that are formulas, and settings that run in milliseconds."""
 
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,6 @@ from gaplab.services.core.registry import Plugin, Registry
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Budget, Outcome
-from gaplab.services.running import versions
-from gaplab.services.specs import blame
 
 TRUTH = np.array([0.7, 0.2])
 
@@ -106,6 +103,4 @@ class Careful(Strategy):
 
 def install(monkeypatch: pytest.MonkeyPatch, registry: Registry[Any], plugin: type[Plugin]) -> None:
     """Let this process have one more plug-in until the end of the test."""
-    monkeypatch.setitem(registry._found.usable, plugin.name, plugin)
-    for module, name in ((blame, "_plugins"), (versions, "_provenance")):  # with caches of their own
-        monkeypatch.setattr(module, name, lru_cache(getattr(module, name).__wrapped__))
+    monkeypatch.setattr(registry, "_usable", dict(sorted({**registry, plugin.name: plugin}.items())))

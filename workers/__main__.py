@@ -34,7 +34,7 @@ def serve(settings: Settings) -> int:
     pulse = PulsePipe.inherited()
     logs.adopt("ray")
     logs.configure()
-    folders.load()
+    folders.load(warn=True)
     try:
         database = Store(settings.database_url, answer_s=_answer_s(settings.lease_s), pinned=True)
         with database as store, in_use(store.file):

@@ -4,7 +4,6 @@ gaplab and its libraries concern all work: a node that has others ends the super
 only the experiments that name it: a process that has another version refuses them, and does the others.
 """
 
-import logging
 import platform
 from collections.abc import Mapping
 from hashlib import sha256
@@ -19,9 +18,7 @@ from gaplab.schemas.provenance import Provenance
 from gaplab.services.core import robot_library
 from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.plugins import folders
-from gaplab.services.plugins.contents import ANY, Contents, read
 from gaplab.services.plugins.external import unavailable
-from gaplab.services.plugins.watching import imported, present
 from gaplab.services.running.versions import Versions as Versions
 from gaplab.services.running.versions import named_versions, plugin_versions
 from gaplab.services.running.versions import versions as versions
@@ -39,8 +36,6 @@ IMPORTED = "GAPLAB_PLUGINS_IMPORTED"
 ROBOT = "robot "
 """Begins the names of robot files, whose texts are among versions."""
 
-log = logging.getLogger("gaplab.supervisor")
-
 
 def with_plugins(shared: Versions, under: Provenance, spec: Mapping[str, Any]) -> Versions:
     """Return what a process must have for work on a spec that was claimed under a provenance.
@@ -48,9 +43,8 @@ def with_plugins(shared: Versions, under: Provenance, spec: Mapping[str, Any]) -
     These are the shared versions of gaplab and its libraries, those of its plug-ins, and robot files.
     """
     files = robot_library.needed_by(PluginRef.model_validate(spec["robot"]))
-    return (
-        shared | _prefixed(named_versions(under, spec)) | {f"{ROBOT}{place}": text for place, text in enumerate(files)}
-    )
+    plugins = {f"{PLUGIN}{plugin}": text for plugin, text in named_versions(under, spec).items()}
+    return shared | plugins | {f"{ROBOT}{place}": text for place, text in enumerate(files)}
 
 
 def process_for(expected: Versions) -> dict[str, Any]:
@@ -72,25 +66,24 @@ def check_here(expected: Versions) -> None:
     limit_prints()
     shared = {name: text for name, text in expected.items() if not name.startswith((PLUGIN, ROBOT))}
     wanted = {name.removeprefix(PLUGIN): text for name, text in expected.items() if name.startswith(PLUGIN)}
-    different = _other_files(wanted)
-    folders.use(() if different else wanted.values())  # nothing undoes an import
     _compare(platform.node(), versions(), shared)
+    folders.use(wanted)
+    found = plugin_versions()
+    if wrong := [plugin for plugin in wanted if found.get(plugin) != wanted[plugin]]:
+        texts = {each: unavailable(each) or folders.differs(found.get(each, "none"), wanted[each]) for each in wrong}
+        raise PluginDiffers(texts, wanted)
     robot_library.learn(text for name, text in expected.items() if name.startswith(ROBOT))
-    if different := different or _different(wanted):
-        raise PluginDiffers(different, wanted)
 
 
 def check_nodes() -> None:
-    """Check that every node of the cluster has this process's versions, and warn of plug-ins that differ.
+    """Check that every node of the cluster has this process's versions of gaplab and its libraries.
 
     Raises:
         ClusterUnusable: one has other versions, or no gaplab at all.
     """
     alive = [node for node in ray.nodes() if node["Alive"]]
     only = [NodeAffinitySchedulingStrategy(node["NodeID"], soft=False) for node in alive]
-    every = process_for({PLUGIN: ANY})
-    answers = [_versions_of_node.options(scheduling_strategy=each, **every).remote() for each in only]
-    ours = versions() | _prefixed(plugin_versions(present()))
+    answers = [_versions_of_node.options(scheduling_strategy=each).remote() for each in only]
     for answer, node in zip(answers, alive, strict=True):
         name = f"{node['NodeManagerHostname']} ({node['NodeManagerAddress']})"
         try:
@@ -99,40 +92,13 @@ def check_nodes() -> None:
             msg = f"the node {name} cannot run gaplab, which every node needs: {_last_line(error)}"
             raise ClusterUnusable(msg) from error
         _compare(name, found, versions())
-        for plugin in [each for each in ours if found.get(each) != ours[each]]:
-            log.warning("the node %s has another version of the %s; experiments that name it wait", name, plugin)
 
 
 def _versions_here() -> Versions:
-    folders.find()
-    imported.contents()
-    return versions() | _prefixed(plugin_versions(imported.contents()))
+    return versions()
 
 
 _versions_of_node = ray.remote(num_cpus=0, max_retries=0)(_versions_here)  # which Ray sends by its name
-
-
-def _prefixed(plugins: Versions) -> Versions:
-    return {f"{PLUGIN}{plugin}": text for plugin, text in plugins.items()}
-
-
-def _other_files(wanted: Versions) -> dict[str, str]:
-    """Return a sentence for each plug-in whose file is another here."""
-    folders.find()
-    here = read() if wanted else Contents()
-    files = {plugin: here.text_of(text.partition(" ")[0]) or "none" for plugin, text in wanted.items()}
-    return {each: _sentence(file, wanted[each]) for each, file in files.items() if not wanted[each].startswith(file)}
-
-
-def _different(wanted: Versions) -> dict[str, str]:
-    """Return a sentence for each plug-in that this process has in another version, by its kind and name."""
-    found = plugin_versions(imported.contents())
-    wrong = [plugin for plugin in wanted if found.get(plugin) != wanted[plugin]]
-    return {plugin: unavailable(plugin) or _sentence(found.get(plugin, "none"), wanted[plugin]) for plugin in wrong}
-
-
-def _sentence(found: str, wanted: str) -> str:
-    return f"a process on {platform.node()} has {found}, the supervisor {wanted}: put the same file on all nodes"
 
 
 def _compare(node: str, found: Versions, expected: Versions) -> None:

@@ -96,7 +96,7 @@ class Repetitions:
             return
         self._looked = monotonic()
         waiting = [run.claim for run in self.runs if not (run.begun or run.over)]
-        present = self._plugins.present()
+        present = self._plugins.under, self._plugins.refused()
         if given := set(execution.give_way(self._store, waiting, *present)):
             self._drop_all_but([run.claim for run in self.runs if run.claim not in given])
         if self._unsure:

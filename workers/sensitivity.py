@@ -101,8 +101,7 @@ class Checks:
             self._run = None
 
     def _claim(self) -> None:
-        _, refused = self._plugins.present()
-        if (claim := sensitivity.claim(self._store, self._owner, refused)) is not None:
+        if (claim := sensitivity.claim(self._store, self._owner, self._plugins.refused())) is not None:
             expected = self._plugins.expected(claim.spec)
             result = check.options(**process_for(expected)).remote(claim.spec, expected)
             self._run, self._begun = (claim, result), monotonic()

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from gaplab.api.clients.progress.notebook import in_notebook
+from gaplab.api.clients.progress import in_notebook
 from gaplab.schemas.estimates import EstimateRead
 
 Ask = Callable[[str], str]

@@ -14,7 +14,7 @@ import httpx2
 from pydantic import TypeAdapter, ValidationError
 
 from gaplab.api.clients.bodies import json_of
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, error_of
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, error_of, format_of
 from gaplab.schemas.records import ExperimentRead, Page, StudyRead
 from gaplab.services.settings import InvalidSetting, Settings
 
@@ -110,12 +110,13 @@ class Connection:
         timeout_s = self._timeout_s + (wait_s if isinstance(wait_s, int | float) else 0.0)
         return self._repeat("GET", path, params=given, timeout=timeout_s)
 
-    def save(self, file: Path, path: str, /, **parameters: Parameter) -> Path:
-        """Write the answer to a GET into a file, and return it; missing folders are created."""
-        content = self.get_bytes(path, **parameters)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(content)
-        return file
+    def save(self, file: str | Path, path: str, formats: Sequence[str], /, **parameters: Parameter) -> Path:
+        """Write the answer to a GET, in the format that its suffix names, into a file; missing folders are created.
+
+        Raises:
+            WrongSuffix: the suffix is not one of these formats.
+        """
+        return written(file, self.get_bytes(path, **parameters | {"format": format_of(file, formats)}))
 
     def items(self, page: type[Page[T]], path: str, /, **parameters: Parameter) -> Iterator[T]:
         """Yield every item of a list, page after page."""
@@ -241,6 +242,14 @@ def plain(parameters: Mapping[str, Parameter]) -> dict[str, Plain]:
         return id_of(value) if isinstance(value, StudyRead | ExperimentRead) else [id_of(each) for each in value]
 
     return {name: with_ids(value) for name, value in parameters.items() if value is not None}
+
+
+def written(file: str | Path, content: bytes) -> Path:
+    """Write a file, and return its path; missing folders are created."""
+    path = Path(file)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return path
 
 
 def segment(of: Of) -> str:

@@ -1,9 +1,11 @@
 """Errors between a client and the service."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from http import HTTPStatus
-from typing import Self
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Self
 
 import httpx2
 from pydantic import ValidationError
@@ -60,6 +62,34 @@ class ExtraMissing(ImportError):
     def __reduce__(self) -> tuple[type[Self], tuple[str, str]]:
         """Return the class and the arguments from which a copy of the error is made."""
         return type(self), (str(self.name), self.extra)
+
+
+class WrongSuffix(ValueError):
+    """The suffix of a file names no format in which it can be written."""
+
+
+def format_of(file: str | Path, formats: Sequence[str]) -> str:
+    """Return the format that the suffix of a file names.
+
+    Raises:
+        WrongSuffix: it is not one of these formats.
+    """
+    suffix = Path(file).suffix.removeprefix(".").lower()
+    if suffix not in formats:
+        raise WrongSuffix(f"{file} has another suffix; permitted: {', '.join(f'.{each}' for each in formats)}")
+    return suffix
+
+
+def library(name: str, extra: str) -> Any:  # noqa: ANN401 - a module that may be missing
+    """Return a library of an optional extra.
+
+    Raises:
+        ExtraMissing: it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise ExtraMissing(name.partition(".")[0], extra) from error
 
 
 def is_final(error: Exception) -> bool:

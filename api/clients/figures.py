@@ -7,7 +7,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from gaplab.api.clients.connection import Connection, Of, id_of
+from gaplab.api.clients.connection import Connection, Of, id_of, written
+from gaplab.api.clients.errors import format_of, library
 
 _FIGURES = "/figures/"
 
@@ -43,17 +44,15 @@ class Figure:
 
     def save(self, file: str | Path) -> Path:
         """Write the figure into a file in the format of its suffix; missing folders are created."""
-        path = Path(file)
-        content = self.content(path.suffix.removeprefix(".").lower())
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-        return path
+        return written(file, self.content(format_of(file, FORMATS)))
 
     def plotly(self) -> Any:  # noqa: ANN401 - Plotly has no types
-        """Return the figure as a Plotly figure, to zoom or to change."""
-        from plotly.graph_objects import Figure as PlotlyFigure
+        """Return the figure as a Plotly figure, to zoom or to change.
 
-        return PlotlyFigure(json.loads(self.content("json"))["figure"])
+        Raises:
+            ExtraMissing: plotly is not installed.
+        """
+        return library("plotly.graph_objects", "notebook").Figure(json.loads(self.content("json"))["figure"])
 
     def _repr_mimebundle_(self, **_: object) -> dict[str, str]:
         """Return what a notebook shows: the drawing itself, which stays in the notebook's file."""

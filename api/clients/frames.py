@@ -1,45 +1,28 @@
 """Frames of pandas, which may not be installed."""
 
-from collections.abc import Sequence
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Iterable, Sequence
+from typing import TYPE_CHECKING
 
-from gaplab.api.clients.errors import ExtraMissing
+from gaplab.api.clients.errors import library
 
 if TYPE_CHECKING:
     import pandas
 
-
-def pandas_library() -> Any:  # noqa: ANN401 - a module that may be missing
-    """Return pandas.
-
-    Raises:
-        ExtraMissing: it is not installed.
-    """
-    try:
-        return import_module("pandas")
-    except ImportError as error:
-        raise ExtraMissing("pandas", "notebook") from error
+WHOLE = {"repetition", "iteration", "rank", "evaluations", "n", "repeats"}
+WHOLE |= {"from_evaluations", "to_evaluations", "n_first", "n_second", "n_paired"}
+"""Columns of whole numbers, in whatever table; they are never null."""
 
 
-def frame(
-    rows: Sequence[Sequence[object]],
-    columns: Sequence[str],
-    numeric: Sequence[str],
-    whole: Sequence[str] = (),
-) -> "pandas.DataFrame":
+def frame(rows: Iterable[Sequence[object]], columns: Sequence[str], others: Collection[str] = ()) -> "pandas.DataFrame":
     """Return a frame whose columns have the same types with and without rows.
 
     Args:
         rows: values by column.
-        columns: names of the columns.
-        numeric: columns of numbers, with nan for null, even if every value is null.
-        whole: those of them that are whole numbers, and never null.
+        columns: names of the columns: of numbers, with nan for null.
+        others: those of them that are not numbers.
+
+    Raises:
+        ExtraMissing: pandas is not installed.
     """
-    pandas = pandas_library()
-    made = pandas.DataFrame(rows, columns=columns)
-    if made.empty:
-        return made.astype({name: "int64" if name in whole else "float64" for name in numeric})
-    for name in numeric:
-        made[name] = pandas.to_numeric(made[name])
-    return made
+    made = library("pandas", "notebook").DataFrame(list(rows), columns=list(columns))
+    return made.astype({name: "int64" if name in WHOLE else "float64" for name in columns if name not in others})

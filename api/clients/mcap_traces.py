@@ -1,16 +1,14 @@
 """Traces in MCAP, as ROS 2 and Foxglove record them: read here, so that the service parses CSV alone."""
 
-import csv
-import io
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from gaplab.api.clients.errors import ExtraMissing
-
-COLUMNS = ("time_s", "x", "y", "z", "qx", "qy", "qz", "qw")
+from gaplab.api.clients.errors import library
+from gaplab.schemas.traces import TRACE_COLUMNS
+from gaplab.services.core.csv_tables import csv_text
 
 POSES = {
     "geometry_msgs/msg/PoseStamped",
@@ -28,28 +26,20 @@ _STAMPS, _NANOSECONDS = ("timestamp", "stamp"), ("nsec", "nanosec")
 
 def mcap_to_csv(file: Path, topic: str | None = None, body: str | None = None) -> str:
     """Return the trace of an MCAP file as CSV; see `Bench.attach_trace`."""
-    try:
-        from mcap.exceptions import McapError
-        from mcap.reader import make_reader
-        from mcap_ros2.decoder import DecoderFactory
-    except ImportError as error:
-        raise ExtraMissing("mcap", "mcap") from error
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    mcap, ros = library("mcap.reader", "mcap"), library("mcap_ros2.decoder", "mcap")
+    errors = library("mcap.exceptions", "mcap")
     try:
         with file.open("rb") as stream:
-            factories: list[Any] = [DecoderFactory(), _Json()]
-            reader = make_reader(stream, decoder_factories=factories)
+            factories: list[Any] = [ros.DecoderFactory(), _Json()]
+            reader = mcap.make_reader(stream, decoder_factories=factories)
             chosen = _chosen(reader.get_summary(), topic, file)
             poses: dict[str, list[list[float]]] = {}
             for _, _, message, decoded in reader.iter_decoded_messages(topics=[chosen]):
                 name = getattr(decoded, "child_frame_id", "")
                 poses.setdefault(name, []).append(_pose(decoded, message.log_time))
-            writer.writerows(_of_body(poses, body, f"{file.name} has {{}} on {chosen!r}"))
-    except McapError as error:
+            return csv_text(TRACE_COLUMNS, _of_body(poses, body, f"{file.name} has {{}} on {chosen!r}"))
+    except errors.McapError as error:
         raise ValueError(f"{file.name} is not an MCAP file that can be read: {error}") from error
-    return text.getvalue()
 
 
 class _Json:

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from gaplab.api.clients.connection import Connection, Of, segment
+from gaplab.api.clients.connection import Connection, Of, segment, written
+from gaplab.api.clients.errors import format_of
 from gaplab.schemas.replays import Replay
 
 FORMATS = ("gif", "webp", "mp4")
@@ -27,17 +28,13 @@ class Replays:
 
         The choice is that of `replay`, and `width` in pixels.
         """
-        path = Path(file)
-        if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
-            raise ValueError(f"{path} has no suffix of a video; permitted: {', '.join(FORMATS)}")
-        return self._connection.save(path, f"/experiments/{segment(of)}/video", format=format_, **choice)
+        return self._connection.save(file, f"/experiments/{segment(of)}/video", FORMATS, **choice)
 
     def robot_picture(self, name: str, file: str | Path, *, theme: str = "light", width: int = 640) -> Path:
         """Write a picture of a robot of the catalogue, as it stands at the start, into a PNG file.
 
         The theme is `light` or `dark`. The height is three quarters of the width, in pixels. Missing folders are made.
         """
-        path = Path(file)
-        if path.suffix.lower() != ".png":
-            raise ValueError(f"{path} has no suffix of a picture; permitted: .png")
-        return self._connection.save(path, f"/catalogue/robots/{segment(name)}/picture", theme=theme, width=width)
+        format_of(file, ("png",))
+        path = f"/catalogue/robots/{segment(name)}/picture"
+        return written(file, self._connection.get_bytes(path, theme=theme, width=width))

@@ -32,11 +32,8 @@ class Reports:
 
         The margins are those of `verdict`. Missing folders are created.
         """
-        path = Path(file)
-        if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
-            raise ValueError(f"{path} has no suffix of a report; permitted: {', '.join(FORMATS)}")
         query = {"margin": margin, "margin_of_direct": margin_of_direct}
-        return self._connection.save(path, f"/studies/{segment(of)}/report", format=format_, **query)
+        return self._connection.save(file, f"/studies/{segment(of)}/report", FORMATS, **query)
 
     def take_home(self, of: Of, file: str | Path) -> Path:
         """Write what an experiment found into a file with the suffix .zip, or a page to print into one with .html.
@@ -44,7 +41,4 @@ class Reports:
         The zip has the best measured controller with its motion, the tuned simulator with its intervals, the verdict,
         samples, spec, provenance and the page. Missing folders are created.
         """
-        path = Path(file)
-        if (format_ := path.suffix.removeprefix(".").lower()) not in ("zip", "html"):
-            raise ValueError(f"{path} has another suffix; permitted: zip, html")
-        return self._connection.save(path, f"/experiments/{segment(of)}/takehome", format=format_)
+        return self._connection.save(file, f"/experiments/{segment(of)}/takehome", ("zip", "html"))

@@ -85,13 +85,7 @@ class Results:
         """
         query: dict[str, Parameter] = {"study": _ids(of), "from": first, "to": last}
         query |= {"margin": margin, "margin_of_direct": margin_of_direct, "intervals": intervals, "fitness": fitness}
-        pairs = self._connection.get(tuple[Comparison, ...], "/comparisons", **query)
-        query |= {"from": pairs[0].from_evaluations, "to": pairs[0].to_evaluations}  # also if an experiment goes on
-
-        def formatted(format: str) -> str:  # noqa: A002 - as the API says
-            return self._connection.get_bytes("/comparisons", format=format, **query).decode()
-
-        return Comparisons(pairs, formatted)
+        return Comparisons(self._connection.get(tuple[Comparison, ...], "/comparisons", **query))
 
     def diff(self, *of: Of) -> SpecDiff:
         """Return the settings in which studies and experiments differ; of a single study, its experiments."""

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from gaplab.api.clients.connection import Connection, Of, id_of, segment
-from gaplab.api.clients.frames import frame, pandas_library
+from gaplab.api.clients.errors import library
+from gaplab.api.clients.frames import frame
 from gaplab.api.clients.results import PAGE, Results
 from gaplab.schemas.curves import CurvePoint
 from gaplab.schemas.records import ExperimentRead, Page, SampleRead, SensorsRead, SimulatorRead
@@ -14,9 +15,7 @@ from gaplab.schemas.replays import Prediction, Predictions
 if TYPE_CHECKING:
     import pandas
 
-WHOLE = ("repetition", "iteration", "rank", "evaluations", "n", "repeats")
-"""Columns of whole numbers, in whatever table."""
-
+NAMED = ("experiment", "name", "strategy")
 STATISTICS = ("evaluations", "n", "mean", "sd", "lower", "upper")
 
 
@@ -41,7 +40,7 @@ class Tables:
             for point in curve.points
             for row in _rows(point, each=each)
         ]
-        return frame(rows, ("experiment", "name", "strategy", *numbers), numbers, WHOLE)
+        return frame(rows, (*NAMED, *numbers), NAMED)
 
     def samples(self, of: Of, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
         """Return the real-world evaluations of an experiment, with a column for each gene.
@@ -53,10 +52,9 @@ class Tables:
         samples = self._samples(of, repetition, kind)
         columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at", "standard_error")
         rows = [[*(getattr(sample, name) for name in columns), _repeats(sample)] for sample in samples]
-        numbers = ("repetition", "iteration", "fitness", "standard_error", "repeats")
-        table = frame(rows, (*columns, "repeats"), numbers, WHOLE)
-        table = table.astype({"kind": str, "measured_by": str, "measured_at": "datetime64[us, UTC]"})
-        genes = pandas_library().DataFrame([sample.genome for sample in samples], index=table.index)
+        others = {"kind": str, "measured_by": str, "measured_at": "datetime64[us, UTC]"}
+        table = frame(rows, (*columns, "repeats"), others).astype(others)
+        genes = library("pandas", "notebook").DataFrame([sample.genome for sample in samples], index=table.index)
         return table.join(genes.rename(columns=lambda gene: f"gene_{gene}"))
 
     def readings(self, of: Of, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
@@ -80,8 +78,8 @@ class Tables:
             if sample.readings is not None
             for time_s, *values in _values(sample.readings, sensors)
         ]
-        numbers = ("repetition", "iteration", "time_s", *names)
-        return frame(rows, ("repetition", "iteration", "kind", "time_s", *names), numbers, WHOLE).astype({"kind": str})
+        columns = ("repetition", "iteration", "kind", "time_s", *names)
+        return frame(rows, columns, {"kind"}).astype({"kind": str})
 
     def simulators(self, of: Of, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
         """Return the tuned simulators of an experiment, with a column for each tunable; rank 0 is an iteration's best.
@@ -96,8 +94,10 @@ class Tables:
         filters = {"limit": PAGE, "repetition": repetition, "iteration": iteration}
         simulators = list(self._connection.items(Page[SimulatorRead], path, **filters))
         columns = ("repetition", "iteration", "rank", "squared_error", "error")
-        table = frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns, WHOLE)
-        return table.join(pandas_library().DataFrame([_tuned(row) for row in simulators], index=table.index))
+        table = frame([[getattr(row, name) for name in columns] for row in simulators], columns)
+        return table.join(
+            library("pandas", "notebook").DataFrame([_tuned(row) for row in simulators], index=table.index)
+        )
 
     def predictions(self, of: Of, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":
         """Return the fitness of each sample in reality, and in simulation before and after it was measured.
@@ -108,7 +108,7 @@ class Tables:
         Raises:
             TimeoutError: it takes longer than `timeout_s`; computed predictions are kept, so ask again.
         """
-        pandas_library()
+        library("pandas", "notebook")
         deadline, path = time.monotonic() + timeout_s, f"/experiments/{segment(of)}/predictions"
         while (predictions := self._connection.get(Predictions, path)).pending:
             if time.monotonic() > deadline:
@@ -116,7 +116,7 @@ class Tables:
                 raise TimeoutError(f"{msg}; ask again")
             time.sleep(every_s)
         columns = tuple(Prediction.model_fields)
-        return frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns, WHOLE)
+        return frame([[getattr(item, name) for name in columns] for item in predictions.items], columns)
 
     def _samples(self, of: Of, repetition: int | None, kind: str | None) -> list[SampleRead]:
         path = f"/experiments/{segment(of)}/samples"

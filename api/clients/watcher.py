@@ -4,17 +4,16 @@ import sys
 import time
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 
 from rich.console import Console
 
 from gaplab.api.clients.connection import Of
-from gaplab.api.clients.errors import ExperimentFailed
-from gaplab.api.clients.progress import log, notebook, terminal
-from gaplab.api.clients.progress.notebook import in_notebook
-from gaplab.api.clients.progress.snapshots import Snapshot, Snapshots
-from gaplab.api.clients.progress.text import console
+from gaplab.api.clients.errors import ExperimentFailed, ServiceError, ServiceUnreachable, is_final
+from gaplab.api.clients.progress import RecordProgress, Snapshot, in_notebook, show
 from gaplab.api.clients.records import Records
 from gaplab.api.clients.results import Results
+from gaplab.api.clients.screen import console
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
 
@@ -31,7 +30,7 @@ class Watcher:
 
         A service that is away for longer than `patience_s` is an error.
         """
-        for snapshot in Snapshots(self._records).of(of, every_s=every_s, patience_s=patience_s):
+        for snapshot in self.snapshots(of, every_s=every_s, patience_s=patience_s):
             if not snapshot.away_s:
                 yield snapshot.study
 
@@ -58,15 +57,10 @@ class Watcher:
             TimeoutError: it has not ended yet. It continues; wait again.
         """
         every_s = every_s if timeout_s is None else min(every_s, timeout_s)
-        snapshots = _within(Snapshots(self._records).of(of, every_s=every_s, patience_s=patience_s), timeout_s)
+        snapshots = _within(self.snapshots(of, every_s=every_s, patience_s=patience_s), timeout_s)
         if progress is None:
             progress = in_notebook() or sys.stderr.isatty()
-        if not progress:
-            ended = deque(snapshots, maxlen=1).pop().study
-        elif in_notebook():
-            ended = notebook.show(snapshots)
-        else:
-            ended = _print(snapshots, console(stderr=True))
+        ended = show(snapshots, console(stderr=True)) if progress else deque(snapshots, maxlen=1).pop().study
         if ended.state is not State.COMPLETED:
             raise ExperimentFailed(ended)
         return ended
@@ -79,12 +73,46 @@ class Watcher:
         A terminal gets a live table, anything else a line every ten seconds. With `curves`, the table has curves and
         repetitions too, and its last state stays on the screen.
         """
-        source = Snapshots(self._records, self._results if curves and console.is_terminal else None)
-        return _print(source.of(of, every_s=every_s, patience_s=patience_s), console, keep=curves)
+        curves = curves and console.is_terminal
+        return show(self.snapshots(of, curves=curves, every_s=every_s, patience_s=patience_s), console, keep=curves)
 
+    def snapshots(
+        self, of: Of, *, curves: bool = False, every_s: float = 1.0, patience_s: float = 60.0
+    ) -> Iterator[Snapshot]:
+        """Yield the progress until the study has ended, perhaps with curves and repetitions.
 
-def _print(snapshots: Iterator[Snapshot], console: Console, *, keep: bool = False) -> StudyRead:
-    return terminal.show(snapshots, console, keep=keep) if console.is_terminal else log.show(snapshots, console)
+        While the service is away, snapshots say so; see `watch`.
+        """
+        details = dict[str, RecordProgress]()
+        snapshot = self._snapshot(self._records.study(of), details, curves=curves)
+        yield snapshot
+        answered_at = time.monotonic()
+        while not snapshot.study.state.ended:
+            time.sleep(every_s)
+            try:
+                snapshot = self._snapshot(self._records.study(of), details, curves=curves)
+            except (ServiceError, ServiceUnreachable) as error:
+                away_s = time.monotonic() - answered_at
+                if is_final(error) or away_s > patience_s:
+                    raise
+                snapshot = replace(snapshot, away_s=away_s)
+            yield snapshot
+            if not snapshot.away_s:
+                answered_at = time.monotonic()
+
+    def _snapshot(self, study: StudyRead, details: dict[str, RecordProgress], *, curves: bool) -> Snapshot:
+        """Return the progress; details by id, of those experiments that go on or have changed, are read again."""
+        experiments = {each.id: each for each in study.experiments}
+        moving = [
+            id
+            for id, each in experiments.items()
+            if not each.state.ended or id not in details or details[id].record != each
+        ]
+        for curve in self._results.curves(moving) if curves and moving else ():
+            id, repetitions = curve.experiment, self._records.repetitions(curve.experiment)
+            details[id] = RecordProgress(experiments[id], curve, repetitions)
+        rows = [details.get(id) or RecordProgress(each) for id, each in experiments.items()]
+        return Snapshot(study, (*([RecordProgress(study)] if len(rows) > 1 else []), *rows))
 
 
 def _within(snapshots: Iterator[Snapshot], timeout_s: float | None) -> Iterator[Snapshot]:

@@ -8,7 +8,7 @@ from typing import IO, Annotated
 import typer
 from rich.markup import escape
 
-from gaplab.api.clients.progress.text import console
+from gaplab.api.clients.screen import console
 from gaplab.api.commands.app import KEEPING, AsJson, Id, Url, app, connect
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.api.commands.json_output import echo, print_json, print_result
@@ -110,7 +110,7 @@ def rerun(  # noqa: PLR0913, PLR0917 - each is an option of the command
     parts = {"--repetitions": repetitions, "--experiment": experiment, "--repetition": repetition, "--minutes": minutes}
     if not verify and (given := [name for name, value in parts.items() if value is not None]):
         raise typer.BadParameter("it limits what --verify computes; add --verify", param_hint=given[0])
-    folders.load()
+    folders.load(warn=True)
     if verify:
         _verify(file, (repetitions, experiment, repetition, minutes), as_json=as_json)
         return

@@ -1,9 +1,12 @@
 """Commands for a robot on a bench: what to measure, answers by hand, and corrections."""
 
+import re
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
 import typer
+from typer.core import TyperCommand
 
 from gaplab.api.clients.bench import Details
 from gaplab.api.clients.client import Client
@@ -11,12 +14,12 @@ from gaplab.api.clients.errors import if_found
 from gaplab.api.commands.app import BENCH, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import echo, print_result
-from gaplab.api.commands.measured_values import ValuesCommand, numbers
 from gaplab.api.commands.questions import confirmed
 from gaplab.api.commands.request_words import print_safety, request_table, request_words, stored_words
 from gaplab.schemas.corrections import Consequences
 from gaplab.schemas.measurements import RequestRead
 from gaplab.schemas.traces import TracesRead
+from gaplab.services.core.csv_tables import finite
 
 RequestId = Annotated[str, typer.Argument(metavar="REQUEST", help="a request, as `gaplab requests` lists it")]
 AnswerId = Annotated[str, typer.Argument(metavar="MEASUREMENT", help="a measurement, as `gaplab requests ID` lists it")]
@@ -28,6 +31,16 @@ Operator = Annotated[str | None, typer.Option("--operator", help="person who mea
 By = Annotated[str | None, typer.Option("--operator", help="person who says so", show_default=False)]
 Yes = Annotated[bool, typer.Option("--yes", help="send it without a question, also if it is unlikely")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="only say what would follow")]
+
+_NEGATIVE = re.compile(r"-\.?\d")
+
+
+class ValuesCommand(TyperCommand):
+    """A command that takes -0.3 as a number; other commands take it as the option -0."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - in a private module of Typer
+        """Parse arguments; a space before a negative number says that it is no option, and means nothing to `float`."""
+        return super().parse_args(ctx, [f" {each}" if _NEGATIVE.match(each) else each for each in args])
 
 
 @app.command(rich_help_panel=BENCH)
@@ -79,7 +92,7 @@ def measured(  # noqa: PLR0913, PLR0917 - each is an option of the command
     url: Url = None,
 ) -> None:
     """Answer a request by hand: with the fitness of each repeat, or --failed and why."""
-    measured, details = numbers(values), _given(failed=failed, note=note, operator=operator)
+    measured, details = _numbers(values), _given(failed=failed, note=note, operator=operator)
     with connect(url) as client:
         sure = yes or confirmed(client.bench.doubts(id, measured, **details))
         details["confirmed"] = sure
@@ -135,7 +148,7 @@ def correct(  # noqa: PLR0913, PLR0917 - each is an option of the command
     url: Url = None,
 ) -> None:
     """Replace the values of a measurement; what was computed from them is computed again."""
-    right, details = numbers(values), _given(failed=failed, operator=operator)
+    right, details = _numbers(values), _given(failed=failed, operator=operator)
     with connect(url) as client:
         found = client.bench.correct(id, right, reason=reason, dry_run=dry_run, **details)
     _print_consequences(found, dry_run=dry_run, as_json=as_json)
@@ -223,3 +236,17 @@ def _nothing(client: Client, experiment: str | None, bench: str | None, *, all_:
 
 def _print_consequences(found: Consequences, *, dry_run: bool, as_json: bool) -> None:
     print_result(found, f"{'It would be done' if dry_run else 'Done'}: {found.words}.", as_json=as_json)
+
+
+def _numbers(values: Iterable[str] | None) -> list[float] | None:
+    """Return measured values as numbers; None if there are none.
+
+    Raises:
+        typer.BadParameter: a value is not a finite number; its place is counted from 1.
+    """
+    found = list[float]()
+    for place, text in enumerate(map(str.strip, values or ()), start=1):
+        if (number := finite(text)) is None:
+            raise typer.BadParameter(f"value {place}: {text!r} is not a finite number, like 0.41", param_hint="VALUE")
+        found.append(number)
+    return found or None

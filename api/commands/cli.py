@@ -4,7 +4,14 @@ import sys
 from collections.abc import Sequence
 
 from gaplab.api.clients.confirmation import NotSubmitted
-from gaplab.api.clients.errors import ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable, lines_of
+from gaplab.api.clients.errors import (
+    ExperimentFailed,
+    ExtraMissing,
+    ServiceError,
+    ServiceUnreachable,
+    WrongSuffix,
+    lines_of,
+)
 
 # the order of the commands in `gaplab --help`, and of its groups
 # isort: off
@@ -30,6 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _exit([str(error)], Exit.INTERRUPTED)
     except (ServiceError, ServiceUnreachable, CommandError, GaplabError) as error:
         _exit(lines_of(error.problem) if isinstance(error, ServiceError) else [str(error)], code_of(error))
+    except WrongSuffix as error:
+        _exit([str(error)], Exit.USAGE)
     except (ExperimentFailed, ExtraMissing, ValueError) as error:
         _exit([str(error)], Exit.FAILED)
     except OSError as error:

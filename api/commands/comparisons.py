@@ -6,13 +6,15 @@ from math import inf, nan
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from gaplab.api.clients.comparisons import Comparisons
-from gaplab.api.clients.progress.text import console
-from gaplab.api.commands import comparison_tables
+from gaplab.api.clients.screen import console
+from gaplab.api.commands import tables
 from gaplab.api.commands.app import RESULTS, AsJson, Ids, Url, app, connect
 from gaplab.api.commands.json_output import echo, print_json
 from gaplab.schemas.curves import Fitness
+from gaplab.services.findings.tables import comparison
 
 
 class Format(StrEnum):
@@ -90,8 +92,19 @@ def margins(text: str | None) -> tuple[float | None, float | None]:
     return (None, number / 100) if text.endswith("%") else (number, None)
 
 
+def _print_tables(pairs: Comparisons) -> None:
+    screen = console()
+    for warning in dict.fromkeys(warning for pair in pairs for warning in pair.warnings):
+        screen.print(f"! {escape(warning)}\n")
+    for grid in comparison(pairs):
+        screen.print(*tables.shown(grid))
+    for pair in pairs:
+        if pair.caution:
+            screen.print(f"! {escape(f'{pair.first_name} - {pair.second_name}: {pair.caution}')}\n")
+
+
 _PRINTERS: dict[Format, Callable[[Comparisons], None]] = {
-    Format.TABLE: lambda pairs: console().print(*comparison_tables.comparisons(pairs)),
+    Format.TABLE: _print_tables,
     Format.CSV: lambda pairs: echo(pairs.csv(), nl=False),
     Format.JSON: print_json,
     Format.LATEX: lambda pairs: echo(pairs.latex(), nl=False),

@@ -11,6 +11,7 @@ import shutil
 import signal
 import sys
 import time
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -20,10 +21,10 @@ from rich.markup import escape
 
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError
-from gaplab.api.clients.progress.text import counts
-from gaplab.api.commands import demo_size, tables
+from gaplab.api.commands import tables
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.process.local_service import start_service
+from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
 from gaplab.services.store.sqlite_file import url_of
@@ -31,7 +32,33 @@ from gaplab.services.store.sqlite_file import url_of
 SPECS = Path(__file__).parents[4] / "examples"
 STUDIES = ("toy", "quadruped")
 SIZED = "quadruped"
-"""The study whose size depends on the speed of this machine."""
+"""The study with physics, whose size is what this machine computes while a person waits."""
+
+SECONDS = 100.0
+"""Time for the study."""
+
+CHECK_ROLLOUTS = 800
+"""Rollouts of the sensitivity check, which an estimate does not count."""
+
+SIZES = (
+    (3, 3, 1.0),
+    (3, 3, 0.8),
+    (3, 3, 0.6),
+    (2, 3, 0.8),
+    (2, 3, 0.6),
+    (2, 3, 0.4),
+    (2, 2, 0.6),
+    (2, 2, 0.4),
+    (2, 2, 0.2),
+)
+"""Repetitions, iterations and the fraction of each search's evaluations, from large to small."""
+
+POPULATION = 20
+"""Evaluations of the population that a search starts with."""
+
+SEARCHES = ("controller_evaluations", "selection_evaluations", "simulator_evaluations")
+
+Spec = Mapping[str, Any]
 
 
 def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
@@ -90,14 +117,14 @@ def _run_study(name: str, spec: dict[str, Any], client: Client, folder: Path, co
     if study.state is not State.COMPLETED:
         reasons = sorted({reason for experiment in study.experiments for reason in experiment.reasons})
         raise CommandError(f"the study {name} ended as {study.state}: {'; '.join(reasons) or 'cancelled'}", Exit.FAILED)
-    console.print(f"{name}: {counts(study.progress)}")
+    console.print(f"{name}: {study.progress.text}")
     _show(name, study, client, folder, console)
 
 
 def _submitted(name: str, spec: dict[str, Any], client: Client, console: Console) -> StudyRead:
     if name == SIZED:
-        client.wait(client.submit(demo_size.trial(spec), yes=True).id, progress=False)
-        spec, reason = demo_size.sized(spec, client.estimate)
+        client.wait(client.submit(trial(spec), yes=True).id, progress=False)
+        spec, reason = sized(spec, client.estimate)
         console.print(f"\n[bold]{name}[/]: {reason}; the study is sized for this machine")
     return client.submit(spec, yes=True)
 
@@ -142,3 +169,37 @@ def _resumed(name: str, spec: dict[str, Any], client: Client, folder: Path) -> S
     except ServiceError:
         return None
     return study if study.state not in {State.FAILED, State.CANCELLED} else None
+
+
+def trial(spec: Spec) -> dict[str, Any]:
+    """Return the spec of a small experiment, from which the service learns the duration of a rollout."""
+    same = {name: spec[name] for name in ("robot", "engine", "reality", "seed") if name in spec}
+    size = {"strategy": "direct", "repetitions": 2, "budget": {"preset": "smoke", "controller_evaluations": 100}}
+    return same | size | {"name": "how long a rollout takes here"}
+
+
+def sized(spec: Spec, estimate: Callable[[Spec], EstimateRead]) -> tuple[dict[str, Any], str]:
+    """Return the largest version of the study that is estimated to fit into the time, or the smallest version.
+
+    It has every number, so it gives the same curves on any machine. The text has the machine's pace, and the duration.
+    """
+    for smaller in _versions(spec):
+        found = estimate(smaller)
+        rollout_s = max(cost.seconds_per_rollout for cost in found.engines)
+        expected_s = found.seconds + CHECK_ROLLOUTS * rollout_s / found.cores
+        if expected_s <= SECONDS:
+            break
+    pace = f"{rollout_s * 1000:.0f} ms a rollout"
+    named = smaller | {"name": f"{spec['name']}, sized for {pace}"}
+    return named, f"{pace} on {found.cores} cores: about {expected_s:.0f} s"
+
+
+def _versions(spec: Spec) -> Iterator[dict[str, Any]]:
+    for repetitions, iterations, part in SIZES:
+        budget = {name: _part(number, part) if name in SEARCHES else number for name, number in spec["budget"].items()}
+        counts = {"repetitions": repetitions, "direct_repetitions": 2 * repetitions, "iterations": iterations}
+        yield dict(spec) | counts | {"budget": budget}
+
+
+def _part(evaluations: int, part: float) -> int:
+    return max(POPULATION, round(part * evaluations))

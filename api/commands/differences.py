@@ -4,13 +4,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
+from rich.console import RenderableType
 
 from gaplab.api.clients.client import Client
 from gaplab.api.commands import completion, tables
 from gaplab.api.commands.app import RESULTS, AsJson, Url, app, connect
 from gaplab.api.commands.json_output import print_result
 from gaplab.schemas.differences import SpecDiff
+from gaplab.services.findings.tables import differing
 
 if TYPE_CHECKING:
     from gaplab.services.specs.differences import SpecColumn
@@ -35,11 +36,9 @@ def diff(of: Compared, as_json: AsJson = False, url: Url = None) -> None:
     else:
         with connect(url) as client:
             found = client.diff(*of)
-    columns = ("setting", *(escape(column.name) for column in found.columns))
-    rows = ((escape(each.setting), *map(escape, each.texts)) for each in found.settings)
-    shown = tables.table(columns, rows) if found.settings else "No setting differs."
-    warnings = (f"! {warning}" for warning in found.warnings)
-    print_result(found, *warnings, shown, found.note, as_json=as_json)
+    grid = differing(found, [column.name for column in found.columns])
+    shown: tuple[RenderableType, ...] = tables.shown(grid) if found.settings else ("No setting differs.",)
+    print_result(found, *(f"! {warning}" for warning in found.warnings), *shown, found.note, as_json=as_json)
 
 
 def _with_files(names: list[str], url: str | None) -> SpecDiff:

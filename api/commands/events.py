@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from gaplab.api.clients.progress.text import console
+from gaplab.api.clients.screen import console
 from gaplab.api.commands import completion
 from gaplab.api.commands.app import SPECS, Url, app, connect
 from gaplab.api.commands.json_output import print_json

@@ -5,9 +5,9 @@ from typing import Any
 
 import typer
 from pydantic import TypeAdapter
-from rich.table import Table
+from rich.console import RenderableType
 
-from gaplab.api.clients.progress.text import console, printable
+from gaplab.api.clients.screen import console, printable
 
 
 def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
@@ -15,16 +15,16 @@ def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
     typer.echo(printable(text), err=err, nl=nl)
 
 
-def print_result(value: object, *shown: str | Table, as_json: bool) -> None:
+def print_result(value: object, *shown: RenderableType, as_json: bool) -> None:
     """Print the value as JSON, or for people the lines and tables that show it."""
     if as_json:
         print_json(value)
         return
     for each in shown:
-        if isinstance(each, Table):
-            console().print(each)
-        else:
+        if isinstance(each, str):
             echo(each)
+        else:
+            console().print(each)
 
 
 def print_json(value: object, *, line: bool = False) -> None:

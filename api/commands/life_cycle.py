@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from gaplab.api.clients.progress.text import state_text
+from gaplab.api.clients.progress import state_text
 from gaplab.api.commands.app import LIFE, AsJson, Id, Url, app, connect
 from gaplab.api.commands.json_output import print_result
 from gaplab.schemas.records import StudyRead

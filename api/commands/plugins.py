@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.markup import escape
 
-from gaplab.api.clients.progress.text import console
+from gaplab.api.clients.screen import console
 from gaplab.api.commands import completion, tables
 from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
@@ -59,11 +59,10 @@ def new(
 ) -> None:
     """Write a plug-in that runs, to change into your own."""
     from gaplab.services.contract.checks import write_skeleton
-    from gaplab.services.core.external_plugins import named_folders
     from gaplab.services.plugins import folders
 
-    folders.find()
-    named = named_folders()
+    folders.load()
+    named = folders.named()
     file = write_skeleton(kind, name, folder or (named[0] if named else Path("plugins")))
     is_found = file.absolute().parent in named
     start = "" if is_found else f"\nLet the service find it: export GAPLAB_PLUGINS={file.absolute().parent}"
@@ -79,8 +78,7 @@ def check(
     from gaplab.services.contract.checks import check_file
     from gaplab.services.plugins import folders
 
-    folders.find()
-    found = list(check_file(file))
+    found = list(check_file(file, folders.named()))
     if as_json:
         print_json(found)
     else:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from gaplab.api.clients.confirmation import Ask, is_yes
-from gaplab.api.clients.progress.text import printable
+from gaplab.api.clients.screen import printable
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import echo
 

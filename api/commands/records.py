@@ -4,10 +4,9 @@ from typing import Annotated
 
 import typer
 from pydantic import ValidationError
-from rich.markup import escape
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.progress.text import best, console, counts
+from gaplab.api.clients.screen import console
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import LIFE, RESULTS, SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
@@ -17,6 +16,7 @@ from gaplab.schemas.misfit import TunableVerdict
 from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.provenance import ProvenanceUse
 from gaplab.schemas.records import StudyRead
+from gaplab.services.findings.tables import tuned
 
 
 @app.command("list", rich_help_panel=RESULTS)
@@ -59,7 +59,7 @@ def show(
     if as_json:
         print_json({"study": study})
         return
-    parts = (tables.overview([study]), counts(study.progress), *map(escape, best(study)))
+    parts = (tables.overview([study]), study.progress.text, *tables.best(study))
     console().print(*parts, tables.overview(study.experiments), sep="\n")
     print_warnings(study)
 
@@ -120,12 +120,13 @@ def _show_one(client: Client, study: StudyRead, *, as_json: bool, with_spec: boo
         print_json({"study": study, "repetitions": repetitions, "provenance": provenance, "misfit": misfit})
         return
     screen = console()
-    shown = (counts(experiment.progress), tables.repetitions(repetitions, experiment))
+    shown = (experiment.progress.text, tables.repetitions(repetitions, experiment))
     screen.print(tables.overview([study]), *shown, sep="\n")
     for use in provenance.uses:
         screen.print(f"computed with {_software(use)}", markup=False, soft_wrap=True)
     if misfit.remarks:
-        screen.print(tables.tuned(misfit), *misfit.remarks, *map(_verdict, misfit.verdicts), sep="\n", markup=False)
+        told = (*misfit.remarks, *map(_verdict, misfit.verdicts))
+        screen.print(*tables.shown(tuned([(experiment.name, misfit.points[-1])])), *told, sep="\n", markup=False)
     if with_spec:
         screen.print_json(data=experiment.spec)
     print_warnings(study)

@@ -10,12 +10,13 @@ from pydantic import ValidationError
 from rich.markup import escape
 from rich.table import Table
 
-from gaplab.api.clients.progress.text import console
+from gaplab.api.clients.screen import console
 from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
-from gaplab.api.commands.tables import minute
+from gaplab.api.commands.tables import minute, table
 from gaplab.schemas.mistakes import sentence
+from gaplab.schemas.robots import RobotRead
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def _imported(file: Path, options: "ImportOptions") -> "ImportedFile":
     from gaplab.services.robots.importing import import_robot
     from gaplab.services.specs.robots import robot_of_file
 
-    folders.find()
+    folders.load()
     imported = import_robot(file, options)
     try:
         robot_of_file(imported.robot)
@@ -155,11 +156,10 @@ def _lines(imported: "ImportedFile", written: Path) -> Iterator[str | Table]:
 
 
 def _mass_table(imported: "ImportedFile") -> Table:
-    table = Table("body", "of the file's", "kg in the file", "kg imported", box=None)
-    for row in imported.masses:
-        table.add_row(escape(row.body), str(len(row.members)), f"{row.before_kg:.6g}", f"{row.after_kg:.6g}")
-    table.add_row("all", "", f"{imported.before_kg:.6g}", f"{imported.after_kg:.6g}", style="bold")
-    return table
+    rows = [(escape(row.body), f"{len(row.members)}", row.before_kg, row.after_kg) for row in imported.masses]
+    rows.append(("[bold]all[/]", "", imported.before_kg, imported.after_kg))
+    columns = ("body", "of the file's", "kg in the file", "kg imported")
+    return table(columns, ((*words, f"{before:.6g}", f"{after:.6g}") for *words, before, after in rows))
 
 
 @robot.command()
@@ -197,9 +197,11 @@ def list_(as_json: AsJson = False, url: Url = None) -> None:
     """List the robots from files that the service has, the newest of a name first."""
     with connect(url) as client:
         found = client.robots()
-    table = Table("name", "sha256", "bodies", "actuators", "kg", "file", "stored", box=None)
-    for each in found:
-        size = str(each.bodies), str(each.actuators), f"{each.mass_kg:.4g}"
-        table.add_row(escape(each.name), each.sha256[:12], *size, escape(each.file or "-"), minute(each.created_at))
-    shown = table if found else "No robot is stored; `gaplab robot add FILE` stores one."
+    columns = ("name", "sha256", "bodies", "actuators", "kg", "file", "stored")
+    shown = table(columns, map(_row, found)) if found else "No robot is stored; `gaplab robot add FILE` stores one."
     print_result(found, shown, as_json=as_json)
+
+
+def _row(found: RobotRead) -> tuple[str, ...]:
+    size = f"{found.bodies}", f"{found.actuators}", f"{found.mass_kg:.4g}"
+    return escape(found.name), found.sha256[:12], *size, escape(found.file or "-"), minute(found.created_at)

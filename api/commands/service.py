@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gaplab.api.clients.progress.text import console
+from gaplab.api.clients.screen import console
 from gaplab.api.commands.app import RUNNING, app
 from gaplab.services.settings import Settings
 
@@ -17,11 +17,18 @@ def serve(
     workers: Annotated[
         bool, typer.Option("--workers/--no-workers", help="run experiments, or only accept and show them")
     ] = True,
+    reload: Annotated[
+        bool, typer.Option("--reload", help="start again when a plug-in file changes: for authors of plug-ins")
+    ] = False,
 ) -> None:
     """Run the service: migrate the database, answer over HTTP and run queued experiments. Ctrl-C ends it."""
     from gaplab.api.process.service import serve as run
+    from gaplab.api.process.service import serve_again_after_edits
 
-    run(Settings.from_environment().bound(host, port), workers=workers)
+    settings = Settings.from_environment().bound(host, port)
+    if reload:
+        raise typer.Exit(serve_again_after_edits(settings, workers=workers))
+    run(settings, workers=workers)
 
 
 @app.command(rich_help_panel=RUNNING)

@@ -29,7 +29,7 @@ def column_of(file: Path) -> SpecColumn:
         if file.suffix == ".zip":
             return SpecColumn(file.name, file.stem, _archived(file))
         spec = read_spec(str(file))
-        folders.find()
+        folders.load()
         return SpecColumn(file.name, spec.get("name") or file.stem, _completed(spec))
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror or error}", Exit.FILE) from error

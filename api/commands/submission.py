@@ -10,7 +10,8 @@ import typer
 
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.confirmation import confirm, sentence
-from gaplab.api.clients.progress.text import console, counts, state_text
+from gaplab.api.clients.progress import state_text
+from gaplab.api.clients.screen import console
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
@@ -19,6 +20,7 @@ from gaplab.api.commands.questions import keyboard
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
+from gaplab.services.findings.tables import sensitivity as effects
 
 SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - for standard input")]
 
@@ -88,7 +90,7 @@ def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> Non
     with connect(url) as client:
         check = client.check(read_spec(spec))
     if as_json or check.state is State.COMPLETED:
-        print_result(check, tables.sensitivity(check), *check.warnings, as_json=as_json)
+        print_result(check, *tables.shown(effects(check, check.spec.robot.name)), *check.warnings, as_json=as_json)
     if check.state is not State.COMPLETED:
         raise CommandError(f"the check {check.id} ended as {check.state}: {check.reason}", Exit.FAILED)
 
@@ -100,7 +102,7 @@ def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  
     except KeyboardInterrupt:
         msg = f"the service continues with it; `gaplab watch {id}` shows the progress again"
         raise CommandError(msg, Exit.INTERRUPTED) from None
-    print_result(record, f"{record.name}: {state_text(record)}; {counts(record.progress)}.", as_json=as_json)
+    print_result(record, f"{record.name}: {state_text(record)}; {record.progress.text}.", as_json=as_json)
     for reason in sorted({reason for experiment in record.experiments for reason in experiment.reasons}):
         echo(f"  {reason}", err=True)
     print_warnings(record)

@@ -7,16 +7,16 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
-from gaplab.api.clients.progress.text import Record, colored, fitness, left, percent, standing
+from gaplab.api.clients.progress import Record, colored, left, percent, standing
 from gaplab.api.commands.completion import KINDS
 from gaplab.schemas.curves import Curve, CurvePoint, from_before
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.misfit import MisfitRead, TunableDistribution
 from gaplab.schemas.plugin import Catalogue, PluginRead
 from gaplab.schemas.records import ExperimentRead, RepetitionRead, StudyRead
-from gaplab.schemas.sensitivity import Sensitivity, SensitivityRead
 from gaplab.services.figures.words import titled
+from gaplab.services.findings.tables import Grid
 
 
 def overview(records: Iterable[Record]) -> Table:
@@ -81,20 +81,12 @@ def plugin(found: PluginRead) -> list[Table | str]:
     return [*lines, table(("option", "default", "meaning"), options) if options else "no options"]
 
 
-def sensitivity(found: SensitivityRead) -> Table:
-    """Return a table of the effect of each tunable on fitness."""
-    columns = ("tunable", "over", f"effect, {found.unit}", "of the spread", "roughness", "nan", "verdict")
-    return table(columns, map(_effect, found.tunables))
+def shown(grid: Grid) -> tuple[Text, Table]:
+    """Return a table of findings for a terminal, below its caption."""
+    return Text(grid.caption), table(map(escape, grid.head), (map(escape, row) for row in grid.rows))
 
 
-def tuned(found: MisfitRead) -> Table:
-    """Return a table of the tunables of the best simulators at the latest iteration, over repetitions."""
-    last = found.points[-1]
-    columns = (f"tuned at {last.iteration}", "mean ± SD", "least", "greatest", "at a bound")
-    return table(columns, map(_tuned, last.tunables))
-
-
-def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+def table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> Table:
     """Return a table whose long cells are folded."""
     made = Table(box=SIMPLE_HEAD, pad_edge=False)
     for column in columns:
@@ -104,19 +96,29 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     return made
 
 
-def number(value: float | None) -> str:
-    """Return a number with three digits; - for None."""
-    return "-" if value is None else f"{value:.3g}"
-
-
 def minute(moment: datetime | None) -> str:
     """Return a moment in local time, to the minute; nothing for None."""
     return moment.astimezone().strftime("%Y-%m-%d %H:%M") if moment else ""
 
 
+def best(study: StudyRead) -> list[str]:
+    """Return a sentence about the fittest experiment of a study; none without a result."""
+    if not (found := study.best):
+        return []
+    evaluations = f"{found.evaluations} real-world evaluation{'' if found.evaluations == 1 else 's'}"
+    mean = f"mean {found.mean:.3f} after {evaluations}{from_before(found.known)}"
+    return [escape(f"best: {found.name.replace('_', ' ')}, {mean} (n = {found.n})")]
+
+
+def _fitness(record: Record) -> str:
+    """Return the fitness of an experiment, or of a study's best, with its number of evaluations: "0.585 at 10"."""
+    found = record.best if isinstance(record, StudyRead) else record.fitness
+    return f"{found.mean:.3f} at {found.evaluations}{from_before(found.known)}" if found else "-"
+
+
 def _record(record: Record) -> tuple[str, ...]:
     many = f" ({len(record.experiments)})" if isinstance(record, StudyRead) and len(record.experiments) > 1 else ""
-    progress = (fitness(record), percent(record.progress), left(record))
+    progress = (_fitness(record), percent(record.progress), left(record))
     tags = f" [dim]{escape(' '.join(record.tags))}[/]" if isinstance(record, StudyRead) and record.tags else ""
     return record.id, escape(record.name) + many + tags, standing(record), *progress, minute(record.created_at)
 
@@ -150,15 +152,6 @@ def _parts(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for name, value in fields.items():
         if value != {}:
             yield name, f"({_in_words(value)})" if isinstance(value, dict) else _in_words(value)
-
-
-def _effect(found: Sensitivity) -> tuple[str, ...]:
-    numbers = map(number, (found.effect, found.relative_effect, found.roughness))
-    return found.name, f"{found.values[0]:g} to {found.values[-1]:g}", *numbers, f"{found.failures}", found.verdict
-
-
-def _tuned(found: TunableDistribution) -> tuple[str, ...]:
-    return found.name, found.text, number(found.least), number(found.greatest), found.at_bounds or "-"
 
 
 def _mean(point: CurvePoint | None) -> str:

@@ -50,7 +50,7 @@ def simulator(
     from gaplab.services.core.stored_specs import spec_of
     from gaplab.services.plugins import folders
 
-    folders.find()
+    folders.load()
     with connect(url) as client:
         best, spec = client.results.best_simulator(id), spec_of(client.spec(id).resolved[0])
         if spec.robot.name == robot_library.IMPORTED:

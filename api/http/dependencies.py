@@ -23,7 +23,6 @@ from gaplab.services.core.errors import InvalidSpec, NotFound, StoreUnavailable
 from gaplab.services.core.nesting import refuse_too_deep
 from gaplab.services.experiments.idempotency import Once
 from gaplab.services.experiments.limits import Admission
-from gaplab.services.plugins import watching
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.settings import Limits
 from gaplab.services.store.session import Store
@@ -131,11 +130,6 @@ async def take_place(request: Request, _: Annotated[None, Depends(refuse_malform
         yield
     finally:
         places.release()
-
-
-def reload_plugins() -> None:
-    """Import the plug-ins again if their files were changed, so that a request needs no restart of the service."""
-    watching.reload()
 
 
 class Parameters(BaseModel):

@@ -176,7 +176,7 @@ def serve_api(
     """
     limits, notify = limits or Limits.from_environment(), notify or Notify.from_environment()
     exit_on_signals()
-    folders.load()
+    folders.load(warn=True)
     require_token(settings)
     with Store(settings.database_url) as store, in_use(store.file):
         app = create_app(store, settings, limits, notify)

@@ -4,17 +4,26 @@ The supervisor that runs them is a separate process. The two meet only in the da
 """
 
 import logging
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from gaplab.api.process.child_process import end, start
+from gaplab.api.process.errors import CommandError
 from gaplab.api.process.server import exit_on_signals, listen, require_token, serve_api
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.services import logs
-from gaplab.services.plugins import folders
+from gaplab.services.plugins import contents, folders
 from gaplab.services.settings import Limits, Notify, Settings, address
 from gaplab.services.store.engine import parse
 from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import file_of, is_open_to_others
+
+LOOK_S = 0.5
+"""Time between two looks for changed plug-in files."""
+
+END_S = 60.0
+"""Longest wait for the end of a service that is started again."""
 
 log = logging.getLogger("gaplab.service")
 
@@ -35,7 +44,7 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     limits, notify = Limits.from_environment(), Notify.from_environment()  # before anything is changed or started
     logs.configure()
     exit_on_signals()
-    folders.load()
+    folders.load(warn=True)
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
     require_token(settings)
@@ -47,6 +56,37 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
         return
     with _kept_supervisor(settings) as supervisor:
         serve_api(settings, listener, supervisor, limits=limits, notify=notify)
+
+
+def serve_again_after_edits(settings: Settings, *, workers: bool = True) -> int:
+    """Serve in another process, and start that again whenever a plug-in file changes.
+
+    Args:
+        settings: settings of the API and the supervisor.
+        workers: whether to run experiments.
+
+    Returns:
+        exit code of a service that ended by itself.
+
+    Raises:
+        CommandError: there is no folder to watch.
+    """
+    if not (watched := folders.named()):
+        raise CommandError(f"--reload watches the folders of {folders.VARIABLE}, which names none")
+    logs.configure()
+    exit_on_signals()
+    arguments = ("serve",) if workers else ("serve", "--no-workers")
+    while True:
+        before = contents.state(watched)
+        service = start("gaplab", *arguments, environment=environment_of(settings))
+        try:
+            while (code := service.poll()) is None and contents.state(watched) == before:
+                time.sleep(LOOK_S)
+        finally:
+            end(service, patience_s=END_S)
+        if code is not None:
+            return code
+        log.info("a plug-in file was changed: the service starts again")
 
 
 @contextmanager

@@ -10,14 +10,15 @@ from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.routes.curves import FITNESS, Ids
+from gaplab.schemas.comparison_columns import COLUMNS, row
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Fitness
 from gaplab.schemas.differences import SpecDiff
+from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.experiments.reading import read_differences
-from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex
+from gaplab.services.findings.tables import comparison, latex
 from gaplab.services.results.comparisons import Margin, compare, warnings_of
-from gaplab.services.results.curves import unit_of
 
 router = APIRouter(tags=["curves"])
 
@@ -104,10 +105,9 @@ def compare_experiments(
         renamed = (replace(each, pointer=each.pointer.removesuffix("_evaluations")) for each in error.violations)
         raise InvalidSpec(renamed) from error
     if query.format == "csv":
-        return attachment(comparisons_csv(pairs), "text/csv", "gaplab-comparisons.csv")
+        return attachment(csv_text(COLUMNS, map(row, pairs)), "text/csv", "gaplab-comparisons.csv")
     if query.format == "latex":
-        unit = unit_of(store, pairs[0].first)
-        return attachment(comparisons_latex(pairs, unit), "application/x-latex", "gaplab-comparisons.tex")
+        return attachment(latex(comparison(pairs)), "application/x-latex", "gaplab-comparisons.tex")
     return pairs
 
 

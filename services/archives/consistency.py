@@ -1,6 +1,6 @@
 """Checks that the rows of an archive belong together, and that this installation can show its experiments."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 from pydantic import ValidationError
@@ -42,18 +42,20 @@ def checked_experiments(rows: Rows, study: str) -> dict[str, Row]:
         InvalidArchive: a spec is invalid, or an experiment belongs to another study.
     """
     experiments = dict[str, Row]()
-    _learn_robots(rows)
+    robots_within = _learn_robots(rows)
     for row in rows("experiment"):
         if row["study_id"] != study:
             raise InvalidArchive(f"the experiment {row['id']!r} belongs to another study than {study!r}")
-        spec = _checked_spec(row)
+        spec = _checked_spec(row, robots_within)
         experiments[row["id"]] = row | {"spec": spec, "robot": _on_a_bench(row["id"], spec)}
     if study in experiments and len(experiments) > 1:
         raise InvalidArchive(f"an experiment among others has the id {study!r} of the study")
     return experiments
 
 
-def _learn_robots(rows: Rows) -> None:
+def _learn_robots(rows: Rows) -> set[str]:
+    """Let this process know the robot files of an archive, and return their hashes."""
+    found = set[str]()
     for row in rows("robot"):
         try:
             file = read_robot_file(row["text"])
@@ -62,6 +64,8 @@ def _learn_robots(rows: Rows) -> None:
         if (file.sha256, file.name, file.text) != (row["sha256"], row["name"], row["text"]):
             raise InvalidArchive(f"the robot {row['name']!r} has another hash or name than its file")
         robot_library.learn([file.text])
+        found.add(file.sha256)
+    return found
 
 
 def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
@@ -138,7 +142,7 @@ def _check_provenance(row: Row) -> None:
         raise InvalidArchive(f"the facts of provenance {row['id']!r} belong to another id")
 
 
-def _checked_spec(row: Row) -> Row:
+def _checked_spec(row: Row, robots_within: Collection[str]) -> Row:
     """Return the spec to store; unknown parameters of reality are null."""
     place, given = f"the spec of experiment {row['id']!r}", row["spec"]
     if row["spec_version"] > SPEC_VERSION:
@@ -154,9 +158,8 @@ def _checked_spec(row: Row) -> Row:
     names = [each.name for each in spec.tunables]
     wrong = [name for name in (*truth, *names) if plain_name(name) not in tunables]
     wrong += [] if spec.robot.name in robots else [spec.robot.name]
-    if spec.robot.name == IMPORTED and not robot_library.needed_by(spec.robot):
-        msg = f"{place} names the robot {label_of(spec.robot)!r}, whose file is neither in the archive nor stored here"
-        raise InvalidArchive(f"{msg}; add it before: gaplab robot add")
+    if spec.robot.name == IMPORTED and spec.robot.options.get("sha256") not in robots_within:
+        raise InvalidArchive(f"{place} names the robot {label_of(spec.robot)!r}, whose file is not in the archive")
     if wrong or len(set(names)) < len(names) or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names plug-ins that are not installed here: {', '.join(wrong)[:200]}"
         raise InvalidArchive(msg)

@@ -2,7 +2,7 @@
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
@@ -22,7 +22,7 @@ from gaplab.services.core import robot_library
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins import folders
-from gaplab.services.plugins.external import imported_files
+from gaplab.services.plugins.external import named_files
 from gaplab.services.running import provenance
 from gaplab.services.running.versions import provenance as provenance_here
 from gaplab.services.specs.shortening import shortest
@@ -127,7 +127,7 @@ def rerun_all(recorded: Sequence[Recorded], cores: int | None) -> Iterator[Repet
     of its processes, so the first repetition without a result is tried alone, and those after it in another pool.
     Repetitions with other external plug-ins have other processes.
     """
-    for plugins, some in groupby(recorded, lambda each: imported_files(each.spec)):
+    for plugins, some in groupby(recorded, lambda each: named_files(each.spec)):
         left = deque(some)
         while left:
             with _pool(cores, plugins) as processes, suppress(BrokenProcessPool):
@@ -138,7 +138,7 @@ def rerun_all(recorded: Sequence[Recorded], cores: int | None) -> Iterator[Repet
                 yield _rerun_alone(left.popleft(), plugins)
 
 
-def _rerun_alone(recorded: Recorded, plugins: tuple[str, ...]) -> RepetitionRerun:
+def _rerun_alone(recorded: Recorded, plugins: Mapping[str, str]) -> RepetitionRerun:
     try:
         with _pool(1, plugins) as process:
             return process.submit(rerun, recorded).result()
@@ -146,7 +146,7 @@ def _rerun_alone(recorded: Recorded, plugins: tuple[str, ...]) -> RepetitionReru
         return result_of(recorded, "not computed", 0, "its process died: it was killed, or ran out of memory")
 
 
-def _pool(cores: int | None, plugins: tuple[str, ...]) -> ProcessPoolExecutor:
+def _pool(cores: int | None, plugins: Mapping[str, str]) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(cores, get_context("spawn"), folders.use, (plugins,))
 
 

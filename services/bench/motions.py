@@ -5,8 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, Literal
 
-import yaml
-
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.controllers.actuation import middles
@@ -138,11 +136,14 @@ def _ros2(motion: Motion, world: World) -> str:
             at[max(before, now - ramp_ns)] = last
         at[now] = last = targets
         before = now
-    points = [{"positions": targets, "time_from_start": _time(place)} for place, targets in at.items()]
-    told = {"joint_names": [joint.name for joint in world.actuators], "points": points}
     remarks = [f"The motion begins at {REST_S:g} s. {between_repeats(world)}", *_fastest(world.actuators, at)]
-    comments = "".join(f"# {remark}\n" for remark in remarks)
-    return comments + str(yaml.safe_dump(told, sort_keys=False, default_flow_style=None))
+    lines = [f"# {remark}" for remark in remarks]
+    lines += [f"joint_names: {json.dumps([joint.name for joint in world.actuators])}", "points:"]
+    for place, targets in at.items():
+        seconds, nanoseconds = divmod(place, 10**9)
+        lines.append(f"- positions: [{', '.join(map(_number, targets))}]")
+        lines.append(f"  time_from_start: {{sec: {seconds}, nanosec: {nanoseconds}}}")
+    return "\n".join(lines) + "\n"
 
 
 def _fastest(actuators: Sequence[Joint], at: Mapping[int, Sequence[float]]) -> Iterator[str]:
@@ -162,5 +163,7 @@ def _points(motion: Motion, world: World) -> list[tuple[float, list[float]]]:
     return [*kept, (end, kept[-1][1])]
 
 
-def _time(nanoseconds: int) -> dict[str, int]:
-    return {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}
+def _number(value: float) -> str:
+    """Return a number as YAML reads one: with a point, also before an exponent."""
+    text = repr(value)
+    return text if "." in text else text.replace("e", ".0e")

@@ -1,7 +1,7 @@
 """Checks of plug-ins by kind, their results for a file, and skeletons to begin with."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from inspect import getdoc
@@ -21,10 +21,10 @@ from gaplab.services.contract import (
     tunables,
     tuners,
 )
-from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError
-from gaplab.services.plugins.external import REGISTRIES
+from gaplab.services.plugins import loading
 from gaplab.services.plugins.ignored import NO_CLASS, why_no_plugin
+from gaplab.services.specs.registries import REGISTRIES
 
 Check = Callable[[type[Any]], None]
 
@@ -145,7 +145,7 @@ def _class_name(name: str) -> str:
     return "".join(part.capitalize() for part in name.split("_"))
 
 
-def check_file(file: Path) -> Iterator[CheckedPlugin]:
+def check_file(file: Path, folders: Sequence[Path] = ()) -> Iterator[CheckedPlugin]:
     """Import a file, and yield each of its plug-ins, checked.
 
     The file can import others of its folder and of the plug-in folders. Outside the plug-in folders, no other file is
@@ -153,6 +153,7 @@ def check_file(file: Path) -> Iterator[CheckedPlugin]:
 
     Args:
         file: a module, or the folder of a package, or its `__init__.py`.
+        folders: the plug-in folders.
 
     Raises:
         FileNotFoundError: there is no such file.
@@ -162,17 +163,15 @@ def check_file(file: Path) -> Iterator[CheckedPlugin]:
         raise FileNotFoundError(2, "there is no such file", str(file))
     path = file.absolute().parent if file.name == "__init__.py" else file.absolute()
     module = f"{path.name}/" if path.is_dir() else path.name
-    others = external_plugins.folders()
-    if path.parent in others:
-        external_plugins.set_folders(others)
+    if path.parent in folders:
+        loading.load(folders)
     else:
-        external_plugins.set_folders((path.parent, *others), only={path.name.removesuffix(".py")})
+        loading.load((path.parent, *folders), only={path.name.removesuffix(".py")})
     found = False
     for kind, registry in REGISTRIES.items():
-        own = [plugin for plugin in registry.values() if (external_plugins.file_of(plugin) or "").startswith(module)]
-        for plugin in own:
+        for name in [name for name, place in registry.files.items() if place.startswith(module)]:
             found = True
-            yield CheckedPlugin(kind, plugin.name, tuple(results(kind, plugin)))
+            yield CheckedPlugin(kind, name, tuple(results(kind, registry[name])))
     for name, refused_kind, why in _unusable(module):
         found = True
         yield CheckedPlugin(refused_kind or "plug-in", name, unusable=why)
@@ -189,5 +188,6 @@ def _needed(path: Path) -> str:
 
 def _unusable(module: str) -> list[tuple[str, str | None, str]]:
     """Return name, kind and reason of each plug-in of a file that cannot be used, once."""
-    all_ = [each for registry in REGISTRIES.values() for each in registry.refused if each.file.startswith(module)]
-    return list({(each.name, each.why): (each.name, each.kind, each.why) for each in all_}.values())
+    every = (each for registry in REGISTRIES.values() for each in registry.refused.values())
+    found = [each for each in every if each.file.startswith(module)]
+    return list({(each.name, each.why): (each.name, each.kind, each.why) for each in found}.values())

@@ -6,6 +6,7 @@ What is read may have any usual separator, and a byte order mark.
 import csv
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from math import isfinite
 from typing import NamedTuple
 
 SEPARATORS = ",;\t"
@@ -51,22 +52,39 @@ class CsvRow(NamedTuple):
     error: str = ""
 
 
-def lines_of(text: str) -> list[str]:
-    """Return the lines of a file."""
-    return text.removeprefix("\ufeff").splitlines()
+class CsvTable(NamedTuple):
+    """A table as it is read; blank rows are left out.
 
-
-def first_of(lines: Sequence[str]) -> str:
-    """Return the first line that is not blank, "" if there is none."""
-    return next((line for line in lines if line.strip()), "")
-
-
-def rows_of(lines: Sequence[str]) -> Iterator[CsvRow]:
-    """Yield the rows that are not blank; the last may be an error.
-
-    The separator is the one that the first line has most of.
+    Attributes:
+        header: its first row; of line 1 without cells if there is none.
+        rows: those below; the last that is read may be an error.
+        lines: number of lines of the file.
     """
-    rows = csv.reader(lines, delimiter=max(SEPARATORS, key=first_of(lines).count), skipinitialspace=True)
+
+    header: CsvRow
+    rows: Iterator[CsvRow]
+    lines: int
+
+
+def read_csv(text: str) -> CsvTable:
+    """Return the table in a file; its separator is the one that its first line has most of."""
+    lines = text.removeprefix("\ufeff").splitlines()
+    rows = _rows(lines)
+    return CsvTable(next(rows, CsvRow(1, [])), rows, len(lines))
+
+
+def finite(cell: str) -> float | None:
+    """Return the finite number of a cell; None if it has none. Decimals have a point, and digits have no groups."""
+    try:
+        number = float(cell)
+    except ValueError:
+        return None
+    return number if isfinite(number) and "_" not in cell else None
+
+
+def _rows(lines: Sequence[str]) -> Iterator[CsvRow]:
+    first = next(filter(str.strip, lines), "")
+    rows = csv.reader(lines, delimiter=max(SEPARATORS, key=first.count), skipinitialspace=True)
     try:
         for row in rows:
             cells = [

@@ -1,20 +1,26 @@
-"""Plug-ins: each file in a plug-in folder is one plug-in; `external_plugins` imports those outside gaplab."""
+"""Plug-ins: each module in the package of a kind has one of gaplab's own, and external ones are put beside them."""
 
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from inspect import cleandoc, isabstract
+from pathlib import PurePath
 from pkgutil import iter_modules
-from types import ModuleType
+from traceback import walk_tb
 from typing import Any, ClassVar, Generic, TypeVar
 
 from pydantic import ValidationError
 
 from gaplab.schemas.base import Frozen
+from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
 from gaplab.schemas.plugin import PluginRead, PluginRef
-from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, unknown_name
-from gaplab.services.core.plugin_faults import Unusable, option_violation, quoted, remedied
+
+EXTERNAL = "gaplab_plugins"
+"""Package of the external plug-ins, whose files import each other as `from gaplab_plugins.other import …`."""
+
+LONGEST = 300
+"""Longest message of a plug-in's own error that is quoted, in characters."""
 
 
 class NoOptions(Frozen):
@@ -48,7 +54,7 @@ class Plugin:
         return PluginRead(
             name=cls.name,
             summary=summary,
-            source=_source(cls),
+            source=cls.source,
             options=cls.Options.model_json_schema(),
             details=cls.details(),
         )
@@ -63,77 +69,78 @@ P = TypeVar("P", bound=Plugin)
 
 
 @dataclass(frozen=True)
-class _Found(Generic[P]):
-    usable: dict[str, type[P]]
-    unusable: dict[str, Unusable]
+class Unusable:
+    """An external plug-in that specs cannot use.
+
+    Attributes:
+        file: the file relative to its folder.
+        name: the name that specs would call it.
+        kind: its kind; None if the file does not tell.
+        why: one sentence with the remedy.
+    """
+
+    file: str
+    name: str
+    kind: str | None
+    why: str
 
 
 class Registry(Mapping[str, type[P]], Generic[P]):
     """The usable plug-ins of one kind, by name, in alphabetical order.
 
-    The first use imports every module of `package` and every external plug-in. A broken external one is `unusable`.
+    The first use imports gaplab's own, from every module of `package`.
+
+    Attributes:
+        kind: the kind.
+        base: base class of the plug-ins.
+        files: the file of each external plug-in, relative to its folder, by name.
+        refused: the external plug-ins that specs cannot use, by their names in the catalogue.
     """
 
     def __init__(self, kind: str, package: str, base: type[P]) -> None:
-        self.kind = kind
+        self.kind, self.base = kind, base
+        self.files: Mapping[str, str] = {}
+        self.refused: Mapping[str, Unusable] = {}
         self._package = package
-        self._base = base
-        self._sorted: tuple[ModuleType | None, _Found[P]] | None = None
+        self._own: Mapping[str, type[P]] | None = None
+        self._usable: Mapping[str, type[P]] | None = None
+
+    @property
+    def own(self) -> Mapping[str, type[P]]:
+        """Gaplab's own plug-ins."""
+        if self._own is None:
+            names = [info.name for info in iter_modules(import_module(self._package).__path__)]
+            modules = [import_module(f"{self._package}.{name}") for name in names]
+            found = (each for module in modules for each in vars(module).values() if isinstance(each, type))
+            plugins = (each for each in found if issubclass(each, self.base) and not isabstract(each))
+            self._own = {each.name: each for each in plugins if hasattr(each, "name")}
+        return self._own
 
     @property
     def unusable(self) -> Mapping[str, str]:
         """Why specs cannot use an external plug-in, by its name in the catalogue."""
-        return {name: each.why for name, each in self._found.unusable.items()}
+        return {name: each.why for name, each in self.refused.items()}
+
+    def put(self, plugins: Mapping[str, type[P]], files: Mapping[str, str], refused: Mapping[str, Unusable]) -> None:
+        """Put external plug-ins beside gaplab's own, in place of those before; the arguments are as the attributes."""
+        self.files, self.refused = files, refused
+        self._usable = dict(sorted({**plugins, **self.own}.items()))
 
     @property
-    def refused(self) -> tuple[Unusable, ...]:
-        """The external plug-ins that specs cannot use."""
-        return tuple(self._found.unusable.values())
-
-    @property
-    def _found(self) -> _Found[P]:
-        """The plug-ins, sorted again after the plug-in folders were set again."""
-        package = external_plugins.package()
-        if self._sorted is None or self._sorted[0] is not package:
-            self._sorted = package, self._sort()
-        return self._sorted[1]
-
-    def _sort(self) -> _Found[P]:
-        usable = self._own()
-        valid, unusable = external_plugins.classes(self._base, self.kind)
-        unusable += [each for each in external_plugins.loaded().unusable if each.kind in {None, self.kind}]
-        for name in sorted({each.name for each in valid}):
-            alike = [each for each in valid if each.name == name]
-            if len(alike) == 1 and name not in usable:
-                usable[name] = alike[0]
-            else:
-                files = [external_plugins.file_of(each) or "" for each in alike]
-                unusable += _of_one_name(self.kind, name, files, ["gaplab"] if name in usable else [])
-        return _Found(dict(sorted(usable.items())), _by_name(unusable, usable))
-
-    def _own(self) -> dict[str, type[P]]:
-        modules = (
-            import_module(f"{self._package}.{info.name}")
-            for info in iter_modules(import_module(self._package).__path__)
-        )
-        return {
-            each.name: each
-            for module in modules
-            for each in vars(module).values()
-            if isinstance(each, type)
-            and issubclass(each, self._base)
-            and not isabstract(each)
-            and hasattr(each, "name")
-        }
+    def _all(self) -> Mapping[str, type[P]]:
+        if self._usable is None:
+            self.put({}, {}, {})
+        assert self._usable is not None
+        return self._usable
 
     def __getitem__(self, name: str) -> type[P]:
-        return self._found.usable[name]
+        return self._all[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._found.usable)
+        return iter(self._all)
 
     def __len__(self) -> int:
-        return len(self._found.usable)
+        return len(self._all)
 
     def check(self, ref: PluginRef, pointer: str = "") -> tuple[type[P], Frozen]:
         """Return the plug-in class that a spec names, and its complete options.
@@ -145,8 +152,8 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         Raises:
             InvalidSpec: the name is unknown, the plug-in is unusable, or it refuses the options.
         """
-        if (why := self.unusable.get(ref.name)) is not None:
-            message = f"the {self.kind} {ref.name!r} is not available: {why}"
+        if (refused := self.refused.get(ref.name)) is not None:
+            message = f"the {self.kind} {ref.name!r} is not available: {refused.why}"
             raise InvalidSpec([Violation(pointer, ref.name, message, tuple(self))])
         if ref.name not in self:
             raise InvalidSpec([unknown_name(pointer, self.kind, ref.name, list(self))])
@@ -155,8 +162,7 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             return plugin, plugin.Options.model_validate(ref.options)
         except ValidationError as error:
             raise InvalidSpec(
-                option_violation(plugin.name, plugin.Options, dict(each), f"{pointer}/options")
-                for each in error.errors()
+                option_violation(plugin, dict(each), f"{pointer}/options") for each in error.errors()
             ) from error
 
     def create(self, ref: PluginRef, pointer: str = "") -> P:
@@ -171,43 +177,61 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         except GaplabError:
             raise
         except Exception as error:
-            why = quoted(error, external_plugins.folders())
-            message = f"the {self.kind} {ref.name!r} cannot be created with these options: {why}"
+            message = f"the {self.kind} {ref.name!r} cannot be created with these options: {quoted(error)}"
             raise InvalidSpec([Violation(pointer, ref.model_dump(mode="json"), message)]) from error
 
     def describe(self) -> tuple[PluginRead, ...]:
         """Return the catalogue's entries of all plug-ins."""
-        found = self._found
-        entries = [*(plugin.describe() for plugin in found.usable.values()), *map(_entry, found.unusable.items())]
+        entries = [*map(self._entry, self), *(_refused_entry(*each) for each in self.refused.items())]
         return tuple(sorted(entries, key=lambda entry: entry.name))
 
+    def _entry(self, name: str) -> PluginRead:
+        """Return the entry of a plug-in; an external one that states no source has its file."""
+        entry = self[name].describe()
+        unstated = name in self.files and entry.source == Plugin.source
+        return entry.model_copy(update={"source": _source(self.files[name])}) if unstated else entry
 
-def _of_one_name(kind: str, name: str, files: list[str], owner: list[str]) -> Iterator[Unusable]:
-    """Yield for each file that its plug-in has the name of another; a file with several of them is there as often.
 
-    The owner is "gaplab", if it has the name too.
+def option_violation(plugin: type[Plugin], error: Mapping[str, Any], pointer: str = "") -> Violation:
+    """Return the violation of an option that the model of a plug-in's options refuses.
+
+    The error is an item of `ValidationError.errors()`; the pointer is the place of the options in the spec.
     """
-    for file in dict.fromkeys(files):
-        others = [*owner, *(each for each in files if each != file), "another class in it"]
-        why = f"{file} has a {kind} called {name!r}, but so has {others[0]}: rename one of them"
-        yield Unusable(file, name, kind, remedied(why))
+    place = pointer_to(error["loc"])
+    if error["type"] == "extra_forbidden":
+        names = [field.alias or name for name, field in plugin.Options.model_fields.items()]  # as specs have them
+        kind = f"option of {plugin.name!r}"
+        return unknown_name(pointer + place, kind, str(error["loc"][-1]), names or ["none"])
+    return Violation(pointer + place, error["input"], sentence(error), permitted_by(error))
 
 
-def _by_name(unusable: Iterable[Unusable], usable: Container[str]) -> dict[str, Unusable]:
-    """Return unusable plug-ins by their names in the catalogue: with the file where the name alone is another's."""
-    named: dict[str, Unusable] = {}
-    for each in unusable:
-        named[each.name if each.name not in usable and each.name not in named else f"{each.name} ({each.file})"] = each
-    return named
+def quoted(error: BaseException, place: str | None = None) -> str:
+    """Return type and message of a plug-in's error in one line of limited length, with its place.
+
+    The place is file and line; left out: those of the last code of an external plug-in that led to the error.
+    """
+    try:
+        message = error.msg if isinstance(error, SyntaxError) else str(error)
+    except Exception:  # noqa: BLE001 - an error of a plug-in may itself be broken
+        message = "its message cannot be read"
+    line = " ".join(f"{type(error).__name__}: {message}".split())
+    line = line if len(line) <= LONGEST else f"{line[: LONGEST - 1]}…"
+    place = place or _place(error)
+    return f"{line} ({place})" if place else line
 
 
-def _entry(named: tuple[str, Unusable]) -> PluginRead:
-    name, found = named
-    source = f"{found.file} of GAPLAB_PLUGINS"
-    return PluginRead(name=name, summary="", source=source, options={}, available=False, note=found.why)
+def _place(error: BaseException) -> str | None:
+    for frame, line in reversed(list(walk_tb(error.__traceback__))):
+        package, *modules = str(frame.f_globals.get("__name__")).split(".")
+        if package == EXTERNAL and modules:
+            path = PurePath(frame.f_code.co_filename)
+            return f"{'/'.join(path.parts[-len(modules) - (path.stem == '__init__') :])}, line {line}"
+    return None
 
 
-def _source(plugin: type[Plugin]) -> str:
-    """Return the stated source of a plug-in, or else the file of an external one."""
-    file = external_plugins.file_of(plugin)
-    return f"{file} of GAPLAB_PLUGINS" if file and plugin.source == Plugin.source else plugin.source
+def _refused_entry(name: str, found: Unusable) -> PluginRead:
+    return PluginRead(name=name, summary="", source=_source(found.file), options={}, available=False, note=found.why)
+
+
+def _source(file: str) -> str:
+    return f"{file} of GAPLAB_PLUGINS"

@@ -9,14 +9,13 @@ column, means that the sensor failed. Cells are separated by commas, semicolons 
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
-from math import isclose, isfinite
+from math import isclose
 
 from gaplab.schemas.measurements import MOST_VALUES, KnownSample
 from gaplab.schemas.samples import CellError, SamplesRead
-from gaplab.services.core.csv_tables import CsvRow, lines_of, rows_of
-from gaplab.services.core.errors import Violation
+from gaplab.services.core.csv_tables import CsvRow, finite, read_csv
 from gaplab.services.core.measured_values import sample_violations
 from gaplab.services.core.robots.base import Robot
 
@@ -29,12 +28,11 @@ MOST_ERRORS = 1_000
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 _GENE, _VALUE = re.compile(r"gene_(\d{1,6})"), re.compile(r"value(?:_(\d{1,6}))?")
 _READING = re.compile(r"(?P<sensor>.+)@(?P<time>\d+(?:\.\d*)?)(?:#(?P<repeat>\d{1,6}))?")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
 class SampleColumn:
-    """What a column holds.
+    """What a column holds; columns that hold the same are equal.
 
     Attributes:
         name: its heading, without a unit.
@@ -44,83 +42,92 @@ class SampleColumn:
         sensor: place of a reading's sensor.
     """
 
-    name: str
+    name: str = field(compare=False)
     kind: str
     place: int
     row: int = 0
     sensor: int = 0
 
 
-class FirstErrors:
-    """Collects errors, and counts those after `MOST_ERRORS`.
-
-    Attributes:
-        first: the first errors.
-        count: number of all errors.
-    """
-
-    def __init__(self) -> None:
-        self.first: list[CellError] = []
-        self.count = 0
-
-    def append(self, error: CellError) -> None:
-        """Add an error."""
-        self.count += 1
-        if len(self.first) < MOST_ERRORS:
-            self.first.append(error)
-
-    def extend(self, errors: Iterable[CellError]) -> None:
-        """Add errors."""
-        for error in errors:
-            self.append(error)
+Numbers = Mapping[SampleColumn, float]
 
 
 def read_samples(text: str, robot: Robot) -> SamplesRead:
     """Return the samples of the text of a table, measured on this robot, or everything that is wrong with it."""
-    rows = rows_of(lines_of(text))
-    samples, errors = list[KnownSample](), FirstErrors()
-    line, headings, broken = next(rows, CsvRow(1, []))
-    columns = [] if broken else list(_columns(line, headings, robot, errors))
-    complete = not errors.count
-    for line, cells, broken in rows:
-        numbers = {} if broken else _numbers(line, cells, columns, errors)
-        samples += _sample(line, numbers, columns, robot, errors) if numbers and complete else ()
-    if broken:
-        errors.append(CellError(line=line, message=broken))
-    if not errors.count and not 1 <= len(samples) <= MOST_SAMPLES:
+    header, rows, _ = read_csv(text)
+    return collected(_found(header, rows, robot))
+
+
+def collected(found: Iterable[KnownSample | CellError]) -> SamplesRead:
+    """Return the samples of a table, or what is wrong with it; no more than `MOST_ERRORS` errors are kept."""
+    samples, errors, more = list[KnownSample](), list[CellError](), 0
+    for each in found:
+        if isinstance(each, KnownSample):
+            samples.append(each)
+        elif len(errors) < MOST_ERRORS:
+            errors.append(each)
+        else:
+            more += 1
+    if not errors and not 1 <= len(samples) <= MOST_SAMPLES:
         permitted = f"1 to {MOST_SAMPLES:,} lines below the header"
-        errors.append(CellError(line=line, message=f"the table has {len(samples):,} samples", permitted=permitted))
-    told = tuple(errors.first)
-    return SamplesRead(samples=() if told else tuple(samples), errors=told, more=errors.count - len(told))
+        errors.append(CellError(line=1, message=f"the table has {len(samples):,} samples", permitted=permitted))
+    return SamplesRead(samples=() if errors else tuple(samples), errors=tuple(errors), more=more)
 
 
-def _columns(line: int, headings: Sequence[str], robot: Robot, errors: FirstErrors) -> Iterator[SampleColumn | None]:
-    """Yield what each column holds, None if it is unknown; add what is wrong with the header to the errors."""
-    found = []
-    for heading in headings:
-        match = _HEADING.fullmatch(heading)
-        name, unit = (match["name"], match["unit"]) if match else (heading, None)
-        column = _column(name, robot)
-        yield column
+def checked(line: int, sample: KnownSample, robot: Robot) -> list[KnownSample | CellError]:
+    """Return the sample of a line, or what is wrong with it for this robot."""
+    errors = list[KnownSample | CellError]()
+    for each in sample_violations(sample, robot):
+        _, part, *rest = each.pointer.split("/")
+        column = f"gene_{rest[0]}" if part == "genome" and rest else None
+        permitted = each.permitted if isinstance(each.permitted, str) else None
+        value = str(each.value)
+        errors.append(CellError(line=line, column=column, value=value, message=each.message, permitted=permitted))
+    return errors or [sample]
+
+
+def _found(header: CsvRow, rows: Iterable[CsvRow], robot: Robot) -> Iterator[KnownSample | CellError]:
+    """Yield what is wrong with the header, and the sample of each line or what is wrong with it."""
+    if header.error:
+        yield CellError(line=header.line, message=header.error)
+        return
+    matches = [_HEADING.fullmatch(heading) for heading in header.cells]
+    columns = [_column(match["name"], robot) if match else None for match in matches]
+    units = [match and match["unit"] for match in matches]
+    complete = True
+    for error in _of_header(header, columns, units, robot):
+        complete = False
+        yield error
+    for row in rows:
+        numbers, errors = _numbers(row, columns)
+        errors = errors or (list(_gaps(row.line, numbers)) if complete else [])
+        yield from errors
+        if complete and not errors:
+            reads = any(column and column.kind == "reading" for column in columns)
+            yield from checked(row.line, _assembled(numbers, reads, robot), robot)
+
+
+def _of_header(
+    header: CsvRow, columns: Sequence[SampleColumn | None], units: Sequence[str | None], robot: Robot
+) -> Iterator[CellError]:
+    """Yield the columns that are unknown, in another unit, twice there, or absent."""
+    line, unknown = header.line, 0
+    for heading, column, unit in zip(header.cells, columns, units, strict=True):
         if column is None:
-            if errors.count < MOST_ERRORS:  # to find the nearest name takes milliseconds
-                errors.append(_unknown(line, heading, robot))
-            else:
-                errors.count += 1
+            unknown += 1
+            yield _unknown(line, heading, robot, hint=unknown <= MOST_ERRORS)  # to find the nearest takes milliseconds
             continue
-        found.append(column)
         own = robot.sensors.units[column.sensor] if column.kind == "reading" else robot.unit
         if unit is not None and unit != own and column.kind != "gene":
-            message = f"{name} is in {own or 'no unit'}, not in {unit or 'no unit'}"
-            errors.append(CellError(line=line, column=name, value=unit, message=message, permitted=own))
-    often = Counter((column.kind, column.place, column.row, column.sensor) for column in found)
-    for column in found:
-        if often.pop((column.kind, column.place, column.row, column.sensor), 1) > 1:
-            errors.append(CellError(line=line, column=column.name, message=f"{column.name} has several columns"))
-    for name in _absent(found, robot):
-        errors.append(
-            CellError(line=line, column=name, message=f"there is no column {name}", permitted=_permitted(robot))
-        )
+            message = f"{column.name} is in {own or 'no unit'}, not in {unit or 'no unit'}"
+            yield CellError(line=line, column=column.name, value=unit, message=message, permitted=own)
+    known = [column for column in columns if column]
+    for column, often in Counter(known).items():
+        if often > 1:
+            yield CellError(line=line, column=column.name, message=f"{column.name} has several columns")
+    for name in _absent(known, robot):
+        message = f"there is no column {name}"
+        yield CellError(line=line, column=name, message=message, permitted=_permitted(robot))
 
 
 def _column(name: str, robot: Robot) -> SampleColumn | None:
@@ -141,54 +148,38 @@ def _column(name: str, robot: Robot) -> SampleColumn | None:
 
 
 def _absent(columns: Sequence[SampleColumn], robot: Robot) -> Iterator[str]:
-    genes = {column.place for column in columns if column.kind == "gene"}
-    values = {column.place for column in columns if column.kind == "value"}
-    read = {column.place for column in columns if column.kind == "reading"}
-    yield from (f"gene_{place}" for place in range(robot.space.size) if place not in genes)
-    wanted = range(max({0, *values, *read}) + 1)
-    yield from (f"value_{place + 1}" if len(wanted) > 1 else "value" for place in wanted if place not in values)
+    places = {kind: {each.place for each in columns if each.kind == kind} for kind in ("gene", "value", "reading")}
+    yield from (f"gene_{place}" for place in range(robot.space.size) if place not in places["gene"])
+    wanted = range(max({0, *places["value"], *places["reading"]}) + 1)
+    absent = (place for place in wanted if place not in places["value"])
+    yield from (f"value_{place + 1}" if len(wanted) > 1 else "value" for place in absent)
 
 
-def _numbers(
-    line: int, cells: Sequence[str], columns: Sequence[SampleColumn | None], errors: FirstErrors
-) -> dict[SampleColumn, float]:
-    """Return the numbers of a line, none if it has an error; add what is wrong with its cells to the errors."""
-    if len(cells) != len(columns):
-        message = f"the line has {len(cells)} cells, and the header {len(columns)}"
-        errors.append(CellError(line=line, message=message, permitted=f"exactly {len(columns)} cells"))
-        return {}
-    before, numbers = errors.count, dict[SampleColumn, float]()
-    for column, cell in zip(columns, cells, strict=True):
+def _numbers(row: CsvRow, columns: Sequence[SampleColumn | None]) -> tuple[Numbers, list[CellError]]:
+    """Return the numbers of a line, and what is wrong with its cells."""
+    line, count = row.line, len(columns)
+    if row.error:
+        return {}, [CellError(line=line, message=row.error)]
+    if len(row.cells) != count:
+        message = f"the line has {len(row.cells)} cells, and the header {count}"
+        return {}, [CellError(line=line, message=message, permitted=f"exactly {count} cells")]
+    numbers, errors = dict[SampleColumn, float](), list[CellError]()
+    for column, cell in zip(columns, row.cells, strict=True):
         if column is None:
             continue
-        if cell and not (_NUMBER.fullmatch(cell) and isfinite(float(cell))):
-            hint = "; decimals have a point" if "," in cell else ""
-            message, wanted = f"{cell[:100]!r} is not a number{hint}", "a finite number"
-            errors.append(CellError(line=line, column=column.name, value=cell[:100], message=message, permitted=wanted))
+        if (number := finite(cell)) is not None:
+            numbers[column] = number
         elif cell:
-            numbers[column] = float(cell)
+            told = cell[:100]
+            message = f"{told!r} is not a number{'; decimals have a point' if ',' in cell else ''}"
+            permitted = "a finite number"
+            errors.append(CellError(line=line, column=column.name, value=told, message=message, permitted=permitted))
         elif column.kind == "gene" or (column.kind == "value" and column.place == 0):
             errors.append(CellError(line=line, column=column.name, value="", message=f"{column.name} is empty"))
-    return numbers if errors.count == before else {}
+    return numbers, errors
 
 
-def _sample(
-    line: int,
-    numbers: Mapping[SampleColumn, float],
-    columns: Sequence[SampleColumn | None],
-    robot: Robot,
-    errors: FirstErrors,
-) -> tuple[KnownSample, ...]:
-    """Return the sample of a line, or none; add what is wrong with it to the errors."""
-    if gaps := list(_gaps(line, numbers)):
-        errors.extend(gaps)
-        return ()
-    sample = _assembled(numbers, any(column and column.kind == "reading" for column in columns), robot)
-    errors.extend(_told_by_line(line, violation) for violation in sample_violations(sample, robot))
-    return (sample,)
-
-
-def _gaps(line: int, numbers: Mapping[SampleColumn, float]) -> Iterator[CellError]:
+def _gaps(line: int, numbers: Numbers) -> Iterator[CellError]:
     """Yield a value after an empty one, and a reading of a repeat without a value."""
     count = sum(column.kind == "value" for column in numbers)
     for column, number in numbers.items():
@@ -199,42 +190,27 @@ def _gaps(line: int, numbers: Mapping[SampleColumn, float]) -> Iterator[CellErro
             yield CellError(line=line, column=column.name, value=f"{number:g}", message=missing)
 
 
-def _assembled(numbers: Mapping[SampleColumn, float], reads: bool, robot: Robot) -> KnownSample:
+def _assembled(numbers: Numbers, reads: bool, robot: Robot) -> KnownSample:
     """Return the sample of a line without gaps; with readings if the table has any."""
-    genes = {column.place: number for column, number in numbers.items() if column.kind == "gene"}
-    values = {column.place: number for column, number in numbers.items() if column.kind == "value"}
-    said = {(each.place, each.row, each.sensor): number for each, number in numbers.items() if each.kind == "reading"}
+    said = {(column.kind, column.place, column.row, column.sensor): number for column, number in numbers.items()}
+    genome, values = ([said[key] for key in sorted(said) if key[0] == kind] for kind in ("gene", "value"))
     times, sensors = range(len(robot.sensors.times_s)), range(len(robot.sensors.names))
     readings = tuple(
-        tuple(tuple(said.get((repeat, row, sensor)) for sensor in sensors) for row in times)
+        tuple(tuple(said.get(("reading", repeat, row, sensor)) for sensor in sensors) for row in times)
         for repeat in range(len(values))
     )
-    return KnownSample(
-        genome=tuple(genes[place] for place in sorted(genes)),
-        values=tuple(values[place] for place in sorted(values)),
-        readings=readings if reads else None,
-    )
+    return KnownSample(genome=tuple(genome), values=tuple(values), readings=readings if reads else None)
 
 
-def _told_by_line(line: int, violation: Violation) -> CellError:
-    _, place, *rest = violation.pointer.split("/")
-    column = f"gene_{rest[0]}" if place == "genome" and rest else None
-    permitted = violation.permitted if isinstance(violation.permitted, str) else None
-    return CellError(
-        line=line, column=column, value=str(violation.value), message=violation.message, permitted=permitted
-    )
-
-
-def _unknown(line: int, heading: str, robot: Robot) -> CellError:
-    nearest = get_close_matches(heading, _names(robot), n=1, cutoff=0.5)
-    hint = f" (did you mean {nearest[0]!r}?)" if nearest else ""
-    message = f"unknown column {heading[:100]!r}{hint}"
-    return CellError(line=line, column=heading[:100], value=heading[:100], message=message, permitted=_permitted(robot))
-
-
-def _names(robot: Robot) -> list[str]:
+def _unknown(line: int, heading: str, robot: Robot, *, hint: bool) -> CellError:
+    """Return that a column is unknown, perhaps with the known name that is nearest."""
     genes = [f"gene_{place}" for place in range(robot.space.size)]
-    return [*genes, "value", "value_1", "value_2", *robot.sensors.columns]
+    names = [*genes, "value", "value_1", "value_2", *robot.sensors.columns]
+    nearest = get_close_matches(heading, names, n=1, cutoff=0.5) if hint else []
+    meant = f" (did you mean {nearest[0]!r}?)" if nearest else ""
+    told = heading[:100]
+    message = f"unknown column {told!r}{meant}"
+    return CellError(line=line, column=told, value=told, message=message, permitted=_permitted(robot))
 
 
 def _permitted(robot: Robot) -> str:

@@ -1,5 +1,7 @@
 """Traces: the recorded motion of a physical robot's base, from which the robot's code computes fitness and readings.
 
+A trace in CSV has a line for each moment, with the pose of the base.
+
 A trace has its own clock and its own place on the ground. A recording that begins at rest shows when the motion
 begins; around that moment, else anywhere, the clock is aligned by cross-correlation with the motion that a simulator
 expects. The place is aligned by the pose at the start of the motion. Heights are above the ground, and z points up.
@@ -7,13 +9,17 @@ expects. The place is aligned by the pose at the start of the motion. Heights ar
 Source: gaplab.
 """
 
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy
 
+from gaplab.schemas.traces import TRACE_COLUMNS
 from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.csv_tables import CsvRow, finite, read_csv
+from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.kinematics import from_start
 from gaplab.services.core.motions import Trajectory
 from gaplab.services.core.world import World
@@ -32,6 +38,38 @@ AROUND_S = 0.03
 
 LEAST_CHANGE = 1e-9
 """Standard deviation of a feature below which it says nothing about time."""
+
+_UNITS: dict[str, tuple[str, ...]] = {"time_s": ("", "s", "ms")} | dict.fromkeys("xyz", ("", "m", "cm", "mm"))
+_UNITS |= dict.fromkeys(TRACE_COLUMNS[4:], ("", "1"))
+"""Units that a heading may state, by column; without one, seconds and metres."""
+
+_SHARES = {"": 1.0, "1": 1.0, "s": 1.0, "ms": 1000.0, "m": 1.0, "cm": 100.0, "mm": 1000.0}
+"""How many of a unit are a second or a metre."""
+
+MOST_LINES = 500_000
+"""Most lines of a trace: 500 s at a kilohertz."""
+
+LONGEST_S = 3_600.0
+"""Longest trace."""
+
+MOST_ERRORS = 100
+"""Most errors that are told of one trace."""
+
+
+LONGEST_GAP_S = 0.25
+"""Longest time without a pose, or with the same one, that is not remarked on; gaps also exceed four usual distances."""
+
+FARTHER, FARTHER_M = 5.0, 0.5
+"""How many times as far as expected a base moves, and how much farther, from which it is remarked on."""
+
+HIGHER_M = 0.1
+"""Difference from the expected height at the start, as a share of it too if that is more, that is remarked on."""
+
+TILTED_RAD = 0.5
+"""Difference from the expected tilt at the start that is remarked on."""
+
+WEAK, WEAKEST = 0.8, 0.1
+"""Match below which a start is uncertain: where it was found by correlation alone, and after rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,3 +219,156 @@ def _correlations(moving: FloatArray, template: FloatArray) -> FloatArray | None
         floor = 1e-6 * np.sqrt((recorded_too**2).sum() * (centred**2).sum())
         found.append(np.where(size > floor, shared / np.maximum(size, floor), 0.0))
     return np.mean(found, axis=0) if found else None
+
+
+def read_trace(text: str, pointer: str) -> Trace:
+    """Return the trace of a CSV file.
+
+    A heading may state another unit than seconds and metres: `x [mm]`; further columns do not matter.
+
+    Args:
+        text: content of the file.
+        pointer: where the request names the file, for errors.
+
+    Raises:
+        InvalidSpec: with every error, each with its line and column.
+    """
+    header, rows, lines = read_csv(text)
+    if lines > MOST_LINES:
+        message = f"the trace has {lines:,} lines"
+        raise InvalidSpec([Violation(pointer, f"{lines:,} lines", message, f"at most {MOST_LINES:,}")])
+    names, units = zip(*map(_named, header.cells or [""]), strict=True)
+    if missing := [name for name in TRACE_COLUMNS if names.count(name) != 1]:
+        message = header.error or f"the trace needs one column each of {', '.join(missing)}"
+        found = ",".join(header.cells)[:200]
+        raise InvalidSpec([Violation(pointer, found, f"line {header.line}: {message}", ", ".join(TRACE_COLUMNS))])
+    places = {name: names.index(name) for name in TRACE_COLUMNS}
+    numbers, errors = _table(rows, places)
+    errors = [*_unknown(header.line, {name: units[place] for name, place in places.items()}), *errors]
+    if not errors:
+        table = np.array(numbers).reshape(-1, len(places)) / [_SHARES[units[place]] for place in places.values()]
+        errors = list(_nonsense(table))
+    if errors:
+        raise InvalidSpec([Violation(pointer, None, message) for message in errors[:MOST_ERRORS]])
+    return Trace(frozen(table[:, 0]), frozen(table[:, 1:4]), frozen(table[:, 4:]))
+
+
+def _named(heading: str) -> tuple[str, str]:
+    """Return the name and the unit of a column: `x [mm]`, `x (mm)` or `x`."""
+    name, _, unit = heading.replace("(", "[").partition("[")
+    return name.strip(), unit.strip(" ])")
+
+
+def _unknown(line: int, units: Mapping[str, str]) -> Iterator[str]:
+    for name, unit in units.items():
+        if unit not in (permitted := _UNITS[name]):
+            known = ", ".join(filter(None, permitted))
+            yield f"line {line}, {name}: the unit {unit!r} is not known; permitted: {known}"
+
+
+def _table(rows: Iterable[CsvRow], places: Mapping[str, int]) -> tuple[list[list[float]], list[str]]:
+    """Return the numbers of all poses, and what is wrong; nothing is read after `MOST_ERRORS`.
+
+    Rows are those below the header, places those of `TRACE_COLUMNS`.
+    """
+    numbers, errors = list[list[float]](), list[str]()
+    for line, cells, error in rows:
+        found = [finite(cells[place]) if place < len(cells) else None for place in places.values()]
+        known = [number for number in found if number is not None]
+        if error:
+            errors.append(f"line {line}: {error}")
+        elif len(known) == len(found):
+            numbers.append(known)
+        else:
+            wrong = (name for name, number in zip(places, found, strict=True) if number is None)
+            shown = ((name, "".join(cells[places[name] : places[name] + 1])[:50]) for name in wrong)
+            errors += [f"line {line}, {name}: {cell!r} is not a finite number" for name, cell in shown]
+        if len(errors) >= MOST_ERRORS:
+            break
+    return numbers, errors
+
+
+def _nonsense(table: FloatArray) -> Iterator[str]:
+    """Yield what is wrong with poses `(k, 8)`: too few, times that do not ascend, quaternions of another size."""
+    if len(table) < 2:
+        yield f"the trace has {len(table)} poses; at least 2 are needed"
+        return
+    backwards = np.nonzero(np.diff(table[:, 0]) <= 0)[0]
+    for place in backwards[:3]:
+        before, after = table[place : place + 2, 0].tolist()
+        yield f"pose {place + 2}: time_s must ascend, and {after} follows {before}"
+    duration = table[-1, 0] - table[0, 0]
+    if duration > LONGEST_S:
+        yield f"the trace lasts {duration:g} s; at most {LONGEST_S:g} s are permitted"
+    sizes = np.linalg.norm(table[:, 4:], axis=1)
+    for place in np.nonzero(np.abs(sizes - 1.0) > 0.01)[0][:3]:
+        yield f"pose {place + 1}: qx, qy, qz, qw have size {sizes[place]:.3g}; permitted: 1, as of a rotation"
+
+
+def unlikely(trace: Trace, expected: Trace, alignment: Alignment) -> Iterator[str]:
+    """Yield what is unlikely about a trace, each as a clause.
+
+    Args:
+        trace: as recorded.
+        expected: what a simulator expects; nan if its physics failed.
+        alignment: when the motion began.
+    """
+    inside = (trace.times_s >= alignment.lag_s) & (trace.times_s <= alignment.lag_s + expected.times_s[-1])
+    yield from _holes(trace.times_s[inside], np.hstack([trace.positions_m, trace.orientations])[inside])
+    if not np.all(np.isfinite(expected.positions_m)):
+        return
+    yield from _jump(trace.times_s[inside], trace.positions_m[inside], expected)
+    seen = trace.at(np.clip(alignment.lag_s + expected.times_s, trace.times_s[0], trace.times_s[-1]))
+    yield from _start(seen.positions_m[0, 2], expected.positions_m[0, 2], seen.orientations, expected.orientations)
+    far, wanted = (
+        float(np.linalg.norm(positions_m[:, :2] - positions_m[0, :2], axis=1).max())
+        for positions_m in (seen.positions_m, expected.positions_m)
+    )
+    if far > FARTHER * wanted + FARTHER_M:
+        yield f"the base moves {far:.2g} m, and the simulators expect {wanted:.2g} m"
+    if alignment.match is None or alignment.match >= (WEAKEST if alignment.after_rest else WEAK):
+        return
+    why = "" if alignment.after_rest else " and the recording does not begin at rest"
+    yield f"the match with the expected motion is {alignment.match:.2f}{why}: state when it began, or look at the plot"
+
+
+def _holes(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
+    """Yield the longest time without a pose, and the longest with one pose."""
+    if len(times_s) < 2:
+        return
+    steps = np.diff(times_s)
+    at = int(np.argmax(steps))
+    if steps[at] > max(LONGEST_GAP_S, 4.0 * float(np.median(steps))):
+        yield f"there is no pose from {times_s[at]:.10g} to {times_s[at + 1]:.10g} s"
+    changes = np.flatnonzero(np.any(np.diff(poses, axis=0) != 0.0, axis=1))
+    if not changes.size:
+        yield "the base does not move"
+        return
+    begins, ends = times_s[changes[:-1] + 1], times_s[changes[1:]]
+    still = ends - begins
+    if still.size and still.max() > 2 * LONGEST_GAP_S:
+        yield f"the pose stays the same from {begins[int(np.argmax(still))]:.10g} s for {still.max():.2g} s"
+
+
+def _jump(times_s: FloatArray, positions_m: FloatArray, expected: Trace) -> Iterator[str]:
+    """Yield the largest step that the base cannot make between two poses."""
+    (steps, durations), (wanted, times) = (
+        (np.linalg.norm(np.diff(places, axis=0), axis=1), np.diff(at))
+        for places, at in ((positions_m, times_s), (expected.positions_m, expected.times_s))
+    )
+    excess = steps - HIGHER_M - FARTHER * (wanted / times).max() * durations
+    if excess.max(initial=0.0) > 0:
+        at = int(np.argmax(excess))
+        yield f"the base jumps by {steps[at]:.2g} m at {times_s[at + 1]:.10g} s"
+
+
+def _start(height_m: float, wanted_m: float, seen: FloatArray, wanted: FloatArray) -> Iterator[str]:
+    if abs(height_m - wanted_m) > max(HIGHER_M, 0.5 * abs(wanted_m)):
+        is_mm = 300.0 * wanted_m < height_m < 3000.0 * wanted_m
+        what = "are these millimetres (`x [mm]`)?" if is_mm else "is z upwards, in metres, from the ground?"
+        yield f"the base begins {height_m:.3g} m high, and the simulators expect {wanted_m:.2g} m: {what}"
+    tilts = [scipy.spatial.transform.Rotation.from_quat(each[0]).apply([0.0, 0.0, 1.0]) for each in (seen, wanted)]
+    angle = float(np.arccos(np.clip(tilts[0] @ tilts[1], -1.0, 1.0)))
+    if angle > TILTED_RAD:
+        what = "is z upwards, and is qw the last of the quaternion?"
+        yield f"the base begins tilted by {np.degrees(angle):.0f}° from what the simulators expect: {what}"

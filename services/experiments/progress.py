@@ -6,7 +6,7 @@ interval settles. The pace of one moment would not: it doubles whenever one of t
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from math import floor, fsum
+from math import ceil, floor, fsum
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Progress, TimeLeft
@@ -25,6 +25,9 @@ LEAST_SPREAD, MOST_SPREAD = 0.25, 2.0
 """Relative half-width of the interval for much finished work, and up to `KNOWN_FROM`: processes that start make the
 first steps slow, and iterations cost more than the first transfer."""
 
+MOST_STEPS = 5
+"""Steps under way that are told."""
+
 Span = tuple[datetime, datetime]
 """Begin and end of the work of an attempt."""
 
@@ -39,43 +42,40 @@ def busy_s(spans: Sequence[Span]) -> float:
     return total
 
 
-def estimate_s(finished: int, left: int, busy: float) -> float | None:
-    """Return the estimate of the seconds left; None until enough is measured.
+def interval(finished: int, left: int, busy: float) -> TimeLeft | None:
+    """Return the interval of the time left, wide at first; None until enough is measured, and without work left.
 
     Args:
         finished: rollouts that were simulated or saved.
         left: rollouts that remain.
         busy: seconds of work so far.
     """
-    if busy < KNOWN_AFTER_S or not finished:
+    if busy < KNOWN_AFTER_S or not finished or left <= 0:
         return None
     if busy < SETTLED_AFTER_S and finished < KNOWN_FROM * (finished + left):
         return None
-    return left * busy / finished
-
-
-def interval(finished: int, left: int, busy: float) -> TimeLeft | None:
-    """Return the interval of the seconds left, wide at first; None until enough is measured, and without work left.
-
-    The arguments are those of `estimate_s`.
-    """
-    seconds = estimate_s(finished, left, busy)
-    if seconds is None or not left:
-        return None
     little = min(1.0, KNOWN_FROM * (finished + left) / finished)
-    spread = 1 + LEAST_SPREAD + (MOST_SPREAD - LEAST_SPREAD) * little
-    return TimeLeft(low_s=seconds / spread, high_s=seconds * spread)
+    seconds, spread = left * busy / finished, 1 + LEAST_SPREAD + (MOST_SPREAD - LEAST_SPREAD) * little
+    low_s, high_s = seconds / spread, seconds * spread
+    return TimeLeft(low_s=low_s, high_s=high_s, text=span(low_s, high_s))
 
 
-_COMPUTED = frozenset({"seconds_left", "time_left"})
+def span(low_s: float, high_s: float) -> str:
+    """Return an interval in minutes, or in hours if it is long."""
+    unit, name = (3600, "h") if high_s > 3 * 3600 else (60, "min")
+    low, high = floor(low_s / unit), ceil(high_s / unit)
+    return f"{low} to {high} {name}" if low else f"less than {high} {name}"
 
 
 def progress_of(tally: Tally, spans: Sequence[Span] = ()) -> Progress:
     """Return the progress of an experiment or a study, with the times of its work if it is running."""
-    sums = {name: getattr(tally, name) for name in Progress.model_fields if name not in _COMPUTED}
     finished, left, busy = tally.rollouts_done + tally.rollouts_saved, tally.rollouts_left, busy_s(spans)
-    seconds_left = estimate_s(finished, left, busy) if tally.open else 0.0
-    return Progress(**sums, seconds_left=seconds_left, time_left=interval(finished, left, busy) if tally.open else None)
+    return Progress.filled_from(
+        tally,
+        share=_share(tally),
+        text=_text(tally),
+        time_left=interval(finished, left, busy),
+    )
 
 
 def caveat_of(state: State, tally: Tally) -> str | None:
@@ -108,10 +108,31 @@ def mean_best(values: Sequence[float]) -> float:
         return fsum(value / len(values) for value in values)
 
 
+def _share(tally: Tally) -> float:
+    """Return the finished share of the rollouts, because they take nearly all of the time; a saved one is finished."""
+    return min(1.0, (tally.rollouts_done + tally.rollouts_saved) / tally.rollouts) if tally.rollouts else 0.0
+
+
+def _text(tally: Tally) -> str:
+    """Return the completed work, and some of the steps under way."""
+    failed = f", {tally.failed} failed" if tally.failed else ""
+    saved = f", {tally.rollouts_saved:,} saved" if tally.rollouts_saved else ""
+    physics = f", physics failed in {tally.rollouts_failed:,}" if tally.rollouts_failed else ""
+    iterations = f"{tally.counted_iterations_done:,} of {tally.counted_iterations:,} iterations"
+    now = [f"{each.kind} {each.iteration}: {100 * each.rollouts // each.budget} %" for each in tally.steps]
+    parts = [
+        f"{tally.completed:,} of {_many(tally.repetitions, 'repetition')}{failed}",
+        *([iterations] if tally.counted_iterations else []),
+        f"{tally.rollouts_done:,} of {tally.rollouts:,} rollouts{saved}{physics}",
+        *now[:MOST_STEPS],
+        *(["…"] if len(now) > MOST_STEPS else []),
+    ]
+    return "; ".join(parts)
+
+
 def _done(tally: Tally) -> str:
-    finished = tally.rollouts_done + tally.rollouts_saved
-    return f"{floor(100 * min(1.0, finished / tally.rollouts)) if tally.rollouts else 0} % done"
+    return f"{floor(100 * _share(tally))} % done"
 
 
 def _many(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+    return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"

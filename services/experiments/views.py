@@ -14,7 +14,7 @@ from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.fitness import best_of, fitness_of
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.progress import Span, caveat_of, caveat_of_several, mean_best, progress_of
-from gaplab.services.plugins.refusals import tells_unavailable
+from gaplab.services.plugins.external import tells_unavailable
 from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.robots import sensors
 from gaplab.services.store.models import ExperimentRow, RepetitionRow

@@ -2,5 +2,6 @@
 
 `comparisons` judges pairs, `judged` the ends of curves, `misfit` and `identification` what tuning has found. What they
 find becomes words once: `wording` writes p-values, intervals and ±, `sentences` what pairs and curves say, and
-`simulator_sentences` what tuned simulators say. The page, commands, the client and reports print these.
+`simulator_sentences` what tuned simulators say. `tables` describes each table once, and writes it for papers. The page,
+commands, the client and reports print these.
 """

@@ -15,7 +15,7 @@ from gaplab.services.core.tasks import tasks
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
-from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.plugins.loading import here
 from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.specs.presets import PRESETS
 
@@ -34,7 +34,7 @@ def catalogue(stored: Sequence[PluginRead] = ()) -> Catalogue:
         tasks=tasks.describe(),
         tuners=tuners.describe(),
         budgets=tuple(BudgetRead(name=name, **asdict(preset)) for name, preset in PRESETS.items()),
-        ignored=ignored_files(),
+        ignored=loaded.ignored if (loaded := here()) else (),
         defaults=StudySpec().model_dump(mode="json", exclude_none=True),
     )
 

@@ -5,23 +5,21 @@ everything in the folders that it imports.
 """
 
 import ast
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 
-from gaplab.services.core.external_plugins import PACKAGE, folders
+from gaplab.services.core.registry import EXTERNAL
 
-ANY = "*"
+_ANY = "*"
 """Stands for all modules of the folders."""
 
 _DYNAMIC = {"import_module", "__import__", "exec"}
 """A module that uses one of these names may import any other module."""
 
 _UNREADABLE = "unreadable"
-
-State = tuple[tuple[str, int, int, int], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +29,12 @@ class Contents:
     Attributes:
         digests: a short hash of each module and of each file in a package.
         imports: the modules and packages of the folders that each module or package imports.
+        files: all of these files, with the text of those in Python that could be read.
     """
 
     digests: Mapping[str, str] = field(default_factory=dict)
     imports: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    files: Mapping[Path, bytes | None] = field(default_factory=dict)
 
     def digest_of(self, file: str) -> str:
         """Return the hash of a module; for a file in a package, that of the whole package.
@@ -67,37 +67,39 @@ class Contents:
         return next((file for file in (f"{top}.py", f"{top}/__init__.py") if file in self.digests), None)
 
 
-def state() -> State:
+def read(folders: Iterable[Path]) -> Contents:
+    """Return what the plug-in folders contain.
+
+    Files beside modules, such as a database, are not part of a plug-in: its data belongs into a package.
+    """
+    digests, imports, files = dict[str, str](), dict[str, frozenset[str]](), dict[Path, bytes | None]()
+    for file, path in _files(folders):
+        try:
+            content = path.read_bytes()
+        except OSError:
+            digests[file], files[path] = _UNREADABLE, None
+            continue
+        digests[file] = sha256(content).hexdigest()[:12]
+        files[path] = content if path.suffix == ".py" else None
+        if path.suffix == ".py":
+            imports[module_of(file)] = imports.get(module_of(file), frozenset()) | _imports(content, file)
+    tops = frozenset(map(module_of, digests))
+    found = {top: tops if _ANY in named else named & tops for top, named in imports.items()}
+    return Contents(digests, found, files)
+
+
+def state(folders: Iterable[Path]) -> tuple[tuple[str, int, int, int], ...]:
     """Return number, size and time of every file of the plug-ins: quick to read, and different after an edit."""
     found = []
-    for file, path in _files():
+    for file, path in _files(folders):
         with suppress(OSError):  # an editor replaces the file at this moment
             stat = path.stat()
             found.append((file, stat.st_ino, stat.st_size, stat.st_mtime_ns))
     return tuple(found)
 
 
-def read() -> Contents:
-    """Return what the plug-in folders contain now.
-
-    Files beside modules, such as a database, are not part of a plug-in: its data belongs into a package.
-    """
-    digests, imports = dict[str, str](), dict[str, frozenset[str]]()
-    for file, path in _files():
-        try:
-            content = path.read_bytes()
-        except OSError:
-            digests[file] = _UNREADABLE
-            continue
-        digests[file] = sha256(content).hexdigest()[:12]
-        if path.suffix == ".py":
-            imports[module_of(file)] = imports.get(module_of(file), frozenset()) | _imports(content, file)
-    tops = frozenset(map(module_of, digests))
-    return Contents(digests, {top: tops if ANY in named else named & tops for top, named in imports.items()})
-
-
-def _files() -> Iterator[tuple[str, Path]]:
-    for folder in folders():
+def _files(folders: Iterable[Path]) -> Iterator[tuple[str, Path]]:
+    for folder in folders:
         packages = sorted(path.parent for path in folder.glob("*/__init__.py"))
         for path in sorted([*folder.glob("*.py"), *(file for package in packages for file in package.rglob("*"))]):
             parts = path.relative_to(folder).parts
@@ -111,7 +113,7 @@ def module_of(file: str) -> str:
 
 
 def _imports(content: bytes, file: str) -> frozenset[str]:
-    """Return the modules of the folders that Python code imports; ANY if that cannot be told."""
+    """Return the modules of the folders that Python code imports; _ANY if that cannot be told."""
     try:
         nodes = list(ast.walk(ast.parse(content)))
     except (SyntaxError, ValueError):  # so nothing can import it
@@ -123,17 +125,17 @@ def _modules_in(node: ast.AST, depth: int) -> Iterator[str]:
     """Yield the modules of the folders that one statement names; `depth` is the number of folders above its file."""
     match node:
         case ast.Name(id=name) | ast.Attribute(attr=name) if name in _DYNAMIC:
-            yield ANY
+            yield _ANY
         case ast.Import():
             yield from _inside([alias.name.split(".") for alias in node.names])
         case ast.ImportFrom():
             package = node.module.split(".") if node.module else []
-            relative = [PACKAGE] if node.level == depth + 1 else []
+            relative = [EXTERNAL] if node.level == depth + 1 else []
             yield from _inside([[*relative, *package, alias.name] for alias in node.names])
 
 
 def _inside(modules: list[list[str]]) -> Iterator[str]:
     """Yield the names that follow the package of external plug-ins."""
     for top, *names in modules:
-        if top == PACKAGE:
-            yield names[0] if names else ANY
+        if top == EXTERNAL:
+            yield names[0] if names else _ANY

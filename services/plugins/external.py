@@ -1,30 +1,28 @@
-"""Versions of external plug-ins, which are files of GAPLAB_PLUGINS, and the plug-ins that a spec names."""
+"""The versions of external plug-ins, the plug-ins that a spec names, and those of them that cannot be used."""
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.external_plugins import file_of
 from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.engines import engines
-from gaplab.services.plugins.contents import Contents
-from gaplab.services.plugins.watching import imported, present
-from gaplab.services.specs.registries import REGISTRIES as REGISTRIES
+from gaplab.services.plugins.loading import here
+from gaplab.services.specs.registries import REGISTRIES
 from gaplab.services.specs.robots import Driven, installed_robot
 
+_FIRST = re.compile(rf"((?:{'|'.join(REGISTRIES)}) .{{1,100}}?) \(unavailable: ", re.DOTALL)
+"""The first plug-in of a text that `text_of` wrote."""
 
-def external_plugins(contents: Contents | None = None) -> Mapping[str, str]:
-    """Return the files of each external plug-in with their hashes, by its kind and name, as in `"robot hexapod"`.
 
-    Args:
-        contents: of the folders; left out, those of now.
-    """
-    found = present() if contents is None else contents
+def external_plugins() -> Mapping[str, str]:
+    """Return the files of each external plug-in with their hashes, by its kind and name, as in `"robot hexapod"`."""
+    loaded = here()
     texts = {
-        f"{kind} {name}": found.text_of(file)
+        f"{kind} {name}": loaded.contents.text_of(file)
         for kind, registry in REGISTRIES.items()
-        for name, plugin in registry.items()
-        if (file := file_of(plugin)) is not None
+        for name, file in registry.files.items()
+        if loaded is not None
     }
     return {plugin: text for plugin, text in texts.items() if text is not None}
 
@@ -34,10 +32,10 @@ def named_in(spec: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_named_in(spec)))
 
 
-def imported_files(spec: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the files of each external plug-in that a resolved spec names, with their hashes, as imported here."""
-    found = external_plugins(imported.contents())
-    return tuple(found[plugin] for plugin in named_in(spec) if plugin in found)
+def named_files(spec: Mapping[str, Any]) -> dict[str, str]:
+    """Return the files of each external plug-in that a resolved spec names, with their hashes, by kind and name."""
+    found = external_plugins()
+    return {plugin: found[plugin] for plugin in named_in(spec) if plugin in found}
 
 
 def unavailable(plugin: str) -> str | None:
@@ -53,6 +51,27 @@ def unavailable(plugin: str) -> str | None:
     if kind == engines.kind and not engines[name].available():
         return f"not installed: {engines[name].install}"
     return None
+
+
+def text_of(reasons: Mapping[str, str]) -> str:
+    """Return the text of plug-ins that cannot be used, each with the reason."""
+    return ", ".join(f"{plugin} (unavailable: {why})" for plugin, why in reasons.items())
+
+
+def tells_unavailable(text: str) -> bool:
+    """Return whether a text is one of plug-ins that cannot be used."""
+    return _FIRST.match(text) is not None
+
+
+def still_holds(text: str, refused: Mapping[str, str]) -> bool:
+    """Return whether the first plug-in of such a text cannot be used by this process either.
+
+    Args:
+        text: of any supervisor.
+        refused: plug-ins that processes of this supervisor refuse, by kind and name.
+    """
+    first = _FIRST.match(text)
+    return first is not None and (first[1] in refused or unavailable(first[1]) is not None)
 
 
 def _named_in(spec: Mapping[str, Any]) -> Iterator[str]:

@@ -1,14 +1,13 @@
 """Files in the plug-in folders that are not plug-ins: they are named, so that nobody waits for them."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from gaplab.schemas.plugin import IgnoredFile
-from gaplab.services.core import external_plugins
-from gaplab.services.core.registry import Plugin
-from gaplab.services.plugins.contents import read
-from gaplab.services.plugins.external import REGISTRIES
+from gaplab.services.core.registry import EXTERNAL, Plugin
+from gaplab.services.plugins.contents import Contents, module_of
+from gaplab.services.specs.registries import REGISTRIES
 
 IMPORTED = {".urdf", ".mjcf"}
 """Endings of descriptions of robots that `gaplab robot import` reads."""
@@ -19,7 +18,7 @@ OTHERS = {".xacro", ".sdf", ".usd"}
 NOT_PYTHON = "it is not a Python module; put data that a plug-in reads into its package"
 TO_IMPORT = "it is not a Python module: gaplab robot import FILE, then gaplab robot add (docs/how-to/robot-file.md)"
 NOT_A_ROBOT = (
-    "it is not a Python module, and not of a format that is imported: make a URDF or an MJCF of it, and import that "
+    "it is not a Python module, and not in a format that is imported: make a URDF or an MJCF of it, and import that "
     "(docs/how-to/robot-file.md), or describe the robot as a class (docs/how-to/robot.md)"
 )
 NO_PACKAGE = "the folder has no __init__.py, so it is not a package"
@@ -28,13 +27,13 @@ DOTTED = "a module cannot be imported by a name with a dot; rename it, for examp
 NO_CLASS = "it has no class of a plug-in; if others import it, begin its name with _"
 
 
-def ignored_files() -> tuple[IgnoredFile, ...]:
-    """Return the files and folders directly in the plug-in folders that are not plug-ins, each with the reason."""
-    return tuple(file for folder in external_plugins.folders() for file in _ignored(folder))
+def ignored_files(folders: Iterable[Path], contents: Contents) -> tuple[IgnoredFile, ...]:
+    """Return what is directly in the plug-in folders and not a plug-in, each with the reason; all were imported."""
+    useful = _useful(contents)
+    return tuple(file for folder in folders if folder.is_dir() for file in _ignored(folder, useful))
 
 
-def _ignored(folder: Path) -> Iterator[IgnoredFile]:
-    useful = _useful()
+def _ignored(folder: Path, useful: set[str]) -> Iterator[IgnoredFile]:
     for path in sorted(folder.iterdir()):
         if path.name.startswith((".", "_")):
             continue
@@ -61,7 +60,7 @@ def why_no_plugin(path: Path) -> str:
 
 def _hidden_classes(name: str) -> list[str]:
     """Return the classes of plug-ins in a module whose names begin with an underscore."""
-    module = f"{external_plugins.PACKAGE}.{name}"
+    module = f"{EXTERNAL}.{name}"
     found = vars(sys.modules[module]).values() if module in sys.modules else ()
     plugins = [each for each in found if isinstance(each, type) and issubclass(each, Plugin)]
     return [each.__name__ for each in plugins if each.__module__ == module and each.__name__[0] == "_"]
@@ -73,11 +72,10 @@ def _why_no_module(suffix: str) -> str:
     return NOT_A_ROBOT if suffix in OTHERS else NOT_PYTHON
 
 
-def _useful() -> set[str]:
+def _useful(contents: Contents) -> set[str]:
     """Return the modules with a plug-in, usable or not, and those that other modules import."""
-    found = {name for names in read().imports.values() for name in names}
+    found = {name for names in contents.imports.values() for name in names}
     for registry in REGISTRIES.values():
-        files = [*(external_plugins.file_of(plugin) for plugin in registry.values())]
-        files += [refused.file for refused in registry.refused]
-        found |= {file.partition("/")[0].removesuffix(".py") for file in files if file}
+        files = [*registry.files.values(), *(refused.file for refused in registry.refused.values())]
+        found |= set(map(module_of, files))
     return found

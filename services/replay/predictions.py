@@ -35,9 +35,6 @@ Fitness = float | None
 Pair = tuple[Fitness, Fitness]
 """Fitness before and after tuning."""
 
-Place = tuple[str, str]
-"""An experiment, and the files of its external plug-ins."""
-
 
 def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, seconds: float = SECONDS) -> Predictions:
     """Return the predictions of an experiment's samples that are computed so far.
@@ -58,15 +55,14 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
     samples = every[:MOST_KEPT]
     spec = spec_of(row.spec)
     sent_spec = sent(spec)
-    place = (row.id, "; ".join(sent_spec.plugins))
-    unknown = [each for each in samples if process.answers.get(_key(place, each)) is None]
+    unknown = [each for each in samples if process.answers.get(_key(row.id, each)) is None]
     unknown.sort(key=lambda each: (each.iteration, each.repetition))
     if unknown:
         refuse_missing(spec)
         pairs = process.call(predict, sent_spec, unknown[:MOST_AT_ONCE], seconds, plugins=sent_spec.plugins)
         for sample, pair in zip(unknown, pairs, strict=False):
-            process.answers.keep(_key(place, sample), pair, SIZE_BYTES)
-    items = _items(place, samples, process.answers)
+            process.answers.keep(_key(row.id, sample), pair, SIZE_BYTES)
+    items = _items(row.id, samples, process.answers)
     return Predictions(
         experiment=row.id,
         unit=unit(spec),
@@ -93,8 +89,8 @@ def predict(spec: SentSpec, samples: Sequence[TunedSample], seconds: float) -> l
     return found
 
 
-def _items(place: Place, samples: Sequence[TunedSample], answers: AnswerCache) -> tuple[Prediction, ...]:
-    found: list[tuple[TunedSample, Pair | None]] = [(each, answers.get(_key(place, each))) for each in samples]
+def _items(experiment: str, samples: Sequence[TunedSample], answers: AnswerCache) -> tuple[Prediction, ...]:
+    found: list[tuple[TunedSample, Pair | None]] = [(each, answers.get(_key(experiment, each))) for each in samples]
     return tuple(
         Prediction(
             repetition=sample.repetition,
@@ -108,10 +104,10 @@ def _items(place: Place, samples: Sequence[TunedSample], answers: AnswerCache) -
     )
 
 
-def _key(place: Place, sample: TunedSample) -> Key:
+def _key(experiment: str, sample: TunedSample) -> Key:
     """Return the key of a prediction; a correction may change the sample of an iteration and its simulators."""
     computed_from = repr((sample.genome, sample.before, sample.after))
-    return "prediction", *place, sample.repetition, sample.iteration, sha256(computed_from.encode()).hexdigest()
+    return "prediction", experiment, sample.repetition, sample.iteration, sha256(computed_from.encode()).hexdigest()
 
 
 def _finite(value: float) -> float | None:

@@ -3,7 +3,8 @@
 import logging
 import os
 import signal
-from collections.abc import Callable
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -11,9 +12,7 @@ from multiprocessing.process import BaseProcess
 from threading import Lock, Thread
 from typing import Any, TypeAlias, TypeVar
 
-from cachetools import LRUCache
-
-from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable
+from gaplab.services.core.errors import EngineError, EngineInterrupted, EngineUnavailable, PluginDiffers
 from gaplab.services.plugins import folders
 from gaplab.services.store.texts import brief
 from gaplab.services.waiting_line import WaitingLine
@@ -32,6 +31,9 @@ MOST_BYTES = 50_000_000
 MOST_OUTPUT = 10_000
 """Bytes of what a call prints that are logged: a plug-in may print without end."""
 
+NONE: Mapping[str, str] = {}
+"""No external plug-ins."""
+
 Key: TypeAlias = tuple[str | int | None, ...]
 
 log = logging.getLogger(__name__)
@@ -45,18 +47,26 @@ class AnswerCache:
     """
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
-        self._answers: LRUCache[Key, tuple[Any, int]] = LRUCache(most_bytes, getsizeof=lambda entry: entry[1])
-        self._lock = Lock()
+        self._answers: OrderedDict[Key, tuple[Any, int]] = OrderedDict()
+        self._most_bytes, self._bytes, self._lock = most_bytes, 0, Lock()
 
     def get(self, key: Key) -> Any:  # noqa: ANN401 - the type that was kept
         """Return the answer, or None if the cache does not have it."""
         with self._lock:
-            return self._answers.get(key, (None, 0))[0]
+            if key not in self._answers:
+                return None
+            self._answers.move_to_end(key)
+            return self._answers[key][0]
 
     def keep(self, key: Key, answer: Any, size_bytes: int) -> None:  # noqa: ANN401 - of any type
         """Add an answer, unless it alone is too large for the cache."""
-        with self._lock, suppress(ValueError):
+        if size_bytes > self._most_bytes:
+            return
+        with self._lock:
+            self._bytes += size_bytes - self._answers.pop(key, (None, 0))[1]
             self._answers[key] = (answer, size_bytes)
+            while self._bytes > self._most_bytes:
+                self._bytes -= self._answers.popitem(last=False)[1][1]
 
 
 class RolloutProcess:
@@ -77,7 +87,7 @@ class RolloutProcess:
         self.answers = AnswerCache()
         self._longest_s = longest_s
         self._line = line or WaitingLine("replays and predictions")
-        self._plugins: tuple[str, ...] = ()
+        self._plugins: Mapping[str, str] = {}
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._closed = False
@@ -93,15 +103,15 @@ class RolloutProcess:
         function: Callable[..., T],
         *arguments: Any,  # noqa: ANN401 - what the function takes
         load: Callable[[], Any] | None = None,
-        plugins: tuple[str, ...] = (),
+        plugins: Mapping[str, str] = NONE,
     ) -> T:
         """Return `function(*arguments)`, computed in the subprocess; all of it can be pickled.
 
         `load` returns the last argument once it is the caller's turn, as those who wait shall hold nothing large.
-        `plugins` are the files, with their hashes, of the external plug-ins that it may import.
+        `plugins` are the files, with their hashes, of the external plug-ins that it may import, by kind and name.
 
         Raises:
-            EngineInterrupted: the process died or took too long, or `close` was called.
+            EngineInterrupted: the process died or took too long, has other plug-ins, or `close` was called.
             EngineUnavailable: the library of an engine is not installed.
             LimitReached: too many callers wait, or earlier calls took too long.
             RuntimeError: the function raised another error; the message quotes it.
@@ -144,7 +154,11 @@ class RolloutProcess:
         if succeeded:
             return answer  # type: ignore[no-any-return]
         kind, text = answer
-        raise EngineUnavailable(text) if kind == EngineUnavailable.__name__ else RuntimeError(f"{kind}: {text}")
+        known: Mapping[str, type[EngineError]] = {
+            EngineUnavailable.__name__: EngineUnavailable,
+            PluginDiffers.__name__: EngineInterrupted,
+        }
+        raise known[kind](text) if kind in known else RuntimeError(f"{kind}: {text}")
 
     def _started(self) -> Connection:
         if self._closed:
@@ -173,17 +187,17 @@ class RolloutProcess:
                     log.info("printed by a rollout: %s%s", kept.decode(errors="replace"), rest)
 
 
-def _serve(pipe: Connection, output: Connection, plugins: tuple[str, ...]) -> None:
+def _serve(pipe: Connection, output: Connection, plugins: Mapping[str, str]) -> None:
     """Execute calls until the other end of the pipe closes, and write what they print to `output`."""
     for descriptor in (1, 2):
         os.dup2(output.fileno(), descriptor)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which closes the pipe
     os.nice(NICENESS)
-    folders.use(plugins)
     with suppress(EOFError, OSError):
         while True:
             function, arguments = pipe.recv()
             try:
+                folders.use(plugins)
                 answer = (True, function(*arguments))
             except Exception as error:  # noqa: BLE001 - the caller raises it
                 answer = (False, (type(error).__name__, brief(str(error))))

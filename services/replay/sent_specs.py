@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core import robot_library
-from gaplab.services.plugins.external import imported_files
+from gaplab.services.plugins.external import named_files
 
 
 class SentSpec(NamedTuple):
@@ -13,17 +13,17 @@ class SentSpec(NamedTuple):
     Attributes:
         text: the spec, as JSON.
         robots: texts of robot files.
-        plugins: files of each external plug-in that it names, with their hashes.
+        plugins: files of each external plug-in that it names, with their hashes, by kind and name.
     """
 
     text: str
     robots: tuple[str, ...]
-    plugins: tuple[str, ...]
+    plugins: dict[str, str]
 
 
 def sent(spec: ResolvedSpec) -> SentSpec:
     """Return a spec to be sent."""
-    plugins = imported_files(spec.model_dump(mode="json"))
+    plugins = named_files(spec.model_dump(mode="json"))
     return SentSpec(spec.model_dump_json(), robot_library.needed_by(spec.robot), plugins)
 
 

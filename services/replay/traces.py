@@ -14,9 +14,7 @@ from gaplab.services.core.kinematics import observes_base
 from gaplab.services.core.motions import Trajectory
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.core.trace_checks import unlikely
-from gaplab.services.core.trace_tables import read_trace
-from gaplab.services.core.traces import Alignment, TooShort, Trace, align, placed
+from gaplab.services.core.traces import Alignment, TooShort, Trace, align, placed, read_trace, unlikely
 from gaplab.services.core.world import World
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.sent_specs import SentSpec, received, sent

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from gaplab.services.figures.marks import FigureDefinition
+from gaplab.services.findings.tables import Grid as Grid
 
 
 @dataclass(frozen=True)
@@ -18,21 +19,6 @@ class Bullets:
     """A list of sentences."""
 
     sentences: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Grid:
-    """A table; the first cell of each row is its head.
-
-    Attributes:
-        caption: what the table shows.
-        words: cells hold words, which are set to the left, not numbers.
-    """
-
-    caption: str
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    words: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,17 @@
 """The arrangement of a report: which facts stand in which section."""
 
+from collections.abc import Sequence
+
+from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.records import StudyRead
 from gaplab.schemas.reports import VerdictRead
+from gaplab.services.core.robot_library import label_of
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number_of, titled
+from gaplab.services.findings import tables as findings
 from gaplab.services.findings.sentences import POOLED
-from gaplab.services.reports import compared, tables
+from gaplab.services.reports import tables
 from gaplab.services.reports.blocks import Block, Bullets, Drawing, Paragraph, Report, Section
 from gaplab.services.reports.content import Facts, facts_of
 from gaplab.services.reports.reproduction import reproduction
@@ -52,19 +57,25 @@ def _differences(facts: Facts) -> tuple[Block, ...]:
     last = facts.at_last[0].where
     cautions = tuple(dict.fromkeys(pair.caution for pair in facts.at_last if pair.caution))
     return (
-        compared.summaries(facts, facts.at_last, f"Fitness {last}"),
-        compared.pairs(facts, facts.at_last, f"All pairs {last}, by the tests that the verdict uses"),
-        *(compared.pairs(facts, each, f"{each[0].fitness.words}, {last}") for each in facts.beside),
-        compared.tests(facts, facts.at_last, f"All pairs {last}, by each test"),
+        findings.experiments(facts.names, facts.at_last, f"Fitness {last}"),
+        findings.differences(facts.names, facts.at_last, f"All pairs {last}"),
+        findings.verdicts(facts.names, facts.at_last, f"All pairs {last}, by the tests that the verdict uses"),
+        *(grid for each in facts.beside for grid in _beside(facts, each, last)),
+        findings.tests(facts.names, facts.at_last, f"All pairs {last}, by each test"),
         *(Paragraph(f"Shared random streams: {caution}.", note=True) for caution in cautions),
         *(_over_all(facts) if facts.over_all else ()),
     )
 
 
+def _beside(facts: Facts, pairs: Sequence[Comparison], last: str) -> tuple[Block, ...]:
+    what = f"{pairs[0].fitness.words}, {last}"
+    return findings.differences(facts.names, pairs, what), findings.verdicts(facts.names, pairs, what)
+
+
 def _over_all(facts: Facts) -> tuple[Block, ...]:
     return (
-        compared.tests(facts, facts.over_all, f"The {facts.over_all[0].where}"),
-        compared.pooled(facts, facts.over_all, "The paper's test: the same pairs, pooled over these numbers"),
+        findings.tests(facts.names, facts.over_all, f"The {facts.over_all[0].where}"),
+        findings.pooled(facts.names, facts.over_all, "The paper's test: the same pairs, pooled over these numbers"),
         Paragraph(f"The last table is {POOLED}. The verdict does not use it.", note=True),
     )
 
@@ -89,8 +100,9 @@ def _simulators(store: Store, facts: Facts) -> tuple[Block, ...]:
 
 
 def _sensitivity(facts: Facts) -> tuple[Block, ...]:
+    checks = (findings.sensitivity(each, label_of(each.spec.robot)) for each in facts.checks)
     warnings = tuple(dict.fromkeys(warning for check in facts.checks for warning in check.warnings))
-    return (*map(tables.sensitivity, facts.checks), *([Bullets(warnings)] if warnings else []))
+    return (*checks, *([Bullets(warnings)] if warnings else []))
 
 
 def _settings(facts: Facts) -> tuple[Block, ...]:

@@ -3,11 +3,9 @@
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 
-from gaplab.schemas.misfit import TunableDistribution
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.sensitivity import SensitivityRead
-from gaplab.services.core.robot_library import label_of
 from gaplab.services.figures.words import number_of, spoken
+from gaplab.services.findings import tables as findings
 from gaplab.services.findings.judged import Judged
 from gaplab.services.findings.wording import MISSING, bracketed, number, share
 from gaplab.services.reports.blocks import Grid
@@ -33,23 +31,6 @@ def _at_last(one: Judged, baseline: float | None) -> tuple[str, ...]:
     since = f" since {one.end.since}" if one.end and end == "flat" else ""
     ends = bracketed(one.point.lower, one.point.upper).strip() or MISSING
     return (one.name, str(one.point.n), number(one.mean), number(one.point.sd), ends, of_direct, end + since)
-
-
-def sensitivity(check: SensitivityRead) -> Grid:
-    """Return the effect of each tunable on fitness, before tuning."""
-    head = ("Tunable", "Between", f"Effect ({check.unit})", "Share of the spread", "Roughness", "Verdict")
-    rows = tuple(
-        (
-            spoken(found.name),
-            f"{found.values[0]:g} to {found.values[-1]:g}",
-            number(found.effect),
-            share(found.relative_effect),
-            number(found.roughness, 2),
-            found.verdict.value,
-        )
-        for found in check.tunables
-    )
-    return Grid(f"Check of {label_of(check.spec.robot)} in {spoken(check.spec.engine.name)}", head, rows)
 
 
 def cost(facts: Facts) -> Grid:
@@ -89,9 +70,7 @@ def cost(facts: Facts) -> Grid:
 def differing(facts: Facts) -> Iterator[Grid]:
     """Yield the settings that differ between the experiments."""
     if facts.differing and facts.differing.settings:
-        head = ("Setting", *(facts.names[column.id] for column in facts.differing.columns))
-        rows = tuple((each.setting, *each.texts) for each in facts.differing.settings)
-        yield Grid("Settings that differ", head, rows, words=True)
+        yield findings.differing(facts.differing, [facts.names[column.id] for column in facts.differing.columns])
 
 
 def settings(facts: Facts) -> Grid:
@@ -173,9 +152,7 @@ def misfit(facts: Facts) -> Iterator[Grid]:
         for name, point in last
     )
     yield Grid("Misfit of the best simulators after the last iteration: mean ± SD over repetitions", head, rows)
-    columns = ("Experiment", "Tunable", "Tuned", "Bounds", "At a bound")
-    tuned = tuple((name, *_tuned(tunable)) for name, point in last for tunable in point.tunables)
-    yield Grid("Tuned values after the last iteration: mean ± SD over repetitions", columns, tuned)
+    yield findings.tuned(last)
 
 
 def identified(facts: Facts) -> Iterator[Grid]:
@@ -194,7 +171,3 @@ def identified(facts: Facts) -> Iterator[Grid]:
     if rows:
         head = ("Experiment", "Tunable", "Verdict", "Uncertainty left", "What would help")
         yield Grid("Which tunables are identified; 100 % is as uncertain as before any sample", head, rows)
-
-
-def _tuned(found: TunableDistribution) -> tuple[str, ...]:
-    return spoken(found.name), found.text, f"{found.lower:g} to {found.upper:g}", found.at_bounds or MISSING

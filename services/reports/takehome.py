@@ -11,8 +11,9 @@ from zipfile import ZipFile
 import numpy as np
 
 from gaplab.schemas.records import SampleRead
+from gaplab.schemas.traces import TRACE_COLUMNS
 from gaplab.services.bench import motions
-from gaplab.services.core import robot_library, trace_tables
+from gaplab.services.core import robot_library
 from gaplab.services.core.arrays import frozen, known
 from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.errors import GaplabError
@@ -127,7 +128,7 @@ def _expected(outcome: ExperimentOutcome, process: RolloutProcess) -> Iterator[t
             return
         if plain_m is not None:
             apart_m[name] = known(np.linalg.norm(plain_m - poses[:, :3], axis=1).max())
-        text, header = io.StringIO(), ",".join(trace_tables.COLUMNS)
+        text, header = io.StringIO(), ",".join(TRACE_COLUMNS)
         np.savetxt(text, np.column_stack([times_s, poses]), "%.9g", ",", header=header, comments="")
         fitness[name] = known(expected)
         yield f"expected/{name}.csv", text.getvalue()

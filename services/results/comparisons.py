@@ -19,6 +19,7 @@ from gaplab.services.findings import sentences
 from gaplab.services.findings.comparisons import Compared, compare_all
 from gaplab.services.results.curves import values_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
+from gaplab.services.specs.robots import unit
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments
 from gaplab.services.store.queries.benches import key_of
@@ -88,7 +89,7 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
     pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
     where = sentences.where(first, final, *(row.known for row in rows if row.tunes))
-    told = {"fitness": fitness, "where": where, "shared_evaluations": shared}
+    told = {"fitness": fitness, "unit": unit(spec_of(rows[0].spec)), "where": where, "shared_evaluations": shared}
     warned = (tuple(_warnings(settings[pair.first], settings[pair.second])) for pair in pairs)
     return tuple(pair.model_copy(update={"warnings": each, **told}) for pair, each in zip(pairs, warned, strict=True))
 

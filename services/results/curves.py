@@ -47,16 +47,6 @@ def curve(store: Store, experiment_id: str, fitness: Fitness = Fitness.RECORDED)
         return curves_of(session, [experiments.get_experiment(session, experiment_id)], fitness)[0]
 
 
-def unit_of(store: Store, experiment_id: str) -> str:
-    """Return the unit of fitness of an experiment; "" if it has none.
-
-    Raises:
-        NotFound: the experiment does not exist.
-    """
-    with store.reading() as session:
-        return unit(spec_of(experiments.get_experiment(session, experiment_id).spec))
-
-
 def curves_csv(curves: Sequence[Curve]) -> str:
     """Return the values of curves as CSV: a line for each repetition at each number of real-world evaluations.
 

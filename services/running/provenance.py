@@ -17,10 +17,10 @@ from gaplab.schemas.provenance import Provenance, ProvenanceRead, ProvenanceUse
 from gaplab.schemas.records import StudyRead
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.views import view
-from gaplab.services.plugins import refusals
-from gaplab.services.plugins.external import named_in, unavailable
+from gaplab.services.plugins.external import named_in, still_holds, tells_unavailable, text_of, unavailable
 from gaplab.services.store.lease import Claim
 from gaplab.services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow
+from gaplab.services.store.queries import robots
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import get_experiment, lock, members
 from gaplab.services.store.queries.provenance import id_of, insert_unless_there
@@ -90,7 +90,7 @@ def permitted(session: Session, under: Provenance, refused: Mapping[str, str] = 
     begun = row.claimable.is_(True) & row.computed_with.is_not(None)
     used = session.scalars(select(row.computed_with).where(begun).distinct())
     same = row.computed_with.in_([text for text in used if text is not None and _holds(text, under)])
-    told = [text for text in _refusals_of_plugins(session) if refusals.still_holds(text, refused)]
+    told = [text for text in _refusals_of_plugins(session) if still_holds(text, refused)]
     usable = row.refused_by.is_(None) | row.refused_by.not_in(told)
     return (row.spec_version <= under.spec_version) & (row.computed_with.is_(None) | same) & usable
 
@@ -101,8 +101,9 @@ def refuse_unusable(session: Session, repetitions: Sequence[int], refused: Mappi
     experiments = session.execute(
         select(row.id, row.spec, row.computed_with, row.refused_by).where(row.id.in_(owners)).order_by(row.id)
     ).all()
+    robots.learn(session, (each.spec for each in experiments))
     reasons = ((each, unusable(each.spec, refused)) for each in experiments)
-    waiting = [(each, storable(refusals.text_of(found))) for each, found in reasons if found]
+    waiting = [(each, storable(text_of(found))) for each, found in reasons if found]
     for experiment, text in waiting:
         session.execute(update(row).where(row.id == experiment.id).values(refused_by=text))
         if text != experiment.refused_by:
@@ -131,12 +132,13 @@ def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None
 def refuse(session: Session, under: Provenance, refused: Mapping[str, str] = NONE) -> None:
     """Note once, on each waiting experiment that may not be claimed with this provenance, why that is."""
     row = ExperimentRow
-    outdated = [text for text in _refusals_of_plugins(session) if not refusals.still_holds(text, refused)]
+    outdated = [text for text in _refusals_of_plugins(session) if not still_holds(text, refused)]
     untold = row.refused_by.is_(None) | row.refused_by.in_(outdated)
     waiting = row.claimable.is_(True) & untold & row.computed_with.is_not(None) & ~permitted(session, under, refused)
     experiments = session.execute(select(row.id, row.spec, row.computed_with).where(waiting).order_by(row.id)).all()
+    robots.learn(session, (spec for _, spec, _ in experiments))
     for experiment, spec, before in experiments:
-        theirs = storable(refusals.text_of(unusable(spec, refused)) or decisive(under, spec))
+        theirs = storable(text_of(unusable(spec, refused)) or decisive(under, spec))
         new = update(row).where(row.id == experiment, untold).values(refused_by=theirs)
         if session.execute(new.returning(row.id)).first() is not None:
             _tell(session, experiment, before, theirs)
@@ -163,7 +165,7 @@ def _refusals_of_plugins(session: Session) -> list[str]:
     """Return the texts by which waiting experiments tell of plug-ins that some supervisor cannot use."""
     row = ExperimentRow
     told = select(row.refused_by).where(row.claimable.is_(True), row.refused_by.is_not(None)).distinct()
-    return [text for text in session.scalars(told) if text is not None and refusals.tells_unavailable(text)]
+    return [text for text in session.scalars(told) if text is not None and tells_unavailable(text)]
 
 
 def unusable(spec: Mapping[str, Any], refused: Mapping[str, str]) -> dict[str, str]:

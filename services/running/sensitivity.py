@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.sensitivity import Checked, Sensitivity
 from gaplab.services.experiments import checks
-from gaplab.services.plugins.refusals import text_of
+from gaplab.services.plugins.external import text_of
 from gaplab.services.running.leases import Change, Leases
 from gaplab.services.running.provenance import NONE, unusable
 from gaplab.services.store.lease import CheckClaim as CheckClaim

@@ -4,7 +4,7 @@ import platform
 import subprocess
 from collections.abc import Mapping
 from contextlib import suppress
-from functools import cache, lru_cache
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from pathlib import Path
@@ -13,12 +13,10 @@ from typing import Any
 from gaplab.arithmetic import chosen
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import SPEC_VERSION
-from gaplab.services.core.external_plugins import file_of
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-from gaplab.services.plugins.contents import Contents
 from gaplab.services.plugins.external import external_plugins, named_in
-from gaplab.services.plugins.watching import present
+from gaplab.services.plugins.loading import here
 
 CODE = ("schemas", "services", "workers")
 LIBRARIES = ("numpy", "scipy", "cma", "numba")
@@ -43,43 +41,37 @@ def versions() -> Versions:
         "Python": platform.python_version(),
         "machine": platform.machine(),
         **{name: _version(name) for name in LIBRARIES},
-        **{each.library: _version(each.library) for each in engines.values() if each.library and not file_of(each)},
+        **{each.library: _version(each.library) for each in engines.own.values() if each.library},
     }
 
 
 def provenance() -> Provenance:
-    """Return what this process computes with, for readers of its results; its plug-ins are those of now."""
-    return _provenance(present())
+    """Return what this process computes with, for readers of its results."""
+    loaded, outside = here(), dict(external_plugins())
+    return _software().model_copy(
+        update={
+            "engines": {name: _engine(name, outside) for name in sorted(engines)},
+            "plugins": dict(loaded.contents.digests) if loaded else {},
+            "outside": outside,
+        }
+    )
 
 
-def plugin_versions(contents: Contents) -> Versions:
+def plugin_versions() -> Versions:
     """Return the version of each external plug-in of this process, by its kind and name, as in `"robot hexapod"`."""
-    libraries = {f"{engines.kind} {name}": _library(each) for name, each in engines.items()}
-    found = external_plugins(contents)
-    return {plugin: ", ".join(filter(None, (text, libraries.get(plugin)))) for plugin, text in found.items()}
-
-
-def versions_of(under: Provenance) -> Versions:
-    """Return the version that a provenance has of each external plug-in, as `plugin_versions` does."""
-    libraries = {f"{engines.kind} {name}": text for name, text in under.engines.items()}
-    return {plugin: libraries.get(plugin, text) for plugin, text in under.outside.items()}
+    outside = external_plugins()
+    return _with_libraries(outside, {name: _engine(name, outside) for name in engines})
 
 
 def named_versions(under: Provenance, spec: Mapping[str, Any]) -> Versions:
     """Return the versions that a provenance has of the external plug-ins that a spec names."""
-    found = versions_of(under)
+    found = _with_libraries(under.outside, under.engines)
     return {plugin: found[plugin] for plugin in named_in(spec) if plugin in found}
 
 
-@lru_cache(maxsize=2)
-def _provenance(contents: Contents) -> Provenance:
-    return _software().model_copy(
-        update={
-            "engines": {name: _engine(each, contents) for name, each in sorted(engines.items())},
-            "plugins": dict(contents.digests),
-            "outside": dict(external_plugins(contents)),
-        }
-    )
+def _with_libraries(outside: Mapping[str, str], texts: Mapping[str, str]) -> Versions:
+    """Return the files of external plug-ins, those of an engine with its library."""
+    return {plugin: texts.get(plugin.removeprefix(f"{engines.kind} "), text) for plugin, text in outside.items()}
 
 
 @cache
@@ -99,11 +91,10 @@ def _software() -> Provenance:
     )
 
 
-def _engine(engine: type[Engine], contents: Contents) -> str:
-    """Return a text that changes when the engine's numbers may."""
-    if (file := file_of(engine)) is not None:
-        return ", ".join(filter(None, (contents.text_of(file) or "none", _library(engine))))
-    return _library(engine) or "of gaplab's own"
+def _engine(name: str, outside: Mapping[str, str]) -> str:
+    """Return a text that changes when the engine's numbers may: its files if it is external, and its library."""
+    found = filter(None, (outside.get(f"{engines.kind} {name}"), _library(engines[name])))
+    return ", ".join(found) or "of gaplab's own"
 
 
 def _library(engine: type[Engine]) -> str | None:

@@ -2,14 +2,12 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache, partial
-from types import ModuleType
 
 import numpy as np
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
-from gaplab.services.core import external_plugins
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters, frozen
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.errors import RealityFailed, gather
@@ -184,11 +182,11 @@ def engine_of(ref: PluginRef) -> Engine:
     Raises:
         InvalidSpec: it is not available here.
     """
-    return _warm_engine(external_plugins.package(), ref.model_dump_json())
+    return _warm_engine(ref.model_dump_json())
 
 
 @lru_cache(maxsize=WARM_ENGINES)
-def _warm_engine(_package: ModuleType | None, ref: str) -> Engine:
+def _warm_engine(ref: str) -> Engine:
     return engines.create(PluginRef.model_validate_json(ref))
 
 

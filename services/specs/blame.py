@@ -2,13 +2,12 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import lru_cache
 from pathlib import Path
 from traceback import walk_tb
-from types import FrameType, ModuleType
+from types import FrameType
 
-from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation
+from gaplab.services.core.registry import EXTERNAL
 from gaplab.services.specs.registries import REGISTRIES
 
 LONGEST = 2_000
@@ -28,7 +27,7 @@ def describe(error: BaseException) -> str:
 def raised(error: BaseException) -> str:
     """Return the sentence without the message, which may name hidden parameters."""
     kind = type(error).__name__
-    plugins = _plugins(external_plugins.package())
+    plugins = _plugins()
     for frame, line in reversed(list(walk_tb(error.__traceback__))):
         if named := next((plugins[place] for place in _places(frame) if place in plugins), None):
             return f"{named} raised {kind} ({Path(frame.f_code.co_filename).name}, line {line})"
@@ -59,7 +58,7 @@ def is_external(error: BaseException) -> bool:
         for frame, _ in walk_tb(error.__traceback__)
         for place in _places(frame)
     )
-    return any(module.partition(".")[0] == external_plugins.PACKAGE for module in modules)
+    return any(module.partition(".")[0] == EXTERNAL for module in modules)
 
 
 def _places(frame: FrameType) -> tuple[type, str | None]:
@@ -67,12 +66,8 @@ def _places(frame: FrameType) -> tuple[type, str | None]:
     return type(frame.f_locals.get("self")), frame.f_globals.get("__name__")
 
 
-@lru_cache(maxsize=1)
-def _plugins(_package: ModuleType | None) -> dict[type | str | None, str]:
-    """Return the kind and name of each plug-in, by its class and by its module; of several in a module, the first.
-
-    The package of external plug-ins is another one after each import of them.
-    """
+def _plugins() -> dict[type | str | None, str]:
+    """Return the kind and name of each plug-in, by its class and by its module; of several in a module, the first."""
     found: dict[type | str | None, str] = {}
     for registry in REGISTRIES.values():
         for name, plugin in registry.items():

@@ -1,6 +1,5 @@
 """The engine of a spec that names none."""
 
-from gaplab.services.core.external_plugins import file_of
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.world import World
 from gaplab.services.engines import engines
@@ -17,7 +16,7 @@ def default_engine(robot: Robot | type[Robot]) -> str:
     named = engines.get(robot.engine)
     if named is None or (named.available() and runs(named, world) and not named.lacks(world)):
         return robot.engine
-    others = (name for name, engine in engines.items() if file_of(engine) is None and engine.available())
+    others = (name for name, engine in engines.own.items() if engine.available())
     able = (name for name in others if runs(engines[name], world) and not engines[name].lacks(world))
     return next(able, robot.engine)
 

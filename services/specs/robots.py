@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from types import ModuleType
 from typing import TypeAlias
 
 from gaplab.schemas.plugin import PluginRef
@@ -10,7 +9,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.results import SensorsRead
 from gaplab.schemas.sensitivity import Checked
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.core import external_plugins, robot_library
+from gaplab.services.core import robot_library
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, gather
 from gaplab.services.core.robot_files import RobotFile
@@ -84,7 +83,7 @@ def unit(spec: NamesARobot) -> str:
     if spec.task is not None:
         return tasks[spec.task.name].unit if spec.task.name in tasks else ""
     try:
-        return _own_unit(external_plugins.package(), spec.robot.model_dump_json())
+        return _own_unit(spec.robot.model_dump_json())
     except InvalidSpec:
         return ""
 
@@ -106,5 +105,5 @@ def sensors(spec: NamesARobot) -> SensorsRead | None:
 
 
 @lru_cache
-def _own_unit(_package: ModuleType | None, ref: str) -> str:
+def _own_unit(ref: str) -> str:
     return robots.create(PluginRef.model_validate_json(ref)).unit

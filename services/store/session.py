@@ -15,14 +15,13 @@ from sqlalchemy.orm import Session as Session
 from sqlalchemy.orm import sessionmaker
 from sqlalchemy.schema import CreateIndex, CreateTable, DDLElement
 
-from gaplab.services.core import robot_library
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
 from gaplab.services.store import database_errors
 from gaplab.services.store.engine import HASTENS, WRITES, open_engine
 from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION, Base
 from gaplab.services.store.models.base import other_schema
-from gaplab.services.store.queries import events, robots
+from gaplab.services.store.queries import events
 from gaplab.services.store.sqlite_file import create, file_of
 
 P = ParamSpec("P")
@@ -63,7 +62,6 @@ class Store:
         event.listen(self._writer, "before_commit", events.write)
         self._hasty = self._engine.execution_options(**{WRITES: True, HASTENS: True})
         self._reader = sessionmaker(self._engine.execution_options(**snapshot), expire_on_commit=False)
-        robot_library.add_source(self)
 
     def __enter__(self) -> Self:
         return self
@@ -123,14 +121,6 @@ class Store:
             self._guard.admit()
             with self._writer(bind=self._hasty) as session, session.begin():
                 work(session, *args, **kwargs)
-
-    def robot_text(self, sha256: str) -> str | None:
-        """Return the text of a robot file; None if it is not stored here, or the database cannot be used now."""
-        try:
-            with self.reading() as session:
-                return robots.text_of(session, sha256)
-        except (StoreUnavailable, DBAPIError):
-            return None
 
     def check(self) -> None:
         """Check that the database can be used and has the schema of this version.

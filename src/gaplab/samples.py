@@ -1,19 +1,30 @@
 """Samples that were measured before an experiment, read from a table without a service."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from gaplab.schemas.measurements import KnownSample
 from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.samples import CellError, SamplesRead
+from gaplab.schemas.traces import TracesSpec
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.csv_tables import read_csv
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.robot_files import read_robot_file
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.sample_tables import checked, collected
 from gaplab.services.core.sample_tables import read_samples as read_table
+from gaplab.services.core.traces import Trace, read_trace
 from gaplab.services.plugins import folders
-from gaplab.services.replay.earlier_traces import with_traces
+from gaplab.services.replay.traces import evaluated, expected_in, refuse_other_bodies
+from gaplab.services.specs.assembly import engine_of
+from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.specs.robots import robot_of_file
+from gaplab.services.specs.simulation import Simulation
 
 
 def read_samples(
@@ -43,9 +54,56 @@ def read_samples(
     if not isinstance(robot, str | Path):
         raise TypeError(f"a robot is its name or its file, not {robot!r:.100}; give its options as `options`")
     file = Path(path)
-    folders.find()
+    folders.load()
     measured = _robot(robot, dict(options or {}), file)
-    return read_table(with_traces(file, measured, confirmed=confirmed), measured).checked(file)
+    return _samples_of(file, measured, confirmed=confirmed).checked(file)
+
+
+def _samples_of(file: Path, robot: Robot, *, confirmed: bool) -> SamplesRead:
+    """Return the samples of a table, or everything that is wrong; of a trace that it names, what its code computes.
+
+    The motion that is expected is that in the robot's own world and engine. A trace that is missing, wrong, or
+    doubtful and not confirmed is an error of its line.
+
+    Raises:
+        InvalidSpec: traces of this robot's base say nothing about it.
+    """
+    text = file.read_text("utf-8", "replace")
+    head, rows, _ = read_csv(text)
+    repeats = [name.removeprefix("trace") for name in head.cells if name.startswith("trace")]
+    if not repeats:
+        return read_table(text, robot)
+    refuse_other_bodies(robot.world)
+
+    def found() -> Iterator[KnownSample | CellError]:
+        for row in rows:
+            cells = dict(zip(head.cells, row.cells, strict=False))
+            try:
+                sample = _measured(robot, cells, repeats, file.parent, confirmed=confirmed)
+            except (InvalidSpec, OSError, KeyError, ValueError) as error:
+                yield CellError(line=row.line, message=row.error or f"{type(error).__name__}: {error}")
+            else:
+                yield from checked(row.line, sample, robot)
+
+    return collected(found())
+
+
+def _measured(
+    robot: Robot, cells: Mapping[str, str], repeats: Sequence[str], folder: Path, *, confirmed: bool
+) -> KnownSample:
+    """Return the sample of a line, whose cells name a recording of each repeat or are empty."""
+    genes = [float(cells[f"gene_{place}"]) for place in range(robot.space.size)]
+    named, genome = [each for each in repeats if cells.get(f"trace{each}")], frozen(genes)
+    contents = [(folder / cells[f"trace{each}"]).read_bytes() for each in named]
+    lags = tuple(float(lag) if (lag := cells.get(f"lag_s{each}")) else None for each in named)
+    traces = [read_trace(content.decode("utf-8", "replace"), "/traces") for content in contents]
+    spec = TracesSpec(traces=tuple(sha256(content).hexdigest() for content in contents), lags_s=lags)
+    simulation = Simulation(robot, engine_of(PluginRef(name=default_engine(robot))), ())
+    times_s, poses, _ = expected_in(simulation, robot, genome, frozen([]))
+    found = evaluated(robot, genome, traces, Trace(times_s, poses[:, :3], poses[:, 3:]), spec)
+    if found.doubts and not confirmed:
+        raise ValueError(f"{'; '.join(found.doubts)}; if that is right, read with confirmed=True")
+    return KnownSample(genome=tuple(genes), values=found.values, readings=found.readings)
 
 
 def _robot(robot: str | Path, options: dict[str, Any], table: Path) -> Robot:

@@ -1,6 +1,5 @@
 """Plug-ins that break the contract are told so, with the reason."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,6 @@ import numpy as np
 import pytest
 
 from gaplab.services.contract.checks import CHECKS, check_file, results
-from gaplab.services.core import external_plugins
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.motions import Motion
@@ -21,20 +19,12 @@ from gaplab.services.core.strategies.random import Random
 from gaplab.services.core.tasks.base import Task
 from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.search import SearchTuner
-from gaplab.services.plugins.external import REGISTRIES
+from gaplab.services.specs.registries import REGISTRIES
 
 
 def reasons(kind: str, plugin: type[Any]) -> str:
     """Return the reasons of all checks that a plug-in fails, one a line."""
     return "\n".join(result.reason for result in results(kind, plugin) if result.reason)
-
-
-@pytest.fixture
-def restored() -> Iterator[None]:
-    """Sets the plug-in folders as they were before."""
-    before = external_plugins.named_folders()
-    yield
-    external_plugins.set_folders(before)
 
 
 class Decaying(SteadyState):
@@ -359,7 +349,7 @@ class Pull(Tunable):
 '''
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 @pytest.mark.parametrize(("gravity", "why"), [(1.62, None), (3.73, "neither an arm nor {} has what it edits: ")])
 def test_a_tunable_passes_if_one_robot_has_what_it_edits(tmp_path: Path, gravity: float, why: str | None) -> None:
     (tmp_path / "moon.py").write_text(LUNAR.format(gravity=gravity))
@@ -386,7 +376,7 @@ class Asserting(Strategy):
 '''
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 def test_an_assertion_of_the_plug_in_is_told_with_its_line(tmp_path: Path) -> None:
     (tmp_path / "asserting.py").write_text(ASSERTING)
 

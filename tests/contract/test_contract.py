@@ -11,12 +11,11 @@ import pytest
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract import checks
 from gaplab.services.contract.checks import CHECKS, Check, check_file, results, write_skeleton
-from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.engines import engines
-from gaplab.services.plugins.external import REGISTRIES
-from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.plugins import loading
+from gaplab.services.specs.registries import REGISTRIES
 
 
 def own() -> Iterator[Any]:
@@ -26,14 +25,6 @@ def own() -> Iterator[Any]:
             if kind != "engine" or engines[name].available():
                 for check in CHECKS[kind]:
                     yield pytest.param(plugin, check, id=f"{name}-{check.__name__}")
-
-
-@pytest.fixture
-def restored() -> Iterator[None]:
-    """Sets the plug-in folders as they were before."""
-    before = external_plugins.named_folders()
-    yield
-    external_plugins.set_folders(before)
 
 
 @pytest.mark.parametrize(("plugin", "check"), list(own()))
@@ -47,7 +38,7 @@ def test_each_kind_has_checks_with_a_promise() -> None:
         assert re.match(r"[A-Z]\w+s |Is ", checks.promise_of(check)), check
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 def test_a_skeleton_of_each_kind_keeps_the_contract_at_once(tmp_path: Path) -> None:
     for kind in CHECKS:
         file = write_skeleton(kind, f"my_{kind}", tmp_path / kind)
@@ -75,7 +66,7 @@ def test_a_name_whose_class_would_be_a_word_of_python_is_refused(tmp_path: Path,
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 @pytest.mark.parametrize(
     ("kind", "name"),
     [
@@ -95,14 +86,14 @@ def test_a_skeleton_named_like_what_it_imports_keeps_the_contract(tmp_path: Path
     assert (found.kind, found.name, found.passes) == (kind, name, True)
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 def test_the_skeleton_of_an_engine_is_no_hardware(tmp_path: Path) -> None:
     (found,) = check_file(write_skeleton("engine", "my_engine", tmp_path))
 
     assert REGISTRIES["engine"][found.name].repeatable
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 @pytest.mark.parametrize("scale", [0.1, 0.25])
 def test_the_skeleton_of_a_discrepancy_reports_errors_in_the_unit_of_fitness(tmp_path: Path, scale: float) -> None:
     (found,) = check_file(write_skeleton("discrepancy", "my_discrepancy", tmp_path))
@@ -134,7 +125,7 @@ class Broken(Strategy):
 '''
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 def test_a_broken_promise_is_told_with_its_reason(tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text(BROKEN.format(gene="7.0"))
 
@@ -148,7 +139,7 @@ def test_a_broken_promise_is_told_with_its_reason(tmp_path: Path) -> None:
     assert any("end it with a full stop" in reason for reason in reasons)
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 def test_an_error_of_the_plug_in_is_told_with_its_line(tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text(BROKEN.format(gene="belief.nothing"))
 
@@ -159,7 +150,7 @@ def test_an_error_of_the_plug_in_is_told_with_its_line(tmp_path: Path) -> None:
     }
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 def test_a_file_that_cannot_be_used_says_why(tmp_path: Path) -> None:
     (tmp_path / "bad.py").write_text("from gaplab.plugins import Strategy\nimport nowhere\n")
     (tmp_path / "none.py").write_text("X = 1\n")
@@ -177,7 +168,7 @@ def test_a_file_that_cannot_be_used_says_why(tmp_path: Path) -> None:
 STRATEGY = BROKEN.format(gene="0.5")
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 @pytest.mark.parametrize(
     ("place", "text", "says"),
     [
@@ -196,11 +187,11 @@ def test_a_file_whose_plug_in_is_not_imported_says_why(tmp_path: Path, place: st
 
     with pytest.raises(GaplabError, match=f"{re.escape(str(checked))} has no plug-in; {re.escape(says)}"):
         list(check_file(checked))
-    external_plugins.set_folders((tmp_path,))
-    assert [each.why.startswith(says) for each in ignored_files()] == ([] if place[0] == "_" else [True])
+    ignored = loading.load((tmp_path,)).ignored
+    assert [each.why.startswith(says) for each in ignored] == ([] if place[0] == "_" else [True])
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 def test_the_first_file_of_a_package_is_the_package(tmp_path: Path) -> None:
     (tmp_path / "pack").mkdir()
     (tmp_path / "pack" / "__init__.py").write_text(STRATEGY)
@@ -209,20 +200,19 @@ def test_the_first_file_of_a_package_is_the_package(tmp_path: Path) -> None:
         assert [found.name for found in check_file(tmp_path / checked)] == ["broken"]
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 @pytest.mark.parametrize(("checked", "other"), [("a", "b"), ("b", "a")])
 def test_a_name_that_another_file_has_is_told_of_either_file(tmp_path: Path, checked: str, other: str) -> None:
     for name in ("a", "b"):
         (tmp_path / f"{name}.py").write_text(STRATEGY)
-    external_plugins.set_folders((tmp_path,))
 
-    (found,) = check_file(tmp_path / f"{checked}.py")
+    (found,) = check_file(tmp_path / f"{checked}.py", (tmp_path,))
 
     assert found.unusable is not None
     assert found.unusable.startswith(f"{checked}.py has a strategy called 'broken', but so has {other}.py")
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 def test_a_check_runs_no_file_that_the_checked_one_does_not_import(tmp_path: Path) -> None:
     plugins, drafts = tmp_path / "plugins", tmp_path / "drafts"
     file = write_skeleton("strategy", "my_strategy", drafts)
@@ -230,16 +220,15 @@ def test_a_check_runs_no_file_that_the_checked_one_does_not_import(tmp_path: Pat
     file.write_text(f"{file.read_text()}\nfrom gaplab_plugins.beside import X  # noqa\n")
     (drafts / "beside.py").write_text("X = 1\n")
     (drafts / "analysis.py").write_text(f"open({str(tmp_path / 'moved')!r}, 'w').write('the robot')\n")
-    external_plugins.set_folders((plugins,))
 
-    (found,) = check_file(file)
+    (found,) = check_file(file, (plugins,))
 
     assert found.name == "my_strategy"
     assert found.passes
     assert not (tmp_path / "moved").exists()
 
 
-@pytest.mark.usefixtures("restored")
+@pytest.mark.usefixtures("plug_ins")
 def test_a_check_knows_the_plug_ins_of_the_files_that_the_checked_one_imports(tmp_path: Path) -> None:
     robot = write_skeleton("robot", "my_robot", tmp_path)
     write_skeleton("controller", "my_controller", tmp_path)

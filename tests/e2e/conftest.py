@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from gaplab.services.archives import import_archive
-from gaplab.services.core import external_plugins
+from gaplab.services.plugins import loading
 from gaplab.services.store.session import Store
 from tests.drawn_robot import FILES, strode
 from tests.e2e.api_alone import Api
@@ -95,15 +95,14 @@ def plugins(folder: Path) -> Path:
 @pytest.fixture(scope="session")
 def known(written_file: Path, plugins: Path) -> Known:
     """What is in the database of `api` from the beginning."""
-    before = external_plugins.folders()
-    external_plugins.set_folders((*before, plugins))
+    loading.load((plugins,))
     store = Store(f"sqlite:///{written_file}")
     fill(store, 210)
     study = make(store, "a study", Study(CURVES, repetitions=4))
     strider = strode(store, iterations=2)
     cancel(store, submit_one(store, toy(name="given up")).id)
     store.dispose()
-    external_plugins.set_folders(before)
+    loading.load(())
     return Known(study.id, [each.id for each in study.experiments], strider)
 
 

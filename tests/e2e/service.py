@@ -25,7 +25,9 @@ class Service:
         http: a client of it.
     """
 
-    def __init__(self, folder: Path, database_url: str | None = None, plugins: Any = "") -> None:
+    def __init__(
+        self, folder: Path, database_url: str | None = None, plugins: Any = "", arguments: tuple[str, ...] = ()
+    ) -> None:
         port = free_port()
         self.url = f"http://127.0.0.1:{port}"
         self.http = httpx2.Client(base_url=self.url, timeout=LONGEST_S)
@@ -37,12 +39,12 @@ class Service:
             "GAPLAB_LEASE_S": "5",
             "GAPLAB_PLUGINS": str(plugins),
         }
+        self._command = [sys.executable, "-m", "gaplab", "serve", *arguments]
         self._process: Any = None
 
     def start(self) -> Any:
         with self._log.open("ab") as log:
-            command = [sys.executable, "-m", "gaplab", "serve"]
-            self._process = subprocess.Popen(command, env=self._environment, stdout=log, stderr=log)
+            self._process = subprocess.Popen(self._command, env=self._environment, stdout=log, stderr=log)
         wait_until(self._answers, otherwise=self.log)
         return self
 

@@ -30,7 +30,7 @@ def specs(tmp_path: Path) -> Path:
 def demo(folder: Path, specs: Path) -> "subprocess.Popen[str]":
     script = (
         "import sys; from pathlib import Path\n"
-        "from gaplab.api.clients.progress.text import console\n"
+        "from gaplab.api.clients.screen import console\n"
         "from gaplab.api.commands.demo import run\n"
         "run(Path(sys.argv[1]), console(), Path(sys.argv[2]))"
     )

@@ -90,7 +90,7 @@ def test_a_notebook_runs_from_its_first_cell_to_its_last(path: Path, service: Lo
 
     data = [output["data"] for output in shown if "data" in output]
     assert any("image/svg+xml" in each for each in data)  # a figure
-    assert any("<progress" in each.get("text/html", "") for each in data)  # its progress
+    assert any(" repetitions; " in each.get("text/html", "") for each in data)  # its progress
     assert any("COMPLETED" in each.get("text/plain", "") for each in data)
     assert not [output for output in shown if output["output_type"] == "stream" and output["name"] == "stderr"]
 

@@ -180,24 +180,17 @@ def supervisors_that_broke(service: Any) -> int:
 
 
 @pytest.mark.release
-def test_an_edit_concerns_the_experiments_that_name_the_plug_in_and_a_person_may_accept_it(
+def test_after_an_edit_a_service_of_an_author_starts_again_and_a_person_may_accept_it(
     tmp_path: Path, service_in: Any
 ) -> None:
-    own, other = tmp_path / "own.py", tmp_path / "other.py"
+    own = tmp_path / "own.py"
     own.write_text(OWN)
-    other.write_text(OWN.replace("own", "other"))
-    service = service_in(tmp_path, plugins=tmp_path)
+    service = service_in(tmp_path, plugins=tmp_path, arguments=("--reload",))
     service.start()
     path = own_begun(service)
 
-    other.write_text("class Other(Strategy")
-    service.kill_repetitions()
-    before = service.get(path)["progress"]["iterations_done"]
-    wait_until(lambda: service.get(path)["progress"]["iterations_done"] > before, otherwise=service.log)
-    assert service.get(path)["warnings"] == []
-
     own.write_text(EDITED)
-    service.kill_repetitions()
+    wait_until(lambda: service.log().count("ready for") == 2, otherwise=service.log)
     wait_until(lambda: [each for each in service.get(path)["warnings"] if "strategy own (own.py" in each])
     quick = service.post("/experiments", QUICK)["id"]
     assert service.finish(f"/experiments/{quick}")["state"] == "COMPLETED"
@@ -210,6 +203,31 @@ def test_an_edit_concerns_the_experiments_that_name_the_plug_in_and_a_person_may
     first, *_, last = (each["provenance"]["outside"] for each in service.get(f"{path}/provenance")["uses"])
     assert first["strategy own"] != last["strategy own"]
     assert supervisors_that_broke(service) == 0
+
+
+@pytest.mark.release
+def test_after_an_edit_a_new_worker_computes_nothing_until_the_service_starts_again(
+    tmp_path: Path, service_in: Any
+) -> None:
+    own = tmp_path / "own.py"
+    own.write_text(OWN)
+    service = service_in(tmp_path, plugins=tmp_path)
+    service.start()
+    path = own_begun(service)
+
+    own.write_text(EDITED)
+    service.kill_repetitions()
+    told = "start the service again if it was edited"
+    wait_until(lambda: [each for each in service.get(path)["warnings"] if told in each], otherwise=service.log)
+    own.write_text(OWN)
+    service.stop()
+    service.start()
+
+    ended = service.finish(path)
+    assert (ended["state"], ended["warnings"]) == ("COMPLETED", [])
+    assert (
+        len({each["provenance"]["outside"]["strategy own"] for each in service.get(f"{path}/provenance")["uses"]}) == 1
+    )
 
 
 @pytest.mark.release
@@ -227,7 +245,7 @@ def test_a_plug_in_that_is_broken_when_the_service_starts_holds_up_its_own_exper
     service.start()
     why = "own.py cannot be imported: SyntaxError: '(' was never closed (own.py, line 1)"
     (entry,) = [each for each in service.get("/catalogue")["strategies"] if each["name"] == "own"]
-    assert (entry["available"], entry["note"]) == (False, f"{why}; repair the file, which is then imported again")
+    assert (entry["available"], entry["note"]) == (False, f"{why}; repair the file, and start the service again")
     refused = service.http.post("/experiments", json=QUICK | {"strategy": "own"})
     assert refused.status_code == 422
     assert why in refused.text

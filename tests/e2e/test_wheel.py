@@ -136,6 +136,6 @@ def test_it_migrates_serves_and_draws_a_figure(user: User, home: Path) -> None:
     with user.serving():
         submitted = json.loads(user.run("gaplab", "submit", "spec.json", "--json"))
         user.run("gaplab", "watch", submitted["id"])
-        user.run("gaplab", "curve", submitted["id"], "--svg", "curve.svg")
+        user.run("gaplab", "figure", "curves", submitted["id"], "-o", "curve.svg")
 
     assert "<svg" in (home / "curve.svg").read_text()

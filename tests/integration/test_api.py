@@ -84,7 +84,7 @@ def test_what_has_run_is_shown_by_repetition_sample_and_simulator(store: Store, 
 
     path = f"/experiments/{made['id']}"
     done = api.get(path).json()
-    assert (done["state"], done["progress"]["completed"], done["progress"]["seconds_left"]) == ("COMPLETED", 2, 0)
+    assert (done["state"], done["progress"]["completed"], done["progress"]["time_left"]) == ("COMPLETED", 2, None)
     assert [each["state"] for each in api.get(f"{path}/repetitions").json()] == ["COMPLETED", "COMPLETED"]
     samples = api.get(f"{path}/samples", params={"repetition": 1, "kind": "sample"}).json()["items"]
     assert [(each["iteration"], each["fitness"]) for each in samples] == [(1, None), (2, 1 / 3)]

@@ -10,11 +10,13 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from gaplab.api.clients.client import Client
+from gaplab.api.clients.errors import ServiceUnreachable
 from gaplab.api.process import local_service
 from gaplab.api.process.child_process import end, start
 from gaplab.api.process.errors import CommandError
@@ -27,7 +29,9 @@ from gaplab.services.access import create_token, revoke_token
 from gaplab.services.core.errors import StoreUnavailable, Unauthenticated
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
+from tests.fakes import CAREFUL
 from tests.ports import free_port
+from tests.processes import processes_with
 from tests.waiting import LONGEST_S, wait_until
 
 
@@ -112,6 +116,38 @@ def test_a_service_migrates_its_database_answers_and_ends_in_order(
     assert json.loads(said)["message"].startswith(f"gaplab serves on http://127.0.0.1:{port}")
     assert said.count("\n") == 1
     assert (tmp_path / "new.db").stat().st_size > 0
+
+
+def test_a_service_of_an_author_starts_again_when_a_plug_in_file_changes(
+    tmp_path: Path, sqlite_url: str, port: int
+) -> None:
+    environment = {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_PLUGINS": str(tmp_path)}
+    process = serve(environment, "--no-workers", "--reload", "--port", str(port))
+
+    with Client(f"http://127.0.0.1:{port}") as client:
+        wait_until(client.ready)
+        assert "careful" not in names_of(client)
+        (tmp_path / "careful.py").write_text(CAREFUL)
+        wait_until(lambda: client.ready() and "careful" in names_of(client))
+    process.terminate()
+    said, _ = process.communicate(timeout=LONGEST_S)
+
+    assert process.returncode == 0, said
+    assert said.count("gaplab serves on") == 2
+    assert processes_with(f"GAPLAB_PORT={port}") == []
+
+
+def names_of(client: Client) -> set[str]:
+    """The strategies of a service that may be ending; none if it does not answer."""
+    with suppress(ServiceUnreachable):
+        return {each.name for each in client.catalogue().strategies}
+    return set()
+
+
+def test_without_a_folder_there_is_nothing_to_start_again_for() -> None:
+    code, said = ended({"GAPLAB_PLUGINS": ""}, "--reload")
+
+    assert (code, "--reload watches the folders of GAPLAB_PLUGINS" in said) == (1, True)
 
 
 @pytest.mark.release

@@ -11,8 +11,7 @@ import pytest
 from rich.console import Console
 
 from gaplab import Client
-from gaplab.api.clients.progress import log
-from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
+from gaplab.api.clients.progress import RecordProgress, Snapshot, log
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.measurements import TakeSpec
 from gaplab.services.bench import taking
@@ -239,9 +238,7 @@ def test_an_experiment_that_waits_for_its_robot_is_listed_shown_and_watched(
 
     listings = [gaplab("list"), gaplab("show", id_)]
     with Client(url) as client:
-        log.show(
-            [Snapshot(client.study(id_), (RecordProgress(client.experiment(id_)),))], Console(file=watched, width=160)
-        )
+        log([Snapshot(client.study(id_), (RecordProgress(client.experiment(id_)),))], Console(file=watched, width=160))
 
     assert [said.code for said in listings] == [0, 0]
     assert all("WAITING" in said.out for said in listings)

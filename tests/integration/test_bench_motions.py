@@ -11,7 +11,7 @@ import yaml
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.bench import motions
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.csv_tables import csv_text, lines_of, rows_of
+from gaplab.services.core.csv_tables import csv_text, read_csv
 from gaplab.services.core.errors import Conflict
 from gaplab.services.specs.robots import Driven, robot_of
 
@@ -84,13 +84,13 @@ def test_a_joint_in_the_csv_is_no_formula_and_is_read_with_its_name(put: Any) ->
     text = written("mixed", "csv")
 
     assert next(csv.reader(text.splitlines()))[-2:] == ["'=1+1 hinge (N·m)", "'=1+1 slide (N)"]
-    assert next(rows_of(lines_of(text))).cells[-2:] == ["=1+1 hinge (N·m)", "=1+1 slide (N)"]
+    assert read_csv(text).header.cells[-2:] == ["=1+1 hinge (N·m)", "=1+1 slide (N)"]
 
 
 def test_texts_in_csv_are_read_as_they_were_written() -> None:
     names = ["=1", "'=1", "''=1", "'plain", "+x", "-x", "@x", "it's", "a,b", '"']
 
-    assert next(rows_of(lines_of(csv_text(names, [])))).cells == names
+    assert read_csv(csv_text(names, [])).header.cells == names
 
 
 def test_a_trajectory_begins_at_rest_and_jumps_nowhere() -> None:

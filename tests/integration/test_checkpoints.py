@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.api.clients.progress.text import counts
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.records import Progress
 from gaplab.services.core.answers import unpack
@@ -253,7 +252,7 @@ def test_progress_tells_how_far_a_tuning_has_come(store: Store) -> None:
     tuning = [(step, progress) for progress in seen for step in progress.steps if step.kind == "tuning"]
     assert {(step.repetition, step.iteration, step.budget) for step, _ in tuning} == {(0, 1, tuning[0][0].budget)}
     assert 0 < tuning[0][0].rollouts < tuning[-1][0].rollouts <= tuning[0][0].budget
-    assert f"; tuning 1: {100 * tuning[1][0].rollouts // tuning[1][0].budget} %" in counts(tuning[1][1])
+    assert f"; tuning 1: {100 * tuning[1][0].rollouts // tuning[1][0].budget} %" in tuning[1][1].text
     done = [progress.rollouts_done + progress.rollouts_saved for progress in seen]
     assert done == sorted(done)
     assert (done[-1], seen[-1].steps) == (seen[-1].rollouts, ())

@@ -138,14 +138,12 @@ def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Sto
     svg, html = tmp_path / "new" / "fig.svg", tmp_path / "fig.html"
 
     table, values = gaplab("curve", id), gaplab("curve", id, "--csv")
-    drawn = gaplab("curve", id, "--svg", str(svg), "--html", str(html))
-    both = gaplab("curve", id, "--csv", "--svg", str(svg))
+    drawn = gaplab("figure", "curves", id, "-o", str(svg), "-o", str(html))
 
     assert re.search(r"^ *2 +\d+\.\d\d±\d+\.\d\d", table.out, re.MULTILINE)
     assert "evolved in reality itself" in table.out
     assert values.out.startswith("experiment,name,strategy,repetition,evaluations,fitness\n")
     assert drawn.code == 0
-    assert both == (0, values.out, f"Wrote {svg}.\n")
     assert ET.fromstring(svg.read_text()).tag.endswith("svg")
     assert html.read_text().startswith("<!doctype html>")
 
@@ -203,8 +201,8 @@ def test_sensitivity_waits_for_a_table_and_warns(gaplab: Gaplab, sqlite_store: S
     worker.join()
 
     assert said.code == 0
-    assert re.search(r"^ *static_friction +0 to 1.5 .* smooth *$", said.out, re.MULTILINE)
-    assert re.search(r"^ *restitution +0.3 to 0.3001 .* nothing *$", said.out, re.MULTILINE)
+    assert re.search(r"^ *Static friction +0 to 1.5 .* smooth *$", said.out, re.MULTILINE)
+    assert re.search(r"^ *Restitution +0.3 to 0.3001 .* nothing *$", said.out, re.MULTILINE)
     assert "restitution over 0.3 to 0.3001 does nothing" in said.out
 
 
@@ -242,7 +240,7 @@ def test_show_tells_warnings_and_misfit(gaplab: Gaplab, sqlite_store: Store) -> 
     assert "warning: restitution over 0.3 to 0.3001 does nothing" in before.err
     assert "the best simulators err by" not in before.out
     assert "at 2 real-world evaluations the best simulators err by" in after.out
-    assert re.search(r"^ *static_friction +0.1 ± 0 ", after.out, re.MULTILINE)
+    assert re.search(r"^ *Static friction +0.1 ± 0 ", after.out, re.MULTILINE)
 
 
 def test_no_service_is_a_sentence_that_says_how_to_start_one(gaplab: Gaplab) -> None:

@@ -18,13 +18,11 @@ from rich.console import Console
 
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
-from gaplab.api.clients.progress import terminal
-from gaplab.api.clients.progress.snapshots import Snapshot, Snapshots
+from gaplab.api.clients.progress import Snapshot, show, spark
 from gaplab.api.commands import completion
 from gaplab.api.commands.cli import app
 from gaplab.api.commands.exit_codes import BY_STATUS, Exit
 from gaplab.api.http import problems
-from gaplab.services.core import external_plugins
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
@@ -76,9 +74,8 @@ def said() -> dict[str, Any]:
 
 
 @pytest.fixture
-def ask(gaplab: Gaplab, said: dict[str, Any]) -> Iterator[Callable[..., Any]]:
-    """Gives the document that a command prints; the plug-in folders are as before at the end."""
-    before = external_plugins.named_folders()
+def ask(gaplab: Gaplab, said: dict[str, Any], plug_ins: Callable[..., None]) -> Callable[..., Any]:
+    """Gives the document that a command prints; the plug-ins are as before at the end."""
 
     def document(name: str, *arguments: str, **shell: str) -> Any:
         answer = gaplab(*name.split(), *arguments, "--json", **shell)
@@ -86,8 +83,7 @@ def ask(gaplab: Gaplab, said: dict[str, Any]) -> Iterator[Callable[..., Any]]:
         said[name] = json.loads(answer.out)
         return said[name]
 
-    yield document
-    external_plugins.set_folders(before)
+    return document
 
 
 @pytest.mark.release
@@ -268,7 +264,7 @@ def test_a_figure_is_drawn_into_as_many_files_as_one_names(
 def test_a_figure_that_cannot_be_drawn_is_a_sentence_and_no_file(gaplab: Gaplab, study: str, tmp_path: Path) -> None:
     svg = str(tmp_path / "a.svg")
     wrong = [
-        (["curves", study, "-o", str(tmp_path / "a.docx")], Exit.USAGE, "has no suffix of a figure"),
+        (["curves", study, "-o", str(tmp_path / "a.docx")], Exit.USAGE, "has another suffix; permitted: .svg"),
         (["curves", study, "-o", svg, "--set", "band"], Exit.USAGE, "NAME=VALUE"),
         (["curves", study, "-o", svg, "--set", "band=wide"], Exit.INVALID, "band"),
         (["curves", study, "-o", svg, "--set", "self=1"], Exit.INVALID, "unknown parameter 'self'"),
@@ -392,8 +388,8 @@ def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: s
         yield from snapshots
 
     with Client(url) as client:
-        snapshots = Snapshots(client.records, client.results).of(study, every_s=0.1, patience_s=60)
-        ended = terminal.show(finishing(snapshots), screen, keep=True)
+        snapshots = client.watcher.snapshots(study, curves=True, every_s=0.1)
+        ended = show(finishing(snapshots), screen, keep=True)
 
     shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown_on.getvalue())
     assert ended.state == "COMPLETED"
@@ -441,5 +437,5 @@ def test_it_is_waited_for_only_so_long_and_a_refusal_not_at_all(url: str, study:
 
 
 def test_numbers_become_blocks() -> None:
-    assert terminal.spark([0, 1, 2], 0, 2) == "▁▅█"
-    assert terminal.spark([3, 3], 3, 3) == "▁▁"
+    assert spark([0, 1, 2], 0, 2) == "▁▅█"
+    assert spark([3, 3], 3, 3) == "▁▁"

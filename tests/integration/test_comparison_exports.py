@@ -14,7 +14,7 @@ from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.comparisons import Comparison, Equivalence, Estimate, Summary, Test, Trusted
-from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex, escaped
+from gaplab.services.findings.tables import comparison, escaped, latex
 from gaplab.services.results.comparisons import compare, warnings_of
 from gaplab.services.store.session import Store
 from tests import experiments
@@ -84,34 +84,33 @@ def test_transferred_controllers_alone_and_the_best_of_them_stand_beside_the_rec
     assert "Thin lines: transferred controllers alone." in figure["caption"]
 
 
-def test_latex_prints_names_as_they_are_and_rounds_p_as_papers_do() -> None:
-    test = Test(statistic=3.0, p=0.0001, p_holm=0.0003, text="< 0.001 (raw < 0.001)")
-    estimate, nothing = Estimate(value=0.125, lower=0.05, upper=0.2, text="0.125 [0.05, 0.2]"), Estimate(text="–")
-    equivalence = Equivalence(margin=0.03, test="welch", p=0.2, p_holm=0.4, verdict="undecided", words="")
+def test_latex_prints_names_as_they_are_and_numbers_in_math_mode() -> None:
+    test = Test(p=0.0001, p_holm=0.0003, text="< 0.001 (raw < 0.001)")
+    estimate, nothing = Estimate(value=0.125, text="0.125 [0.05, 0.2]"), Estimate(text="–")
+    equivalence = Equivalence(
+        margin=0.03, test="welch", p=0.2, p_holm=0.4, verdict="undecided", words="undecided within ±0.03"
+    )
     summary = Summary(n=9, sd=0.5, mean=estimate, interquartile_mean=nothing)
     pair = Comparison(
         first="a", second="b", first_name="half & half_100%", second_name=r"a\b{c}^~", from_evaluations=3,
-        to_evaluations=5, n_first=9, n_second=9, sizes="9, 9", difference=-0.25, effect_size=None,
-        difference_text="−0.25 [−0.5, 0]", effect_size_text="–", student=test,
-        welch=test.model_copy(update={"text": "0.041 (raw < 0.001)"}), mann_whitney=Test(text="–"),
+        to_evaluations=5, n_first=9, n_second=9, sizes="9, 9", difference=-0.25, difference_text="−0.25 [−0.5, 0]",
+        effect_size=None, effect_size_text="–", student=test, welch=test, mann_whitney=Test(text="–"),
         lower=-0.5, upper=0.0, improvement=estimate, shared_streams=False, streams="", n_paired=0,
-        trusted=Trusted(test="welch"), paired_t=Test(),
+        trusted=Trusted(test="welch", text="0.041 (raw 0.004)"), paired_t=Test(),
         wilcoxon=Test(), brown_forsythe=test, summary_first=summary, summary_second=summary,
-        equivalence=equivalence, where="mean of each repetition over 3 to 5 real-world evaluations",
+        equivalence=equivalence, unit="m/s", where="mean of each repetition over 3 to 5 real-world evaluations",
     )  # fmt: skip
 
-    table = comparisons_latex([pair], "m/s")
+    table = latex(comparison([pair]))
 
-    assert r"half \& half 100\% & a\textbackslash{}b\{c\}\textasciicircum{}\textasciitilde{} & 9, 9 & " in table
-    assert r" & 9, 9 & $-0.25$ [$-0.5$, $0$] & -- & $0.125$ [$0.05$, $0.2$]" in table
-    small = r"$< 0.001$ (raw $< 0.001$)"
-    assert rf"& {small} & $0.041$ (raw $< 0.001$) & -- & {small} & undecided, $0.400$ (raw $0.200$) \\" in table
-    assert "mean of each repetition over 3 to 5 real-world evaluations" in table
-    assert r"equivalence within $\pm0.03$" in table
-    assert table.count(r"\begin{table}") == 2
-    assert "in m/s" in table
+    name = r"half \& half 100\% $-$ a\textbackslash{}b\{c\}\textasciicircum{}\textasciitilde{}"
+    assert f"{name} & $9$, $9$ & $-0.25$ [$-0.5$, $0$] & -- & $0.125$ [$0.05$, $0.2$] \\\\" in table
+    verdict = r"$0.041$ (raw $0.004$) & too few values that vary & undecided within $\pm0.03$ \\"
+    assert f"{name} & Welch & {verdict}" in table
+    assert f"{name} & $< 0.001$ (raw $< 0.001$) & $< 0.001$ (raw $< 0.001$) & -- & $< 0.001$ (raw" in table
+    assert r"\caption{Recorded fitness in m/s, mean of each repetition over 3 to 5 real-world evaluations" in table
+    assert table.count(r"\begin{table}") == 4
     assert table.count("{") == table.count("}") - table.count(r"\}") + table.count(r"\{")
-    assert comparisons_csv([pair]).count("\n") == 2
     assert escaped("a\n b") == "a b"
 
 
@@ -140,7 +139,7 @@ def test_the_command_prints_each_format(ids: list[str], gaplab: Gaplab) -> None:
         gaplab("compare", *ids, "--at", "2", "--format", name) for name in ("table", "csv", "json", "latex")
     )
 
-    assert "p Mann-Whitney" in table.out
+    assert "Mann-Whitney" in table.out
     assert "plain" in table.out
     assert len(text.out.splitlines()) == 1 + 3
     assert json.loads(document.out)[0]["to_evaluations"] == 2

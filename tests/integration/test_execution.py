@@ -381,12 +381,12 @@ def test_progress_counts_what_the_steps_took(store: Store) -> None:
     progress = reading.read_experiment(store, submitted.id).progress
 
     spent = Cost(3 * 60 + 2 * 90, 3 * 3 + 2 * 3)
-    assert (waiting.iterations_done, waiting.rollouts_done, waiting.seconds_left) == (0, 0, None)
+    assert (waiting.iterations_done, waiting.rollouts_done, waiting.time_left) == (0, 0, None)
     assert (progress.repetitions, progress.completed, progress.failed) == (3, 1, 0)
     assert (progress.iterations, progress.iterations_done) == (9, 4)
     assert (progress.rollouts_done, progress.rollouts_failed) == (spent.rollouts + 90, spent.failures + 4)
     assert (progress.counted_iterations, progress.counted_iterations_done) == (6, 2)
-    assert (progress.seconds_left, progress.time_left) == (None, None)  # of a pace of milliseconds nothing is known
+    assert progress.time_left is None  # of a pace of milliseconds nothing is known
 
 
 def test_nothing_is_left_to_do_at_the_end(store: Store) -> None:
@@ -395,7 +395,7 @@ def test_nothing_is_left_to_do_at_the_end(store: Store) -> None:
 
     run(store, claim)
 
-    assert reading.read_experiment(store, submitted.id).progress.seconds_left == 0
+    assert reading.read_experiment(store, submitted.id).progress.time_left is None
 
 
 def test_the_budgeted_rollouts_are_those_that_a_repetition_takes_or_saves(store: Store) -> None:

@@ -283,7 +283,7 @@ def test_a_queued_experiment_can_be_cancelled_once(store: Store) -> None:
 
     assert (cancelled.state, cancelled.started_at) == (State.CANCELLED, None)
     assert cancelled.ended_at is not None
-    assert cancelled.progress.seconds_left == 0
+    assert cancelled.progress.time_left is None
     assert cancelled == reading.read_experiment(store, experiment)
     with pytest.raises(Conflict, match="CANCELLED"):
         cancel(store, experiment)

@@ -185,7 +185,7 @@ def test_stopping_keeps_what_is_there(store: Store) -> None:
     assert states(store, experiment) == [State.COMPLETED, State.COMPLETED, State.CANCELLED, State.CANCELLED]
     assert [len(each) for each in stored(store, experiment)] == [13, 10, 2, 0]
     assert [point.n for point in curves.curve(store, experiment).points] == [2, 2, 1]
-    assert reading.read_experiment(store, experiment).progress.seconds_left == 0
+    assert reading.read_experiment(store, experiment).progress.time_left is None
     assert endings(store, experiment, 1) == [Ending.STOPPED]
 
 

@@ -1,8 +1,9 @@
-"""External plug-ins that are edited or broken while experiments name them: those wait, and others go on."""
+"""External plug-ins that were edited or broken before a process started: experiments that name them wait."""
 
 import pickle
 import sys
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +11,17 @@ import pytest
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.sensitivity import SensitivitySpec
 from gaplab.services import events
 from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
+from gaplab.services.core.registry import EXTERNAL
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import checks, reading
-from gaplab.services.plugins import watching
-from gaplab.services.plugins.watching import FolderWatch
+from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.running import execution, provenance, sensitivity, versions
 from gaplab.services.settings import Settings
-from gaplab.services.specs import blame
-from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.workers import nodes
@@ -76,18 +74,14 @@ class Slippery(ToyFunction):
 """
 
 
-@pytest.fixture(autouse=True)
-def looks_at_files_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watching, "LOOK_S", 0)
-
-
 def submit(store: Store, **changes: Any) -> str:
     return submit_one(store, toy(**{"repetitions": 2} | changes)).id
 
 
 def claimed(store: Store, plugins: Plugins | None = None) -> list[str]:
-    """The experiments that a supervisor claims now, with as many claims as it likes."""
-    return sorted({claim.experiment_id for claim in execution.claim(store, "me", 9, *(plugins or Plugins()).present())})
+    """The experiments that a supervisor claims, with as many claims as it likes; left out: one that starts now."""
+    plugins = plugins or Plugins()
+    return sorted({each.experiment_id for each in execution.claim(store, "me", 9, plugins.under, plugins.refused())})
 
 
 def refusals(store: Store) -> list[Any]:
@@ -108,58 +102,94 @@ def expected(strategy: str = "careful", **changes: Any) -> Any:
     return Plugins(versions.versions()).expected(resolve_experiment(toy(strategy=strategy, **changes)))
 
 
-def test_a_new_process_is_refused_for_an_edit_of_a_plug_in_that_the_spec_names_and_does_not_import_it(
-    put: Any,
+@pytest.fixture
+def process(put: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Lets this process be another, which has imported no plug-in yet, with a folder in its environment."""
+
+    def begin(home: Path) -> None:
+        monkeypatch.setenv(VARIABLE, str(home))
+        for name in [name for name in sys.modules if name.partition(".")[0] == EXTERNAL]:
+            del sys.modules[name]
+
+    return begin
+
+
+def test_a_process_is_refused_for_an_edit_of_a_plug_in_that_the_spec_names_and_does_not_import_it(
+    put: Any, process: Any
 ) -> None:
     home = put(careful=CAREFUL, brave=CAREFUL.replace("careful", "brave"))
     wanted, others = expected(), expected("random")
-    nodes.check_here(wanted)
     (home / "brave.py").write_text("class Brave(")
-    put()
+    process(home)
     nodes.check_here(wanted)
 
     (home / "careful.py").write_text(EDITED)
-    put()
-    nodes.check_here(others)
+    nodes.check_here(wanted)  # this process has imported it
+    process(home)
     with pytest.raises(PluginDiffers) as refused:
         nodes.check_here(wanted)
 
     assert "gaplab_plugins.careful" not in sys.modules
     assert set(refused.value.differences) == {"strategy careful"}
     assert wanted["plug-in strategy careful"] in str(refused.value)
+    assert "start the service again if it was edited" in str(refused.value)
     assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)
+    nodes.check_here(others)
+    assert "careful" not in strategies
 
 
 def test_a_process_that_cannot_import_a_named_plug_in_says_why(
-    put: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    put: Any, process: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "of_the_head.py").touch()
     monkeypatch.syspath_prepend(tmp_path)
-    put(careful=f"{CAREFUL}\nimport of_the_head\n")
+    home = put(careful=f"{CAREFUL}\nimport of_the_head\n")
     wanted = expected()
     (tmp_path / "of_the_head.py").unlink()
     del sys.modules["of_the_head"]
-    put()
+    process(home)
 
     with pytest.raises(PluginDiffers, match="No module named 'of_the_head'"):
         nodes.check_here(wanted)
 
 
-def test_a_process_imports_what_the_spec_needs_alone(put: Any) -> None:
+def test_a_process_imports_what_the_spec_needs_alone(put: Any, process: Any, tmp_path: Path) -> None:
+    noted = f"with open({str(tmp_path / 'imports')!r}, 'a') as file:\n    file.write('x')\n"
     brave = CAREFUL.replace("careful", "brave")
-    home = put(careful=f"from gaplab_plugins import _shared\n{CAREFUL}", brave=brave, _shared="")
-    (home / "_shared.py").write_text(f"with open({str(home / 'imports')!r}, 'a') as file:\n    file.write('x')\n")
-    put()
+    home = put(careful=f"from gaplab_plugins import _shared\n{CAREFUL}", brave=brave, _shared=noted)
     wanted = expected()
-    put()
-    (home / "imports").unlink()
+    (tmp_path / "imports").unlink()
+    process(home)
 
     nodes.check_here(wanted)
     nodes.check_here(wanted)
 
     assert ("careful" in strategies, "brave" in strategies) == (True, False)
-    assert (home / "imports").read_text() == "x"
+    assert (tmp_path / "imports").read_text() == "x"
     assert "gaplab_plugins.brave" not in sys.modules
+
+
+def test_an_edit_reaches_nothing_that_a_running_process_imports(put: Any) -> None:
+    home = put(careful=CAREFUL, _later="X = 1")
+    (home / "_later.py").write_text("X = 2")
+    (home / "_new.py").write_text("X = 1")
+
+    assert import_module("gaplab_plugins._later").X == 1
+    with pytest.raises(ModuleNotFoundError, match="when the process started"):
+        import_module("gaplab_plugins._new")
+    assert "_later.py" in versions.provenance().plugins
+    assert "_new.py" not in versions.provenance().plugins
+
+
+def test_each_version_of_the_named_plug_ins_has_processes_of_its_own_and_without_any_all_share_theirs(put: Any) -> None:
+    put(careful=CAREFUL)
+    before = nodes.process_for(expected())
+    put(other=CAREFUL.replace("careful", "brave"))
+    beside = nodes.process_for(expected())
+    put(careful=EDITED)
+
+    assert before == beside != nodes.process_for(expected())
+    assert nodes.process_for(expected("random")) == {}
 
 
 def test_the_usual_controller_of_a_robot_is_needed_too_unless_the_spec_names_another(put: Any) -> None:
@@ -172,19 +202,6 @@ def test_the_usual_controller_of_a_robot_is_needed_too_unless_the_spec_names_ano
 
     assert usual == {"plug-in robot walker", "plug-in controller gait"}
     assert other == {"plug-in robot walker"}
-
-
-def test_each_version_of_the_named_plug_ins_has_processes_of_its_own_and_without_any_all_share_theirs(put: Any) -> None:
-    home = put(careful=CAREFUL)
-    before = nodes.process_for(expected())
-    (home / "other.py").write_text(CAREFUL.replace("careful", "brave"))
-    watching.reload()
-    beside = nodes.process_for(expected())
-    (home / "careful.py").write_text(EDITED)
-    watching.reload()
-
-    assert before == beside != nodes.process_for(expected())
-    assert nodes.process_for(expected("random")) == {}
 
 
 @pytest.mark.release
@@ -208,39 +225,6 @@ def test_a_plug_in_that_changes_gaplab_changes_no_number_of_specs_that_do_not_na
     assert ended[1] == test_workers.expected(plain)
 
 
-def test_files_that_were_edited_between_their_import_and_the_first_look_are_imported_again(put: Any) -> None:
-    home = put(careful=CAREFUL)
-    before = strategies["careful"]
-    (home / "careful.py").write_text(EDITED)
-
-    watching.reload()
-
-    assert strategies["careful"] is not before
-    assert strategies["careful"].describe().summary == "Stays in the very middle."
-
-
-def test_an_error_of_a_plug_in_that_was_added_later_names_it(put: Any) -> None:
-    home = put()
-    assert blame.describe(ValueError("first")) == "ValueError: first"
-    (home / "careful.py").write_text(CAREFUL)
-    watching.reload()
-
-    with pytest.raises(AttributeError) as raised:
-        strategies["careful"]().select(None, None, None)  # type: ignore[arg-type]
-
-    assert blame.describe(raised.value).startswith("strategy 'careful' raised AttributeError (careful.py, line 1")
-
-
-def test_an_engine_is_warm_until_its_file_is_edited(put: Any) -> None:
-    text = 'from gaplab.services.engines.analytic import Analytic\n\n\nclass Glide(Analytic):\n    name = "glide"\n'
-    put(glide=text)
-    first, again = engine_of(PluginRef(name="glide")), engine_of(PluginRef(name="glide"))
-    put(glide=f"{text}    usual_rollout_s = 1.0\n")
-
-    assert first is again
-    assert engine_of(PluginRef(name="glide")).usual_rollout_s == 1.0
-
-
 def test_versions_of_gaplab_concern_all_work(put: Any) -> None:
     put(careful=CAREFUL)
 
@@ -249,24 +233,24 @@ def test_versions_of_gaplab_concern_all_work(put: Any) -> None:
 
 
 def test_an_edit_holds_up_the_experiments_that_name_the_plug_in_and_no_other(store: Store, put: Any) -> None:
-    home = put(careful=CAREFUL)
+    put(careful=CAREFUL)
     named, other = begin(store), submit(store, strategy="random")
 
-    (home / "careful.py").write_text(EDITED)
+    put(careful=EDITED)
 
     assert claimed(store) == [other]
     (warning,) = reading.read_experiment(store, named).warnings
     assert "strategy careful (careful.py " in warning
     assert f"gaplab accept-versions {named}" in warning
-    (home / "careful.py").write_text(CAREFUL)
+    put(careful=CAREFUL)
     assert claimed(store) == [named]
     assert provenance.read(store, named).refused_by is None
 
 
-def test_accepted_an_edited_plug_in_goes_on_without_a_restart(store: Store, put: Any) -> None:
-    home = put(careful=CAREFUL)
+def test_accepted_an_edited_plug_in_goes_on(store: Store, put: Any) -> None:
+    put(careful=CAREFUL)
     named = begin(store)
-    (home / "careful.py").write_text(EDITED)
+    put(careful=EDITED)
     assert claimed(store) == []
 
     provenance.accept_versions(store, named)
@@ -275,13 +259,13 @@ def test_accepted_an_edited_plug_in_goes_on_without_a_restart(store: Store, put:
 
 
 def test_an_edit_of_what_a_plug_in_imports_counts_as_its_own(store: Store, put: Any) -> None:
-    home = put(_middle="X = 1", careful=f"from ._middle import X\n{CAREFUL}")
+    put(_middle="X = 1", careful=f"from ._middle import X\n{CAREFUL}")
     named = begin(store)
 
-    (home / "_middle.py").write_text("X = 2")
+    put(_middle="X = 2")
 
     assert claimed(store) == []
-    (home / "_middle.py").write_text("X = 1")
+    put(_middle="X = 1")
     assert claimed(store) == [named]
 
 
@@ -297,7 +281,7 @@ def test_an_experiment_whose_plug_in_is_broken_stays_queued_and_says_why(store: 
     assert claimed(store) == []
     found = reading.read_experiment(store, named)
     assert found.state is (State.RUNNING if begun else State.QUEUED)
-    assert [each for each in found.warnings if WHY in each and "imported again" in each]
+    assert [each for each in found.warnings if WHY in each and "start the service again" in each]
     assert [each.experiment for each in refusals(store)] == [named]
     put(careful=CAREFUL)
     assert claimed(store) == [named]
@@ -344,8 +328,8 @@ def test_a_check_whose_robot_is_broken_waits_and_others_are_done(store: Store, p
 
 def refused_by_a_process(store: Store, plugins: Plugins) -> str:
     """The experiment of a repetition that was claimed, and then refused by its process."""
-    (claim,) = execution.claim(store, "me", 1, *plugins.present())
-    version = versions.versions_of(versions.provenance())["strategy careful"]
+    (claim,) = execution.claim(store, "me", 1, plugins.under, plugins.refused())
+    version = versions.plugin_versions()["strategy careful"]
     refused = PluginDiffers({"strategy careful": "a process has another"}, {"strategy careful": version})
     plugins.hand_back(store, claim, refused)
     return claim.experiment_id
@@ -367,7 +351,7 @@ def test_what_a_process_refuses_waits_without_a_hot_loop_and_is_tried_again(stor
     tries = 0
     while now[0] < 1.9 * LONGEST_S:
         now[0] += FIRST_S
-        if plugins.present()[1] == {}:
+        if not plugins.refused():
             assert refused_by_a_process(store, plugins) == named
             tries += 1
     assert 4 <= tries <= 6
@@ -375,36 +359,10 @@ def test_what_a_process_refuses_waits_without_a_hot_loop_and_is_tried_again(stor
     assert claimed(store, plugins) == [named]
 
 
-def test_a_refused_version_is_forgotten_with_the_next_edit(store: Store, put: Any) -> None:
-    home = put(careful=CAREFUL)
-    plugins = Plugins()
-    named = submit(store, strategy="careful")
+def test_a_supervisor_that_starts_tries_what_was_refused(store: Store, put: Any) -> None:
+    put(careful=CAREFUL)
+    plugins, named = Plugins(), submit(store, strategy="careful")
     refused_by_a_process(store, plugins)
     assert claimed(store, plugins) == []
 
-    (home / "careful.py").write_text(EDITED)
-
-    assert claimed(store, plugins) == [named]
-
-
-def test_folders_are_looked_at_once_a_second(put: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.undo()
-    now = [0.0]
-    home = put(careful=CAREFUL)
-    watch = FolderWatch(lambda: now[0])
-    first = watch.contents()
-
-    (home / "careful.py").write_text(EDITED)
-
-    assert watch.contents() is first
-    now[0] += watching.LOOK_S
-    assert watch.contents().digests != first.digests
-    assert watch.contents() is watch.contents()
-
-
-def test_a_file_that_an_editor_replaces_meanwhile_stops_nothing(put: Any) -> None:
-    home = put(careful=CAREFUL)
-    Path(home / "broken.py").symlink_to(home / "nowhere.py")
-    (home / "folder.py").mkdir()
-
-    assert set(FolderWatch().contents().digests) == {"careful.py"}
+    assert claimed(store) == [named]

@@ -18,13 +18,12 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import Replay
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.bench import motions
-from gaplab.services.core import external_plugins
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots import robots
 from gaplab.services.core.types import Simulator, Transferred, Tuned
 from gaplab.services.core.world import PDMotor
-from gaplab.services.plugins import folders, watching
+from gaplab.services.plugins import loading
 from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Requested
@@ -40,16 +39,14 @@ def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FastAPI]:
     home = tmp_path_factory.mktemp("plug-ins")
     for name, text in FILES.items():
         (home / f"{name}.py").write_text(text)
-    folders.find()
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv(VARIABLE, str(home))
-        external_plugins.set_folders((*external_plugins.folders(), home))
-        watching.reload()
+        loading.load((home,))
         app = create_app(Store("sqlite://"))
         yield app
         app.state.rollout_process.close()
         app.state.drawing_process.close()
-    external_plugins.set_folders(())
+    loading.load(())
 
 
 @pytest.fixture

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
-from gaplab.services.core.external_plugins import file_of
 from gaplab.services.core.strategies import strategies
+from gaplab.services.plugins import contents
 from gaplab.services.replay.process import MOST_OUTPUT, NICENESS, AnswerCache, RolloutProcess
 from gaplab.services.waiting_line import WaitingLine
 from tests.fakes import CAREFUL
@@ -55,19 +55,22 @@ def test_a_process_imports_the_plug_ins_of_its_calls_alone(tmp_path: Path, monke
         (tmp_path / f"{name}.py").write_text(CAREFUL.replace("careful", name))
     monkeypatch.setenv("GAPLAB_PLUGINS", str(tmp_path))
     rollouts = RolloutProcess()
-    named = [(), ("careful.py 1",), ("careful.py 1",), ("careful.py 2",), ()]
+    careful = {"strategy careful": contents.read([tmp_path]).text_of("careful.py")}
 
-    found = [rollouts.call(_external_strategies, plugins=plugins) for plugins in named]
+    found = [rollouts.call(_external_strategies, plugins=plugins) for plugins in ({}, careful, careful, {})]
 
-    assert [names for _, names in found] == [[], ["careful"], ["careful"], ["careful"], []]
-    first, second, third, fourth, fifth = (pid for pid, _ in found)
+    assert [names for _, names in found] == [[], ["careful"], ["careful"], []]
+    first, second, third, fourth = (pid for pid, _ in found)
     assert second == third
-    assert len({first, second, fourth, fifth}) == 4
+    assert len({first, second, fourth}) == 3
+    (tmp_path / "careful.py").write_text(f"{CAREFUL}\n# edited\n")
+    with pytest.raises(EngineInterrupted, match="start the service again if it was edited"):
+        rollouts.call(_external_strategies, plugins=careful)
     rollouts.close()
 
 
 def _external_strategies() -> tuple[int, list[str]]:
-    return os.getpid(), [name for name, each in strategies.items() if file_of(each)]
+    return os.getpid(), list(strategies.files)
 
 
 def test_a_process_that_was_killed_is_replaced(rollouts: Any) -> None:

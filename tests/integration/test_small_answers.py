@@ -2,28 +2,23 @@
 
 import io
 import logging
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from fastapi.testclient import TestClient
 
 import gaplab as package
-from gaplab.api.app import create_app
 from gaplab.api.commands.cli import app
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.spec import StudySpec
 from gaplab.services import logs
-from gaplab.services.core import external_plugins
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines import engines
 from gaplab.services.experiments import submission
-from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.plugins import loading
 from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
-from tests.waiting import wait_until
 
 SMALL = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke"}
 
@@ -100,14 +95,6 @@ def test_where_the_robots_engine_is_not_installed_another_of_gaplabs_own_runs_it
     assert default_engine(Quadruped()) == "mujoco"
 
 
-@pytest.fixture
-def plugin_folder(tmp_path: Path) -> Iterator[Path]:
-    before = external_plugins.named_folders()
-    external_plugins.set_folders((tmp_path,))
-    yield tmp_path
-    external_plugins.set_folders(before)
-
-
 PLUGIN = '''
 from gaplab.plugins import Strategy
 
@@ -123,37 +110,17 @@ class {cls}(Strategy):
 '''
 
 
-def test_a_plug_in_that_is_added_or_repaired_needs_no_restart(plugin_folder: Path, sqlite_store: Store) -> None:
-    with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
+@pytest.mark.usefixtures("plug_ins")
+def test_a_file_that_is_not_a_plug_in_is_named(tmp_path: Path, gaplab: Gaplab) -> None:
+    (tmp_path / "robot.urdf").write_text("<robot/>")
+    (tmp_path / "robot.sdf").write_text("<sdf/>")
+    (tmp_path / "data").mkdir()
+    (tmp_path / "extra.py").write_text("X = 1\n")
+    (tmp_path / "_shared.py").write_text("X = 1\n")
+    (tmp_path / "used.py").write_text("X = 1\n")
+    (tmp_path / "mine.py").write_text("from gaplab_plugins.used import X\n" + PLUGIN.format(cls="Mine", name="mine"))
 
-        def names() -> dict[str, bool]:
-            return {each["name"]: each["available"] for each in api.get("/catalogue").json()["strategies"]}
-
-        assert "mine" not in names()
-        (plugin_folder / "mine.py").write_text(PLUGIN.format(cls="Mine", name="mine"))
-        wait_until(lambda: names().get("mine") is True)
-        (plugin_folder / "mine.py").write_text("import nowhere\n" + PLUGIN.format(cls="Mine", name="mine"))
-        wait_until(lambda: names().get("mine") is False)
-        (plugin_folder / "mine.py").write_text(PLUGIN.format(cls="Mine", name="yours"))
-        wait_until(lambda: names().get("yours") is True)
-        assert "mine" not in names()
-        accepted = api.post("/experiments", json={"strategy": "yours", "robot": "toy_function"})
-
-    assert accepted.status_code == 202
-
-
-def test_a_file_that_is_no_plug_in_is_named(plugin_folder: Path, gaplab: Gaplab) -> None:
-    (plugin_folder / "robot.urdf").write_text("<robot/>")
-    (plugin_folder / "robot.sdf").write_text("<sdf/>")
-    (plugin_folder / "data").mkdir()
-    (plugin_folder / "extra.py").write_text("X = 1\n")
-    (plugin_folder / "_shared.py").write_text("X = 1\n")
-    (plugin_folder / "used.py").write_text("X = 1\n")
-    (plugin_folder / "mine.py").write_text(
-        "from gaplab_plugins.used import X\n" + PLUGIN.format(cls="Mine", name="mine")
-    )
-
-    found = {each.file: each.why for each in ignored_files()}
+    found = {each.file: each.why for each in loading.load((tmp_path,)).ignored}
 
     assert set(found) == {"data/", "extra.py", "robot.sdf", "robot.urdf"}
     assert "gaplab robot import FILE, then gaplab robot add (docs/how-to/robot-file.md)" in found["robot.urdf"]

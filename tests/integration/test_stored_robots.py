@@ -22,7 +22,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.robots.robot_file import Imported
 from gaplab.services.core.world import Inertia
 from gaplab.services.experiments import stored_robots, submission
-from gaplab.services.running import execution
+from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.clock import now
@@ -194,6 +194,19 @@ def test_a_robot_from_a_file_has_the_numbers_of_the_plug_in_to_the_last_bit(stor
 
     ours, theirs = (list(repetition(setting(spec, 0))) for spec in (from_file, plug_in))
     assert [repr(step) for step in ours] == [repr(step) for step in theirs]
+
+
+def test_who_claims_work_on_a_stored_robot_can_send_its_file(store: Store) -> None:
+    stored_robots.add_robot(store, file_of().text)
+    submit_one(store, ExperimentSpec.model_validate(SPEC))
+
+    robot_library._known.clear()
+    (claim,) = execution.claim(store, "me", 1)
+    assert robot_library.needed_by(claim.spec.robot) == (file_of().text,)
+    robot_library._known.clear()
+    check = sensitivity.claim(store, "me")
+    assert check is not None
+    assert robot_library.needed_by(check.spec.robot) == (file_of().text,)
 
 
 def test_a_spec_whose_robot_is_gone_says_so(store: Store) -> None:

@@ -43,7 +43,7 @@ def submitted(stage: Any, spec: Any, name: Any) -> Any:
 
 
 def edited(stage: Any) -> bool:
-    """Save a comment in a file that no experiment names, and end a worker, so that new processes import it."""
+    """Save a comment in a file that no experiment names, and end a worker, so that one starts with other files."""
     return _changed(stage, "\n# edited\n", "worker")
 
 

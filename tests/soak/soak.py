@@ -10,7 +10,7 @@ from typing import Any
 
 import httpx2
 
-from gaplab.services.core import external_plugins
+from gaplab.services.plugins import loading
 from gaplab.services.store.session import Store
 from tests.soak import checker, faults, import_faults, misbehaviour
 from tests.soak.clients import Clients
@@ -87,7 +87,7 @@ def soak(
     """
     folder = Path(folder)
     plugins = Path(shutil.copytree(misbehaviour.FOLDER, folder / "plugins", ignore=shutil.ignore_patterns("__*")))
-    external_plugins.set_folders((misbehaviour.FOLDER,))  # the checker computes with the strategy that behaves
+    loading.load((misbehaviour.FOLDER,))  # the checker computes with the strategy that behaves
     database = kind(folder)
     history, store = History(folder / "history.jsonl"), Store(database.url)
     outcome, stage = Outcome(database.name), Stage(folder, database, LEASE_S, plugins, history)
@@ -108,7 +108,7 @@ def soak(
         stage.kill()
         store.dispose()
         database.close()
-        external_plugins.set_folders(())
+        loading.load(())
     return outcome
 
 

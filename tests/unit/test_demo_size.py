@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gaplab.api.commands.demo_size import SECONDS, SIZES, sized, trial
+from gaplab.api.commands.demo import SECONDS, SIZES, sized, trial
 from gaplab.schemas.estimates import EngineCost, EstimateRead
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments import estimates

@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.plugin_faults import fault_of
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
-from gaplab.services.plugins import watching
+from gaplab.services.plugins.faults import fault_of
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.realities import completed
 from gaplab.services.specs.registries import REGISTRIES
@@ -37,7 +36,7 @@ ALIAS = with_options('lambda_: float = Field(default=0.5, alias="lambda")')
 
 @pytest.mark.parametrize("kind", sorted(REGISTRIES))
 def test_gaplabs_own_plug_ins_have_no_fault(kind: str) -> None:
-    assert {name: fault_of(plugin, kind, ()) for name, plugin in REGISTRIES[kind].items()} == dict.fromkeys(
+    assert {name: fault_of(plugin, kind) for name, plugin in REGISTRIES[kind].items()} == dict.fromkeys(
         REGISTRIES[kind]
     )
 
@@ -138,6 +137,5 @@ def test_an_edit_that_keeps_size_and_second_is_imported(put: Put, place: str) ->
 
         assert getattr(strategies["careful"], "weight", None) == float(weight)
 
-    watching.imported.contents()
     assert not list(file.parent.rglob("*.pyc"))
     assert re.search("weight = 9.0", file.read_text())

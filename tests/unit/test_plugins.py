@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.engines.base import Engine
-from gaplab.services.plugins import contents
+from gaplab.services.plugins import contents, loading
+from gaplab.services.specs.registries import REGISTRIES
 from tests.fakes import CAREFUL
 
 ROOT = Path(__file__).parents[2]
@@ -26,11 +26,11 @@ Put = Callable[..., Path]
 
 
 def strategies() -> Registry[Strategy]:
-    return Registry("strategy", "gaplab.services.core.strategies", Strategy)  # type: ignore[type-abstract]
+    return REGISTRIES["strategy"]
 
 
 def tunables() -> Registry[Tunable]:
-    return Registry("tunable", "gaplab.services.core.tunables", Tunable)  # type: ignore[type-abstract]
+    return REGISTRIES["tunable"]
 
 
 def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put) -> None:
@@ -41,8 +41,9 @@ def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put) -> None:
     assert "careful" in found
     assert "informative" in found
     assert list(found) == sorted(found)
-    assert found["careful"].describe().source == "careful.py of GAPLAB_PLUGINS"
-    assert found["random"].describe().source.startswith("Paper")
+    sources = {each.name: each.source for each in found.describe()}
+    assert sources["careful"] == "careful.py of GAPLAB_PLUGINS"
+    assert sources["random"].startswith("Paper")
     assert isinstance(found.create(PluginRef(name="careful")), Strategy)
 
 
@@ -80,8 +81,8 @@ def test_folders_are_several_but_a_file_has_one_place(put: Put) -> None:
 def test_of_folders_with_one_name_as_much_of_the_path_is_told_as_makes_them_differ(put: Put, tmp_path: Path) -> None:
     for home in ("first", "second"):
         (tmp_path / home / "plugins" / "careful").mkdir(parents=True)
-        put(f"{home}/plugins")
         (tmp_path / home / "plugins" / "careful" / "__init__.py").write_text(CAREFUL)
+        put(f"{home}/plugins")
 
     files = "first/plugins/careful and second/plugins/careful"
     assert strategies().unusable["careful"].startswith(f"{files} have the same name: rename one of them")
@@ -89,7 +90,7 @@ def test_of_folders_with_one_name_as_much_of_the_path_is_told_as_makes_them_diff
 
 BROKEN = [
     ("def (", "broken", r"broken\.py cannot be imported: SyntaxError: invalid syntax \(broken\.py, line 1\)"),
-    (CAREFUL.replace("numpy as", "numpy us"), "careful", r"SyntaxError: invalid syntax \(broken\.py, line 4\)"),
+    (CAREFUL.replace("numpy as", "numpy us"), "broken", r"SyntaxError: invalid syntax \(broken\.py, line 4\)"),
     ("import no_such_module", "broken", "ModuleNotFoundError: No module named 'no_such_module'"),
     (f"{CAREFUL}\n1 / 0", "careful", r"ZeroDivisionError: division by zero \(broken\.py, line 18\)"),
     ("raise SystemExit(3)", "broken", "SystemExit: 3"),
@@ -119,15 +120,15 @@ def test_a_broken_file_is_unavailable_with_the_reason_and_stops_nothing_else(
     (entry,) = [each for each in found.describe() if not each.available]
     assert (entry.name, entry.source) == (name, "broken.py of GAPLAB_PLUGINS")
     assert re.search(says, entry.note)
-    assert entry.note.endswith("; repair the file, which is then imported again")
+    assert entry.note.endswith("; repair the file, and start the service again")
     with pytest.raises(InvalidSpec, match=f"'{re.escape(name)}' is not available: ") as refused:
         found.create(PluginRef(name=name), "/strategy")
     assert refused.value.violations[0].pointer == "/strategy"
     assert entry.note in refused.value.violations[0].message
 
 
-def test_a_file_that_is_broken_early_counts_among_the_kind_that_its_text_tells(put: Put) -> None:
-    put(law='class Law(MaterialTunable):\n    name: str = "law"\n    upper = (', unknown="def (")
+def test_a_file_that_cannot_be_imported_counts_among_the_kind_that_its_classes_tell(put: Put) -> None:
+    put(friction='import nowhere\n\n\nclass Law(MaterialTunable):\n    name: str = "law"\n', unknown="def (")
 
     assert set(strategies().unusable) == {"unknown"}
     assert set(tunables().unusable) == {"law", "unknown"}
@@ -167,24 +168,21 @@ def test_a_plug_in_that_cannot_be_created_is_a_violation_of_its_spec(put: Put) -
         strategies().create(PluginRef(name="careful", options={"simulators": 9}))
 
 
-def test_a_folder_that_is_not_there_is_empty(tmp_path: Path) -> None:
-    external_plugins.set_folders((tmp_path / "nowhere",))
-    try:
-        assert strategies().unusable == {}
-        assert contents.read().digests == {}
-    finally:
-        external_plugins.set_folders(())
+def test_a_folder_that_is_not_there_is_empty(tmp_path: Path, plug_ins: Callable[..., None]) -> None:
+    plug_ins(tmp_path / "nowhere")
+
+    assert strategies().unusable == {}
+    assert loading.here().contents.digests == {}
 
 
 def test_what_is_in_the_folder_has_a_hash_and_files_that_python_keeps_have_none(put: Put) -> None:
     home = put(careful=CAREFUL)
-    list(strategies())
-    before = contents.read().digests
+    before = contents.read([home]).digests
 
     (home / "careful.py").write_text(CAREFUL + "\n# another\n")
 
     assert set(before) == {"careful.py"}
-    assert contents.read().digests["careful.py"] != before["careful.py"]
+    assert contents.read([home]).digests["careful.py"] != before["careful.py"]
 
 
 @pytest.mark.parametrize(
@@ -206,11 +204,11 @@ def test_the_text_of_a_plug_in_has_all_that_it_imports_from_the_folders(put: Put
     (home / "glide").mkdir()
     (home / "glide" / "__init__.py").write_text("")
     (home / "glide" / "law.py").write_text("from ..careful import later")
-    before = contents.read()
+    before = contents.read([home])
 
     edited = home / ("glide/law.py" if file.startswith("glide") else file)
     edited.write_text(f"{edited.read_text()}\n# another\n")
-    after = contents.read()
+    after = contents.read([home])
 
     assert f", {file} " in before.text_of("careful.py")
     assert before.text_of("careful.py") != after.text_of("careful.py")
@@ -225,7 +223,7 @@ def test_data_counts_in_a_package_and_not_beside_modules(put: Put) -> None:
         (home / folder / file).write_text("1.0")
     (home / "gaplab.db").write_text("a database")
 
-    assert set(contents.read().digests) == {"careful.py", "glide/__init__.py", "glide/friction.csv"}
+    assert set(contents.read([home]).digests) == {"careful.py", "glide/__init__.py", "glide/friction.csv"}
 
 
 def test_a_package_may_have_its_plug_in_in_any_of_its_files(put: Put) -> None:
@@ -234,29 +232,26 @@ def test_a_package_may_have_its_plug_in_in_any_of_its_files(put: Put) -> None:
     (package / "core.py").write_text(CAREFUL)
     (package / "__init__.py").write_text("from gaplab_plugins.thorough.core import Careful")
 
-    found = strategies()["careful"]
+    put()
 
-    assert external_plugins.file_of(found) == "thorough/core.py"
-    found_here = contents.read()
+    assert strategies().files["careful"] == "thorough/core.py"
+    found_here = loading.here().contents
     assert found_here.digest_of("thorough/core.py") == found_here.digest_of("thorough/__init__.py")
 
 
 def test_the_content_of_a_package_is_all_that_is_in_it(put: Put) -> None:
-    package = put(alone="") / "glide"
+    home = put(alone="")
+    package = home / "glide"
     package.mkdir()
     (package / "__init__.py").write_text(GLIDE)
     (package / "law.py").write_text("SPEED = 1.0")
-    before = contents.read()
+    before = contents.read([home])
 
     (package / "law.py").write_text("SPEED = 2.0")
 
-    after = contents.read()
+    after = contents.read([home])
     assert after.digest_of("glide/__init__.py") != before.digest_of("glide/__init__.py")
     assert after.digest_of("alone.py") == before.digest_of("alone.py") == after.digests["alone.py"]
-
-
-def test_without_folders_there_is_nothing_to_tell() -> None:
-    assert contents.read().digests == {}
 
 
 ELSEWHERE = """
@@ -268,7 +263,7 @@ from gaplab.services.plugins.catalogue import catalogue
 from gaplab.services.running.provenance import decisive
 
 assert os.environ["GAPLAB_PLUGINS"] == "mine", "an import has changed the environment"
-folders.find()
+folders.load()
 found = provenance()
 print("careful" in [each.name for each in catalogue().strategies])
 print(sorted(found.plugins) == ["careful.py", "glide.py"])
@@ -327,7 +322,8 @@ def test_every_process_with_the_variable_has_them_and_their_content_decides_who_
 def test_a_process_starts_with_broken_plug_ins_and_warns_once(tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text("1 / 0")
     missing = tmp_path / "nowhere"
-    program = "from gaplab.services.plugins import folders\nfolders.load()\nfolders.load()\nprint('started')"
+    loading_twice = "folders.load(warn=True)\nfolders.load(warn=True)"
+    program = f"from gaplab.services.plugins import folders\n{loading_twice}\nprint('started')"
     environment = os.environ | {"GAPLAB_PLUGINS": f"{tmp_path}{os.pathsep}{missing}"}
 
     done = subprocess.run(

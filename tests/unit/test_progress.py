@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 from rich.table import Table
 
-from gaplab.api.clients.progress import text
-from gaplab.api.clients.progress.text import COLORS, console
+from gaplab.api.clients import screen
+from gaplab.api.clients.progress import COLORS
+from gaplab.api.clients.screen import console
 from gaplab.api.commands.json_output import echo, print_json
 from gaplab.schemas.lifecycle import State
 
@@ -21,13 +22,13 @@ def test_no_name_reaches_the_terminal_as_an_order(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, is_terminal: bool
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1" if is_terminal else "")
-    name, screen = "evil\x1b[2J\x9b31m\x7f", console()
+    name, shown = "evil\x1b[2J\x9b31m\x7f", console()
     table = Table("name")
     table.add_row(name)
 
     echo(name)
     print_json({name: 1})
-    screen.print(table, f"[green]{name}[/]")
+    shown.print(table, f"[green]{name}[/]")
     printed = capsys.readouterr().out
 
     assert not {"\x9b", "\x7f"} & set(printed)
@@ -37,9 +38,9 @@ def test_no_name_reaches_the_terminal_as_an_order(
 
 
 def test_the_command_prints_through_one_place_alone() -> None:
-    folder = Path(text.__file__).parents[2]
+    folder = Path(screen.__file__).parents[1]
     printing = {
         file.name for file in folder.rglob("*.py") if re.search(r"typer\.s?echo|[^(]Console\(", file.read_text())
     }
 
-    assert printing == {"json_output.py", "help.py"}  # `help` prints only its own texts
+    assert printing == {"json_output.py", "help.py", "progress.py"}  # `help` prints its own texts, `progress` HTML

@@ -1,13 +1,14 @@
 """The interval of the time left, from the pace of the whole work so far."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
 
-from gaplab.api.clients.progress.text import span
-from gaplab.schemas.records import TimeLeft
-from gaplab.services.experiments.progress import busy_s, interval
+from gaplab.schemas.records import StepRead
+from gaplab.services.experiments.progress import busy_s, interval, progress_of, span
+from gaplab.services.store.queries.progress import Tally
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 
@@ -70,4 +71,23 @@ def test_the_interval_narrows_and_contains_the_true_time_of_progress_in_bursts()
     ],
 )
 def test_an_interval_is_in_whole_minutes_or_hours(low: Any, high: Any, shown: Any) -> None:
-    assert span(TimeLeft(low_s=low, high_s=high)) == shown
+    assert span(low, high) == shown
+
+
+def test_failures_and_steps_under_way_are_named_where_there_are_any() -> None:
+    done = Tally(repetitions=4_000, completed=1, counted_iterations=15, counted_iterations_done=15, rollouts=1_000)
+    steps = tuple(StepRead(repetition=0, kind="tuning", iteration=3, rollouts=419, budget=1_000) for _ in range(6))
+
+    plain = progress_of(replace(done, rollouts_done=900))
+    broken = progress_of(
+        replace(
+            done, failed=2, counted_iterations=0, rollouts_done=90, rollouts_failed=3, rollouts_saved=950, steps=steps
+        )
+    )
+
+    assert (plain.share, plain.text) == (0.9, "1 of 4,000 repetitions; 15 of 15 iterations; 900 of 1,000 rollouts")
+    assert broken.share == 1.0
+    assert broken.text == (
+        "1 of 4,000 repetitions, 2 failed; 90 of 1,000 rollouts, 950 saved, physics failed in 3; "
+        f"{'; '.join(['tuning 3: 41 %'] * 5)}; …"
+    )

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gaplab.schemas.traces import TRACE_COLUMNS
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.trace_checks import unlikely
-from gaplab.services.core.trace_tables import COLUMNS, MOST_ERRORS, read_trace
-from gaplab.services.core.traces import TooShort, Trace, align, placed
+from gaplab.services.core.traces import MOST_ERRORS, TooShort, Trace, align, placed, read_trace, unlikely
 from gaplab.services.engines.mujoco.engine import MuJoCo
 from gaplab.services.replay.traces import refuse_other_bodies
 
@@ -189,9 +188,9 @@ def test_a_trace_that_lacks_a_part_of_the_motion_is_refused(expected: Trace) -> 
 
 
 def table(**changes: Any) -> str:
-    rows = [dict(zip(COLUMNS, [place * 0.1, 0, 0, 0.2, 0, 0, 0, 1], strict=True)) for place in range(3)]
+    rows = [dict(zip(TRACE_COLUMNS, [place * 0.1, 0, 0, 0.2, 0, 0, 0, 1], strict=True)) for place in range(3)]
     rows[1] |= changes
-    return "\n".join([",".join(COLUMNS), *(",".join(str(cell) for cell in row.values()) for row in rows)])
+    return "\n".join([",".join(TRACE_COLUMNS), *(",".join(str(cell) for cell in row.values()) for row in rows)])
 
 
 def test_a_trace_is_read_with_any_order_units_and_more_columns() -> None:
@@ -224,7 +223,7 @@ ENDLESS = '"' + "0123456789\n" * 20_000
         (table(time_s=1700000000.02), "pose 3: time_s must ascend, and 0.2 follows 1700000000.02"),
         (table(time_s=9e9), "pose 3: time_s must ascend"),
         (table(qw=2), "pose 2: qx, qy, qz, qw have size 2; permitted: 1"),
-        (",".join(COLUMNS), "the trace has 0 poses; at least 2 are needed"),
+        (",".join(TRACE_COLUMNS), "the trace has 0 poses; at least 2 are needed"),
         (table().replace("0.2,0.0,0", "5000,0,0").replace("\n0.2", "\n5000"), "at most 3600 s are permitted"),
         (f"{table()}\n{ENDLESS}", r"line 13112: the line is not CSV: field larger than field limit \(131072\)"),
         (ENDLESS, r"line 13108: the line is not CSV: field larger than field limit"),
@@ -238,7 +237,7 @@ def test_what_is_no_trace_is_refused_with_its_line(text: str, message: str) -> N
 
 def test_a_hostile_trace_gives_few_errors_and_takes_little_memory() -> None:
     """The errors of 50,000 lines of eight cells took 40 MB."""
-    text = ",".join(COLUMNS) + "\n" + "x\n" * 50_000
+    text = ",".join(TRACE_COLUMNS) + "\n" + "x\n" * 50_000
     tracemalloc.start()
 
     with pytest.raises(InvalidSpec) as refused:

@@ -39,13 +39,6 @@ export function duration(seconds) {
   return days < 730 ? `${days} days` : `${Math.round(days / 365)} years`;
 }
 
-/** Format an interval of seconds in whole minutes, or hours if it is long. @param {{ low_s: number, high_s: number }} interval */
-export function durationRange({ low_s: low, high_s: high }) {
-  const [unit, name] = high > 3 * 3600 ? [3600, "h"] : [60, "min"];
-  const [least, most] = [Math.floor(low / unit), Math.ceil(high / unit)];
-  return least ? `${least} to ${most} ${name}` : `less than ${most} ${name}`;
-}
-
 /** @type {(known: number) => string} */
 export const fromBefore = (known) => (known ? ` (and ${count(known)} from before)` : "");
 

@@ -135,6 +135,7 @@ declare namespace Api {
     welch: Test;
     mann_whitney: Test;
     fitness: Fitness;
+    unit: string;
     where: string;
     shared_evaluations: number;
     caution: string | null;
@@ -495,9 +496,10 @@ declare namespace Api {
     rollouts_done: number;
     rollouts_failed: number;
     rollouts_saved: number;
-    seconds_left: number | null;
     time_left: TimeLeft | null;
     steps: Array<StepRead>;
+    share: number;
+    text: string;
   }
   interface Provenance {
     gaplab: string;
@@ -834,6 +836,7 @@ declare namespace Api {
   interface TimeLeft {
     low_s: number;
     high_s: number;
+    text: string;
   }
   interface TraceRead {
     attachment: string;

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from secrets import choice
 
 from sqlalchemy import event, insert, or_, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import QueryContext, Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
@@ -15,6 +15,7 @@ from gaplab.schemas.spec import Schedule
 from gaplab.services.core.errors import Conflict, NotFound, StoreUnavailable
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import DeletionRow, ExperimentRow, RepetitionRow, StudyRow
+from gaplab.services.store.queries import robots
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
 
@@ -237,9 +238,10 @@ def _missing(session: Session, id_: str) -> str:
 
 
 @event.listens_for(ExperimentRow, "load")
-def _refuse_newer(row: ExperimentRow, _: object) -> None:
-    """Refuse a spec of a later version, whose fields may have another meaning."""
+def _admit(row: ExperimentRow, context: QueryContext) -> None:
+    """Refuse a spec of a later version, whose fields may have another meaning; know the robot of any other."""
     if row.spec_version > SPEC_VERSION:
         msg = f"the spec of experiment {row.id!r} is of version {row.spec_version}, and this gaplab reads up to "
         msg += f"{SPEC_VERSION}: use a later gaplab with this database"
         raise StoreUnavailable(msg)
+    robots.learn(context.session, [row.spec])

@@ -33,7 +33,6 @@ class Tally:
     completed: int = 0
     failed: int = 0
     running: int = 0
-    open: int = 0
     stopped: int = 0
     iterations: int = 0
     iterations_done: int = 0
@@ -72,7 +71,6 @@ def _all_tallies() -> Select[*tuple[Any, ...]]:
             _count(row.state == State.COMPLETED),
             _count(row.state == State.FAILED),
             _count((row.state == State.RUNNING) & (row.steps > 0)),
-            _count(row.state.in_(PENDING)),
             _count(row.state.in_(_STOPPED) & (row.iterations_done < ExperimentRow.iterations)),
             func.sum(ExperimentRow.iterations),
             func.sum(row.iterations_done),

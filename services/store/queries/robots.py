@@ -1,20 +1,34 @@
-"""Robot files."""
+"""Robot files. A process knows the robots of the experiments and checks that it loads."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import func, select, update
-from sqlalchemy.orm import Session
+from sqlalchemy import event, func, select, update
+from sqlalchemy.orm import QueryContext, Session
 
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core import robot_library
 from gaplab.services.store.clock import now
-from gaplab.services.store.models import RobotRow
+from gaplab.services.store.models import RobotRow, SensitivityRow
 from gaplab.services.store.statements import insert_new
 
 
-def text_of(session: Session, sha256: str) -> str | None:
-    """Return the text of the robot with this hash; None if there is none."""
-    return session.scalar(select(RobotRow.text).where(RobotRow.sha256 == sha256))
+def learn(session: Session, specs: Iterable[Mapping[str, Any]]) -> None:
+    """Let this process know the robots that stored specs name, so that they can be created without a store."""
+    if unknown := robot_library.unknown(PluginRef.model_validate(spec["robot"]) for spec in specs):
+        texts = select(RobotRow.text).where(RobotRow.sha256.in_(unknown))
+        robot_library.learn(session.connection().scalars(texts))
+
+
+@event.listens_for(RobotRow, "load")
+def _learn(row: RobotRow, _: object) -> None:
+    robot_library.learn([row.text])
+
+
+@event.listens_for(SensitivityRow, "load")
+def _learn_robot_of(row: SensitivityRow, context: QueryContext) -> None:
+    learn(context.session, [row.spec])
 
 
 def newest(session: Session, name: str) -> RobotRow | None:
@@ -25,7 +39,8 @@ def newest(session: Session, name: str) -> RobotRow | None:
 
 def all_(session: Session) -> list[RobotRow]:
     """Return all robots, by name, the newest of a name first."""
-    return list(session.scalars(select(RobotRow).order_by(RobotRow.name, RobotRow.created_at.desc(), RobotRow.sha256)))
+    order = RobotRow.name, RobotRow.created_at.desc(), RobotRow.sha256
+    return list(session.scalars(select(RobotRow).order_by(*order)))
 
 
 def names(session: Session) -> tuple[str, ...]:

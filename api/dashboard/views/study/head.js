@@ -7,7 +7,7 @@ import { h, refill, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { age, count, evaluationsText, fixed, percent, readableName, timeBetween, titleOf } from "../../lib/format.js";
 import { notesBlock } from "../../lib/markdown.js";
-import { fraction, progressBar, timeLeftFact, workFacts } from "../../lib/progress.js";
+import { progressBar, timeLeft } from "../../lib/progress.js";
 import { isPhysical, worldsText } from "../../lib/robots.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { factItems } from "../../lib/table.js";
@@ -31,7 +31,7 @@ export function head(page) {
   const update = () => {
     const { study } = page;
     setText(title, titleOf({ name: study.name, strategy: study.experiments.length > 1 ? "" : study.experiments[0].strategy }));
-    document.title = `${ENDED.includes(study.state) ? "" : `${percent(fraction(study.progress))} · `}${title.textContent} · gaplab`;
+    document.title = `${ENDED.includes(study.state) ? "" : `${percent(study.progress.share)} · `}${title.textContent} · gaplab`;
     notes.update(study.notes);
     tags.update(study.tags);
     refill(state, `${study.state} ${study.caveat}`, () => stateBadge(study.state, study.caveat));
@@ -81,7 +81,7 @@ function factsOf({ study, unit }) {
   const several = [["Experiments", `${count(ended)} of ${count(others.length + 1)} ended`]];
   /** @type {Fact[]} */
   const reached = fitness ? [[by ? "Best fitness" : "Fitness in reality", `${fixed(fitness.mean)} ${unit(first)}${by} after ${evaluationsText(fitness)} (mean of ${fitness.n})`]] : [];
-  return [...(others.length ? several : []), ...workFacts(progress), ...reached, ...times(study),
+  return [...(others.length ? several : []), ["Work", progress.text], ...reached, ...times(study),
     ...(others.length ? [] : [/** @type {Fact} */ (["Priority", priority]), /** @type {Fact} */ (["At once", atOnce === null ? "any number" : `at most ${count(atOnce)}`])])];
 }
 
@@ -91,7 +91,7 @@ function times(study) {
   const [[began], ends] = [known("started_at"), known("ended_at")];
   const last = ends.at(-1);
   if (last && ends.length === study.experiments.length) return [["Ended", age(last)], ...(began ? [/** @type {Fact} */ (["Took", timeBetween(began, last)])] : [])];
-  return [["Time left", timeLeftFact(study)], began ? ["Began", age(began)] : ["Submitted", age(study.created_at)]];
+  return [["Time left", timeLeft(study, "–")], began ? ["Began", age(began)] : ["Submitted", age(study.created_at)]];
 }
 
 /**
