@@ -120,8 +120,8 @@ def create_app(
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.connections = most_requests(limits) + SPARE
     app.state.feed, app.state.notify = EventFeed(store), notify or Notify()
-    app.state.rollout_process, app.state.drawing_process = RolloutProcess(), RolloutProcess(line=WaitingLine("videos"))
-    app.state.exports, app.state.writers = WaitingLine("exports"), asyncio.Semaphore(WRITERS)
+    app.state.rollout_process, app.state.exports = RolloutProcess(), WaitingLine("exports")
+    app.state.writers = asyncio.Semaphore(WRITERS)
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)

@@ -5,6 +5,7 @@ reports any error on the page. Look at the pictures before you keep them.
 """
 
 import json
+from base64 import b64decode
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
@@ -20,9 +21,9 @@ from gaplab.api.process.local_service import start_service
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import import_archive
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.experiments.stored_robots import add_robot
 from gaplab.services.experiments.submission import submit
-from gaplab.services.replay.portraits import portrait
+from gaplab.services.figures.words import spoken
 from gaplab.services.running.execution import claim, record_all
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.lease import Pulse
@@ -39,8 +40,17 @@ STUDIES = ("quadruped-mujoco-paper", "figure-4-physx", "figure-4-mujoco")
 
 LONGEST_S = 600
 
-TILE_PX = 426
-"""Width of the picture of a robot from a file."""
+TILE_PX = (426, 320)
+"""Size of the picture of a robot from a file."""
+
+DRAWN = """async (image) => {
+  await image.decode();
+  const canvas = document.createElement("canvas");
+  Object.assign(canvas, { width: image.naturalWidth, height: image.naturalHeight });
+  canvas.getContext("2d").drawImage(image, 0, 0);
+  return canvas.toDataURL().split(",")[1];
+}"""
+"""Returns a picture of the page as PNG in Base64."""
 
 
 class View(NamedTuple):
@@ -92,6 +102,8 @@ def prepared() -> Iterator[tuple[str, dict[str, str]]]:
         ids = {"study": shown.study, "experiment": shown.experiments[0], "all": ",".join(shown.experiments)}
         ids["toy"] = toy(store)
         ask_for_a_measurement(store)
+        for name in real_robots.FILES:
+            add_robot(store, real_robots.imported(name).robot.text)
         store.dispose()
         with start_service(database_url, Path(folder) / "api.log", workers=False) as client:
             yield client.url, ids
@@ -140,34 +152,32 @@ def take(page: Page, view: View, path: Path) -> None:
         picture.convert("RGB").quantize(256).save(path, optimize=True)
 
 
-def paint_robots() -> None:
-    """Store the pictures of the robots, which the service paints."""
-    imported = {name: real_robots.imported(name).robot.world for name in real_robots.FILES}
-    path = FOLDER / "robots-light.png"
-    sheet({name: portrait(world, False, TILE_PX) for name, world in imported.items()}).save(path, optimize=True)
-    print(f"Wrote {path}.")  # noqa: T201
-    path = FOLDER / "quadruped-light.png"
-    path.write_bytes(portrait(Quadruped().world, False, 640))
-    print(f"Wrote {path}.")  # noqa: T201
-
-
-def sheet(pictures: dict[str, bytes]) -> Image.Image:
-    """Return pictures of one size in rows of three, each with its name."""
-    tiles = {name: Image.open(BytesIO(data)).convert("RGB") for name, data in pictures.items()}
-    width, height = next(iter(tiles.values())).size
-    whole = Image.new("RGB", (3 * width, -(-len(tiles) // 3) * height))
-    for place, (name, tile) in enumerate(tiles.items()):
+def take_robots(page: Page) -> None:
+    """Store the pictures of robots, which the form for a new study draws."""
+    drawn = {name: picture_of(page, name) for name in ("quadruped", *real_robots.FILES)}
+    drawn.pop("quadruped").quantize(256).save(FOLDER / "quadruped-light.png", optimize=True)
+    whole = Image.new("RGB", (3 * TILE_PX[0], -(-len(drawn) // 3) * TILE_PX[1]))
+    for place, (name, picture) in enumerate(drawn.items()):
+        tile = picture.resize(TILE_PX)
         ImageDraw.Draw(tile).text((12, 10), name, fill="black", font_size=20)
-        whole.paste(tile, (place % 3 * width, place // 3 * height))
-    return whole.quantize(256)
+        whole.paste(tile, (place % 3 * TILE_PX[0], place // 3 * TILE_PX[1]))
+    whole.quantize(256).save(FOLDER / "robots-light.png", optimize=True)
+
+
+def picture_of(page: Page, robot: str) -> Image.Image:
+    """Choose a robot in the form, and return its picture."""
+    page.get_by_label("Robot", exact=True).select_option(robot)
+    shown = page.locator(f".robot-picture[alt='The robot {spoken(robot)}'][src]")
+    return Image.open(BytesIO(b64decode(shown.evaluate(DRAWN)))).convert("RGB")
 
 
 def main() -> None:
     """Take every picture."""
-    paint_robots()
     browser = Chromium()
     try:
         with prepared() as (url, ids):
+            take_robots(browser.visit(f"{url}/#/new"))
+            browser.end()
             for view in VIEWS:
                 path = FOLDER / f"{view.name}-{'dark' if view.dark else 'light'}.png"
                 address = f"{url}/#/{view.address.format(**ids)}"

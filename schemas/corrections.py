@@ -76,5 +76,7 @@ class BranchRead(Frozen):
     iteration: int = Field(description="iteration of the measurement that was corrected")
     reason: str = Field(examples=["4.4 was 0.44"])
     steps: tuple[dict[str, object], ...] = Field(examples=[[{"kind": "probed", "iteration": 2, "fitness": 0.43}]])
-    sentences: tuple[str, ...] = Field(description="the steps in words")
+    sentences: tuple[str, ...] = Field(
+        description="the steps in words", examples=[["Repetition 0: iteration 2 reaches 0.43 in reality"]]
+    )
     closed_at: Moment

@@ -45,13 +45,10 @@ class Shape(Frozen):
     )
 
 
-class ReplayWorld(Frozen):
-    """The motion in one world. If the physics failed, it is empty and its fitness is null."""
+class Shown(Frozen):
+    """Shapes on their ground, and where they are."""
 
-    engine: EngineName
     shapes: tuple[Shape, ...]
-    fitness: Statistic = Field(description="fitness in this replay")
-    recorded: Statistic = Field(description="stored fitness of the same controller; null: not computed, or failed")
     positions_m: tuple[tuple[float, ...], ...] = Field(default=(), description="by frame: x, y, z of each body in turn")
     orientations: tuple[tuple[float, ...], ...] = Field(
         default=(), description="by frame: x, y, z, w of each body in turn"
@@ -59,15 +56,32 @@ class ReplayWorld(Frozen):
     slope_rad: float = Field(
         default=0.0, description="angle by which the ground, the plane z = 0, rises along x: gravity is turned by it"
     )
-    heights_m: tuple[float, ...] = Field(default=(), description="height of the observed body, by frame")
-    speeds_m_s: tuple[float, ...] = Field(
-        default=(),
-        description="speed of the observed body towards its final position, by frame, averaged over 0.2 s",
-    )
     contacts: tuple[tuple[Interval, ...], ...] = Field(
         default=(),
         description="by foot: intervals in s during which it is less than 2 mm above the ground; empty: unknown, "
         "as the engine tells no joint angles",
+    )
+
+
+class RobotShapes(Shown):
+    """A robot as it stands at the start: a single frame, at 0 s."""
+
+    scale: float = Field(description="its diagonal relative to 0.75 m, for the camera's distance", examples=[0.8])
+    middle_m: Position = Field(
+        description="the middle of the robot, which the camera looks at", examples=[(0.0, 0.0, 0.1)]
+    )
+
+
+class ReplayWorld(Shown):
+    """The motion in one world. If the physics failed, it is empty and its fitness is null."""
+
+    engine: EngineName
+    fitness: Statistic = Field(description="fitness in this replay")
+    recorded: Statistic = Field(description="stored fitness of the same controller; null: not computed, or failed")
+    heights_m: tuple[float, ...] = Field(default=(), description="height of the observed body, by frame")
+    speeds_m_s: tuple[float, ...] = Field(
+        default=(),
+        description="speed of the observed body towards its final position, by frame, averaged over 0.2 s",
     )
 
 

@@ -83,9 +83,9 @@ class Client:
         self.misfit, self.misfit_csv, self.figure_kinds = results.misfit, results.misfit_csv, figures.kinds
         self.simulators, self.predictions, self.readings = tables.simulators, tables.predictions, tables.readings
         self.figure, self.verdict, self.events = figures.draw, reports.verdict, event_log.events
-        self.report, self.take_home, self.robot_picture = reports.save, reports.take_home, replays.robot_picture
+        self.report, self.take_home, self.replay = reports.save, reports.take_home, replays.replay
         self.export, self.import_, self.requests = archives.export, archives.import_, bench.requests
-        self.watch, self.wait, self.replay, self.video = watcher.watch, watcher.wait, replays.replay, replays.video
+        self.watch, self.wait = watcher.watch, watcher.wait
 
     def __enter__(self) -> Self:
         return self

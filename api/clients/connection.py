@@ -111,12 +111,13 @@ class Connection:
         return self._repeat("GET", path, params=given, timeout=timeout_s)
 
     def save(self, file: str | Path, path: str, formats: Sequence[str], /, **parameters: Parameter) -> Path:
-        """Write the answer to a GET, in the format that its suffix names, into a file; missing folders are created.
+        """Write the answer to a GET into a file, in the format of its suffix if there are several; folders are created.
 
         Raises:
             WrongSuffix: the suffix is not one of these formats.
         """
-        return written(file, self.get_bytes(path, **parameters | {"format": format_of(file, formats)}))
+        chosen = {"format": format_of(file, formats)}
+        return written(file, self.get_bytes(path, **parameters | (chosen if len(formats) > 1 else {})))
 
     def items(self, page: type[Page[T]], path: str, /, **parameters: Parameter) -> Iterator[T]:
         """Yield every item of a list, page after page."""

@@ -5,8 +5,6 @@ from pathlib import Path
 from gaplab.api.clients.connection import Connection, Of, segment
 from gaplab.schemas.reports import VerdictRead
 
-FORMATS = ("html", "pdf")
-
 
 class Reports:
     """Reports on studies."""
@@ -28,17 +26,17 @@ class Reports:
     def save(
         self, of: Of, file: str | Path, *, margin: float | None = None, margin_of_direct: float | None = None
     ) -> Path:
-        """Write the report on a study into a file with the suffix .html or .pdf.
+        """Write the report on a study into a file with the suffix .html, to read and to print.
 
         The margins are those of `verdict`. Missing folders are created.
         """
         query = {"margin": margin, "margin_of_direct": margin_of_direct}
-        return self._connection.save(file, f"/studies/{segment(of)}/report", FORMATS, **query)
+        return self._connection.save(file, f"/studies/{segment(of)}/report", ("html",), **query)
 
     def take_home(self, of: Of, file: str | Path) -> Path:
-        """Write what an experiment found into a file with the suffix .zip, or a page to print into one with .html.
+        """Write what an experiment found into a file with the suffix .zip.
 
-        The zip has the best measured controller with its motion, the tuned simulator with its intervals, the verdict,
-        samples, spec, provenance and the page. Missing folders are created.
+        It has the best measured controller with its motion, the tuned simulator with its intervals, the verdict,
+        samples, spec, provenance and the report. Missing folders are created.
         """
-        return self._connection.save(file, f"/experiments/{segment(of)}/takehome", ("zip", "html"))
+        return self._connection.save(file, f"/experiments/{segment(of)}/takehome", ("zip",))

@@ -1,12 +1,10 @@
-"""The commands that write reports and replays, and what one takes home from a bench."""
+"""The commands for reports and replays, and for what one takes home from a bench."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gaplab.api.clients.replays import FORMATS as VIDEOS
-from gaplab.api.clients.reports import FORMATS
 from gaplab.api.commands.app import BENCH, RESULTS, AsJson, ExperimentId, Id, Url, app, connect
 from gaplab.api.commands.comparisons import MarginOption, margins
 from gaplab.api.commands.figures import named_option
@@ -17,10 +15,7 @@ from gaplab.schemas.replays import ReplayWorld
 @app.command(rich_help_panel=RESULTS)
 def report(
     id: Id,
-    save: Annotated[
-        list[Path] | None,
-        typer.Option("--save", "-o", help=f"file; its suffix is the format: {', '.join(FORMATS)}; repeatable"),
-    ] = None,
+    save: Annotated[Path | None, typer.Option("--save", "-o", help="file with the suffix .html")] = None,
     margin: MarginOption = None,
     as_json: AsJson = False,
     url: Url = None,
@@ -29,10 +24,10 @@ def report(
     width, share = margins(margin)
     with connect(url) as client:
         verdict = client.verdict(id, margin=width, margin_of_direct=share)
-        files = [client.reports.save(id, file, margin=width, margin_of_direct=share) for file in save or []]
-    sentences = () if files else verdict.sentences
+        file = client.report(id, save, margin=width, margin_of_direct=share) if save else None
+    sentences = () if file else verdict.sentences
     print_result(verdict, verdict.headline, *(f"- {each}" for each in sentences), as_json=as_json)
-    for file in files:
+    if file:
         echo(f"Wrote {file}.", err=as_json)
 
 
@@ -40,12 +35,13 @@ def report(
 def takehome(
     id: Annotated[str, typer.Argument(metavar="ID", help="an experiment")],
     file: Annotated[
-        Path | None, typer.Argument(help=".zip, or .html to print; default: gaplab-ID-takehome.zip", show_default=False)
+        Path | None,
+        typer.Argument(help="file with the suffix .zip; default: gaplab-ID-takehome.zip", show_default=False),
     ] = None,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Save what one takes home: the best controller, its motion, the tuned simulator, and the verdict."""
+    """Save what one takes home: the best controller, its motion, the tuned simulator, and the report."""
     file = file or Path(f"gaplab-{id}-takehome.zip")
     with connect(url) as client:
         written = client.take_home(id, file)
@@ -56,9 +52,6 @@ def takehome(
 @app.command(rich_help_panel=RESULTS)
 def replay(
     id: ExperimentId,
-    save: Annotated[
-        Path | None, typer.Option("--save", "-o", help=f"file; its suffix is the format: {', '.join(VIDEOS)}")
-    ] = None,
     options: Annotated[
         list[str] | None,
         typer.Option(
@@ -71,15 +64,11 @@ def replay(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Replay a controller in its simulator and in reality, and save it as a video."""
+    """Replay a controller in its simulator and in reality: print its fitness, or with --json its motion."""
     with connect(url) as client:
-        choice = dict(map(named_option, options or []))
-        found = client.replay(id, **choice)
-        file = client.video(id, save, **choice) if save else None
+        found = client.replay(id, **dict(map(named_option, options or [])))
     worlds = (("in its simulator", found.simulation), ("in reality", found.reality))
     print_result(found, *(f"{name}: {_result_in(world, found.unit)}" for name, world in worlds), as_json=as_json)
-    if file:
-        echo(f"Wrote {file}.", err=as_json)
 
 
 def _result_in(world: ReplayWorld | None, unit: str) -> str:

@@ -216,7 +216,6 @@ class Server(uvicorn.Server):
         """End the streams and the replay process, finish the requests under way, and close."""
         self._app.state.feed.close()
         self._app.state.rollout_process.close()
-        self._app.state.drawing_process.close()
         await super().shutdown(sockets)
 
 

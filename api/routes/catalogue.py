@@ -1,29 +1,21 @@
-"""The plug-ins that a spec may name, and pictures of the robots among them."""
+"""The plug-ins that a spec may name, and the shapes of the robots among them."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Request, Response
-from pydantic import Field
+from fastapi import APIRouter, Path, Request, Response
 
 from gaplab.api.http import conditional
-from gaplab.api.http.dependencies import DrawingProcessDep, Parameters, StoreDep
+from gaplab.api.http.dependencies import StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.plugin import Catalogue
+from gaplab.schemas.replays import RobotShapes
 from gaplab.services.experiments.stored_robots import catalogued, list_robots
 from gaplab.services.plugins.catalogue import catalogue
-from gaplab.services.replay.portraits import robot_picture
+from gaplab.services.replay.replays import robot_shapes
 
 router = APIRouter(tags=["catalogue"])
 
 RobotInPath = Annotated[str, Path(max_length=100, description="name of a robot", examples=["quadruped"])]
-_PNG = {"image/png": {"schema": {"type": "string", "format": "binary"}, "example": "…"}}
-
-
-class PictureQuery(Parameters):
-    """How a robot is drawn."""
-
-    theme: Literal["light", "dark"] = Field(default="light", description="colours of the page")
-    width: int = Field(default=320, ge=80, le=1_280, description="width in pixels; the height is three quarters of it")
 
 
 @router.get(
@@ -38,19 +30,12 @@ def read_catalogue(request: Request, store: StoreDep) -> Response:
 
 
 @router.get(
-    "/catalogue/robots/{name}/picture",
-    summary="Draw a robot",
-    response_class=Response,
-    response_description="The robot as it stands at the start, as PNG",
-    responses=conditional.CACHED | {200: conditional.TAGGED[200] | {"content": _PNG}} | documented(404, 422, 429),
+    "/catalogue/robots/{name}/shapes",
+    summary="Read the shapes of a robot",
+    response_model=RobotShapes,
+    response_description="The robot as it stands at the start",
+    responses=conditional.CACHED | documented(404, 422),
 )
-def draw_robot(
-    request: Request,
-    name: RobotInPath,
-    drawing: DrawingProcessDep,
-    store: StoreDep,
-    query: Annotated[PictureQuery, Query()],
-) -> Response:
-    """Draw a robot of the catalogue with its default options, on its ground; a robot without bodies has no picture."""
-    drawn = robot_picture(drawing, store, name, dark=query.theme == "dark", width_px=query.width)
-    return conditional.tagged_response(request, Response(drawn, media_type="image/png"))
+def read_robot_shapes(request: Request, name: RobotInPath, store: StoreDep) -> Response:
+    """Return what draws a robot of the catalogue with its default options; a robot without bodies has no shapes."""
+    return conditional.tagged(request, robot_shapes(store, name))

@@ -5,20 +5,13 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from gaplab.api.http.dependencies import DrawingProcessDep, Id, Parameters, RolloutProcessDep, StoreDep
+from gaplab.api.http.dependencies import Id, Parameters, RolloutProcessDep, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.replays import ControllerKind, Predictions, Replay
 from gaplab.services.replay import predictions, replays
 from gaplab.services.replay.rollout import LAST, ReplayChoice
-from gaplab.services.replay.video import VideoFormat, replay_video
 
 router = APIRouter(prefix="/experiments", tags=["replays"])
-
-MEDIA_TYPES: dict[VideoFormat, str] = {"gif": "image/gif", "webp": "image/webp", "mp4": "video/mp4"}
-_VIDEOS = {
-    media_type: {"schema": {"type": "string", "format": "binary"}, "example": "…"}
-    for media_type in MEDIA_TYPES.values()
-}
 
 
 class ReplayQuery(Parameters):
@@ -46,13 +39,6 @@ class ReplayQuery(Parameters):
         return ReplayChoice(self.repetition, iteration, self.kind, self.simulator)
 
 
-class VideoQuery(ReplayQuery):
-    """The replay to draw, and how."""
-
-    format: VideoFormat = Field(default="gif", description="the kind of file")
-    width: int = Field(default=960, ge=240, le=1_920, description="width of the video in pixels")
-
-
 @router.get(
     "/{id}/replay",
     summary="Replay a controller",
@@ -70,32 +56,6 @@ def read_replay(
     """
     replay = replays.replay_json(store, process, id, query.choice())
     return Response(replay, media_type="application/json")
-
-
-@router.get(
-    "/{id}/video",
-    summary="Draw a replay as a video",
-    response_class=Response,
-    response_description="Both worlds side by side, 25 pictures a second",
-    responses={200: {"content": _VIDEOS}, **documented(404, 409, 422, 429)},
-)
-def draw_video(
-    id: Id,
-    store: StoreDep,
-    process: RolloutProcessDep,
-    drawing: DrawingProcessDep,
-    query: Annotated[VideoQuery, Query()],
-) -> Response:
-    """Draw a replay as GIF, WebP or MP4, for a talk or a paper's supplement; it shows what the replay shows.
-
-    MP4 needs the extra `video` where the service runs. No hardware is moved.
-    """
-    replay = replays.replay_json(store, process, id, query.choice())
-    drawn = replay_video(drawing, replay, query.format, 2 * (query.width // 2))
-    shown = Replay.model_validate_json(replay)
-    name = f"gaplab-{id}-{shown.repetition}-{shown.iteration}.{query.format}"
-    disposition = {"Content-Disposition": f'inline; filename="{name}"'}
-    return Response(drawn, media_type=MEDIA_TYPES[query.format], headers=disposition)
 
 
 @router.get(

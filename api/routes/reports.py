@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from gaplab.api.http.dependencies import Id, Parameters, RolloutProcessDep, StoreDep
+from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import in_turn
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.http.security_headers import page
@@ -17,15 +17,12 @@ from gaplab.services.experiments import reading
 from gaplab.services.reports.content import verdict_on
 from gaplab.services.reports.document import report_on
 from gaplab.services.reports.html import render_html
-from gaplab.services.reports.takehome import takehome_page, takehome_zip
+from gaplab.services.reports.takehome import takehome_zip
 
 router = APIRouter(tags=["reports"])
 
-_FORMATS = "one HTML file without scripts, which prints well; PDF; or JSON with the verdict alone"
-_CONTENT = {
-    "text/html": {"schema": {"type": "string"}, "example": "<!doctype html><html lang='en'>…"},
-    "application/pdf": {"schema": {"type": "string", "format": "binary"}, "example": "%PDF…"},
-}
+_FORMATS = "one HTML file without scripts, to read and to print; or JSON with the verdict alone"
+_CONTENT = {"text/html": {"schema": {"type": "string"}, "example": "<!doctype html><html lang='en'>…"}}
 _RESPONSES: Responses = {
     200: {"description": _FORMATS.capitalize(), "content": _CONTENT},
     **documented(404, 422, 429),
@@ -35,26 +32,10 @@ _RESPONSES: Responses = {
 class ReportQuery(MarginQuery):
     """The format of a report, and the margin of its verdict."""
 
-    format: Literal["html", "pdf", "json"] = Field(default="html", description=_FORMATS)
+    format: Literal["html", "json"] = Field(default="html", description=_FORMATS)
 
 
-_HOME = "a zip with files and a page, or the page alone: one HTML file without scripts, to print"
-_TAKEN_HOME: Responses = {
-    200: {
-        "description": _HOME.capitalize(),
-        "content": {
-            "application/zip": {"schema": {"type": "string", "format": "binary"}, "example": "PK…"},
-            "text/html": _CONTENT["text/html"],
-        },
-    },
-    **documented(404, 409, 422, 429),
-}
-
-
-class TakeHomeQuery(Parameters):
-    """The format of what is taken home."""
-
-    format: Literal["zip", "html"] = Field(default="zip", description=_HOME)
+_ZIP = {"application/zip": {"schema": {"type": "string", "format": "binary"}, "example": "PK…"}}
 
 
 @router.get("/studies/{id}/report", summary="Report on a study", response_model=VerdictRead, responses=_RESPONSES)
@@ -69,14 +50,8 @@ def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]
         return verdict_on(store, study, margin)
     report, at = report_on(store, study, margin), datetime.now(UTC)
     made = f"Made by gaplab {version('gaplab')} on {at:%Y-%m-%d at %H:%M} UTC, from what was stored by then."
-    name = f'inline; filename="gaplab-{report.id}-report.{query.format}"'
-    if query.format == "html":
-        answer: Response = page(in_turn(lambda: render_html(report, made)))
-    else:
-        from gaplab.services.reports.pdf import render_pdf  # its library takes as long to import as the web server
-
-        answer = Response(in_turn(lambda: render_pdf(report, made, at)), media_type="application/pdf")
-    answer.headers["Content-Disposition"] = name
+    answer = page(in_turn(lambda: render_html(report, made)))
+    answer.headers["Content-Disposition"] = f'inline; filename="gaplab-{report.id}-report.html"'
     return answer
 
 
@@ -84,18 +59,13 @@ def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]
     "/experiments/{id}/takehome",
     summary="Take home what an experiment found",
     response_class=Response,
-    responses=_TAKEN_HOME,
+    response_description="Files for programs, and the report",
+    responses={200: {"content": _ZIP}, **documented(404, 409, 422, 429)},
 )
-def take_home(
-    id: Id, store: StoreDep, process: RolloutProcessDep, query: Annotated[TakeHomeQuery, Query()]
-) -> Response:
-    """Return the best measured controller, the tuned simulator with its intervals, the verdict, samples and provenance.
+def take_home(id: Id, store: StoreDep, process: RolloutProcessDep) -> Response:
+    """Return the report, the best measured controller, the tuned simulator with its intervals, samples and provenance.
 
     The same results give the same bytes.
     """
-    if query.format == "html":
-        answer: Response = page(in_turn(lambda: takehome_page(store, id)))
-    else:
-        answer = Response(takehome_zip(store, process, id, in_turn), media_type="application/zip")
-    answer.headers["Content-Disposition"] = f'inline; filename="gaplab-{id}-takehome.{query.format}"'
-    return answer
+    disposition = {"Content-Disposition": f'inline; filename="gaplab-{id}-takehome.zip"'}
+    return Response(takehome_zip(store, process, id, in_turn), media_type="application/zip", headers=disposition)

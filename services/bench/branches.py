@@ -52,14 +52,13 @@ def list_branches(session: Session, experiment: str) -> tuple[BranchRead, ...]:
     query = select(row, repetition.number).join(repetition, repetition.id == row.repetition_id)
     found = session.execute(query.where(repetition.experiment_id == experiment).order_by(repetition.number, row.number))
 
-    def sentences(branch: BranchRow, repetition: int) -> tuple[str, ...]:
+    def view(branch: BranchRow, repetition: int) -> BranchRead:
         of_it = (step.repetition_id == branch.repetition_id) & (step.branch == branch.number)
-        closed = session.scalars(select(step).where(of_it).order_by(step.place))
-        return tuple(step_sentence(_shown(each), repetition) for each in closed)
+        steps = tuple(map(_shown, session.scalars(select(step).where(of_it).order_by(step.place))))
+        sentences = tuple(step_sentence(each, repetition) for each in steps)
+        return BranchRead.filled_from(branch, repetition=repetition, steps=steps, sentences=sentences)
 
-    return tuple(
-        BranchRead.filled_from(each, repetition=number, sentences=sentences(each, number)) for each, number in found
-    )
+    return tuple(view(branch, number) for branch, number in found)
 
 
 def _shown(step: StepRow) -> dict[str, Any]:

@@ -1,18 +1,22 @@
-"""Replays: the motion of a measured controller in its simulator and in reality, computed on request."""
+"""Replays: the motion of a measured controller in its simulator and in reality, and robots at their start."""
 
 from dataclasses import replace
 from hashlib import sha256
 
 from gaplab.schemas.records import MeasurementKind
-from gaplab.schemas.replays import ControllerKind, Replay
+from gaplab.schemas.replays import ControllerKind, Replay, RobotShapes
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
+from gaplab.services.core.robot_files import stored_robot_file
 from gaplab.services.core.robot_library import label_of
+from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.experiments import stored_robots
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import LAST, ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.replay.sent_specs import sent
+from gaplab.services.replay.shapes import at_start
 from gaplab.services.specs.assembly import refuse_missing
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.specs.robots import robot_of
@@ -56,6 +60,19 @@ def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choic
         found = process.call(compute_replay, request, plugins=request.spec.plugins)
         process.answers.keep(key, found, len(found))
     return found
+
+
+def robot_shapes(store: Store, name: str) -> RobotShapes:
+    """Return a robot, of the catalogue or from a file, by its name or the hash of its file, as it stands at the start.
+
+    Raises:
+        NotFound: no usable robot has this name or hash, or it has no body.
+    """
+    own = robots[name].example().world if name in robots else None
+    world = own if own is not None else stored_robot_file(stored_robots.robot_text(store, name)).world
+    if not world.bodies:
+        raise NotFound(f"the robot {name!r} has no body, so it has no shapes")
+    return at_start(world)
 
 
 def _with_iteration(session: Session, row: ExperimentRow, choice: ReplayChoice) -> ReplayChoice:

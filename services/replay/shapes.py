@@ -1,14 +1,23 @@
 """The shapes that draw a World: the parts of its bodies, struts to bodies far from their joints, and the ground."""
 
-import numpy as np
+from functools import lru_cache
+from itertools import product
 
-from gaplab.schemas.replays import Framing, Orientation, Position, Shape, ShapeKind, ShapeRole
+import numpy as np
+import scipy
+
+from gaplab.schemas.replays import Framing, Orientation, Position, RobotShapes, Shape, ShapeKind, ShapeRole
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import rotated
+from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m, rotated
 from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Vector
 from gaplab.services.core.shapes import Shape as Solid
 from gaplab.services.core.world import World
-from gaplab.services.replay.polyhedra import SIGNS, Face, hull_faces
+
+Face = tuple[int, ...]
+"""Places of its corners, anticlockwise as seen from outside."""
+
+SIGNS = tuple(product((-0.5, 0.5), repeat=3))
+BOX: tuple[Face, ...] = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 SLENDER = 0.4
 """Radius of a strut, as a factor of the radius of its part."""
@@ -93,9 +102,32 @@ def framing_of(low: FloatArray, high: FloatArray) -> Framing:
 
     The scale is a power of 2, so that the squares of the ground keep round sizes.
     """
-    size = max(float(np.linalg.norm(high - low)), 1e-3)
-    scale = float(2.0 ** np.round(np.log2(size / USUAL_SIZE_M)))
+    scale = float(2.0 ** np.round(np.log2(_size_m(low, high) / USUAL_SIZE_M)))
     return Framing(scale=scale, height_m=round(max(LOOKED_AT_M * scale, float(low[2] + high[2]) / 2), 4))
+
+
+def at_start(world: World) -> RobotShapes:
+    """Return a robot as it stands at the start, seen as large as any other."""
+    pose = np.array([[0.0, 0.0, world.start_height_m, *world.start_turn]])
+    positions, orientations = body_poses(world, pose, np.array([[joint.start for joint in world.joints]]))
+    shapes = shapes_of(world)
+    low, high = extent_of(shapes, positions[0], orientations[0])
+    clearances = (
+        clearances_m(world.bodies[foot], positions[:, foot], orientations[:, foot]) for foot in feet_of(world)
+    )
+    return RobotShapes(
+        shapes=shapes,
+        positions_m=tuple(map(tuple, positions.reshape(1, -1).tolist())),
+        orientations=tuple(map(tuple, orientations.reshape(1, -1).tolist())),
+        slope_rad=world.slope_rad,
+        contacts=tuple(((0.0, 0.0),) if clearance[0] < TOUCHING_M else () for clearance in clearances),
+        scale=_size_m(low, high) / USUAL_SIZE_M,
+        middle_m=tuple(((low + high) / 2).tolist()),
+    )
+
+
+def _size_m(low: FloatArray, high: FloatArray) -> float:
+    return max(float(np.linalg.norm(high - low)), 1e-3)
 
 
 def _outline(shape: Shape) -> FloatArray:
@@ -141,6 +173,34 @@ def _rounded_hull(hull: Hull) -> tuple[tuple[Vector, ...], tuple[Face, ...]]:
     """Return corners, rounded to 0.01 mm, and faces of a hull."""
     vertices, faces = hull_faces(hull.points_m)
     return tuple((round(x, 5), round(y, 5), round(z, 5)) for x, y, z in vertices), faces
+
+
+@lru_cache(maxsize=1024)
+def hull_faces(points_m: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], tuple[Face, ...]]:
+    """Return the corners of the convex hull of points, and its triangles; both in an order that the points determine.
+
+    Points in one plane have no hull; their bounding box, which may be flat, stands for it.
+    """
+    points = np.array(points_m, dtype=float)
+    try:
+        hull = scipy.spatial.ConvexHull(points)
+    except (scipy.spatial.QhullError, ValueError):
+        low, high = points.min(axis=0), points.max(axis=0)
+        return _vectors((low + high) / 2 + np.array(SIGNS) * (high - low)), BOX
+    corners = np.sort(hull.vertices)
+    renumbered = {int(old): new for new, old in enumerate(corners)}
+    inside = points[corners].mean(axis=0)
+    faces = []
+    for triangle in hull.simplices.tolist():
+        a, b, c = (points[place] for place in triangle)
+        outwards = np.cross(b - a, c - a) @ (a - inside) >= 0
+        first, second, third = (renumbered[place] for place in (triangle if outwards else triangle[::-1]))
+        faces.append(min((first, second, third), (second, third, first), (third, first, second)))
+    return _vectors(points[corners]), tuple(sorted(faces))
+
+
+def _vectors(rows: FloatArray) -> tuple[Vector, ...]:
+    return tuple((float(x), float(y), float(z)) for x, y, z in rows)
 
 
 def _strut(place: int, parts: tuple[Part, ...]) -> Shape | None:

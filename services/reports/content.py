@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.provenance import ProvenanceRead
-from gaplab.schemas.records import ExperimentRead, StudyRead, common_count
+from gaplab.schemas.records import ExperimentRead, SampleRead, SimulatorRead, StudyRead, common_count
 from gaplab.schemas.reports import VerdictRead
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.errors import NotFound
@@ -22,8 +23,31 @@ from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import TunedSimulators, tuned_simulators
 from gaplab.services.running import provenance
 from gaplab.services.specs.differences import SpecColumn, differences
+from gaplab.services.store.queries import experiments as rows
+from gaplab.services.store.queries import results as stored
+from gaplab.services.store.queries import tunings
 from gaplab.services.store.queries.costs import Work, work_of
-from gaplab.services.store.session import Store
+from gaplab.services.store.session import Session, Store
+
+MOST_ROWS = 1_000_000
+"""Most measurements, and most simulators of one repetition."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What an experiment has measured and tuned so far.
+
+    Attributes:
+        measured: its measurements that succeeded, by repetition in the order of the log.
+        best: the fittest of them; None without any.
+        simulators: simulators of the latest tuning in the repetition of the fittest measurement, the best first.
+        samples: number of samples that they were tuned on.
+    """
+
+    measured: tuple[SampleRead, ...]
+    best: SampleRead | None
+    simulators: tuple[SimulatorRead, ...]
+    samples: int
 
 
 @dataclass(frozen=True)
@@ -49,6 +73,7 @@ class Facts:
         work: work by experiment.
         provenance: provenance by experiment.
         leading: simulators of the experiment with the highest mean; None if there are none.
+        outcome: what its only experiment has measured and tuned; None if there are several.
     """
 
     id: str
@@ -68,11 +93,17 @@ class Facts:
     work: Mapping[str, Work]
     provenance: Mapping[str, ProvenanceRead]
     leading: tuple[Judged, TunedSimulators] | None
+    outcome: Outcome | None
 
     @cached_property
     def names(self) -> dict[str, str]:
         """The distinct names of the experiments, by their ids."""
         return {one.curve.experiment: one.name for one in self.judged}
+
+    @property
+    def unit(self) -> str:
+        """The unit of fitness; "" if its robot is not installed here."""
+        return next((one.curve.unit for one in self.judged), "")
 
 
 def verdict_on(store: Store, subject: StudyRead, margin: Margin | None = None) -> VerdictRead:
@@ -94,6 +125,7 @@ def facts_of(store: Store, subject: StudyRead, margin: Margin | None = None) -> 
     columns = [SpecColumn(each.id, each.name, (each.spec,)) for each in experiments]
     with store.reading() as session:
         work = work_of(session, ids)
+        outcome = _outcome(session, ids[0]) if len(ids) == 1 else None
     return Facts(
         id=subject.id,
         name=subject.name,
@@ -112,7 +144,24 @@ def facts_of(store: Store, subject: StudyRead, margin: Margin | None = None) -> 
         work=work,
         provenance={id_: provenance.read(store, id_) for id_ in ids},
         leading=_leading(store, judged),
+        outcome=outcome,
     )
+
+
+def _outcome(session: Session, experiment_id: str) -> Outcome:
+    row = rows.get_experiment(session, experiment_id)
+    seen = stored.page_of_samples(session, row.id, repetition=None, kind=None, limit=MOST_ROWS, cursor=None)
+    measured = tuple(sample for sample in seen if sample.fitness is not None)
+    best = max(measured, key=lambda sample: -inf if sample.fitness is None else sample.fitness, default=None)
+    repetition = best.repetition if best else 0
+    tuned = (
+        stored.page_of_simulators(session, row, repetition=repetition, iteration=None, limit=MOST_ROWS, cursor=None)
+        if row.tunes
+        else ()
+    )
+    last = max((simulator.iteration for simulator in tuned), default=0)
+    samples = tunings.measured(session, row).tuned_until(repetition, last) if tuned else 0
+    return Outcome(measured, best, tuple(each for each in tuned if each.iteration == last), samples)
 
 
 def _misfits(store: Store, experiments: Sequence[ExperimentRead]) -> dict[str, MisfitRead]:

@@ -3,17 +3,19 @@
 from collections.abc import Sequence
 
 from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.curves import from_before
 from gaplab.schemas.records import StudyRead
-from gaplab.schemas.reports import VerdictRead
 from gaplab.services.core.robot_library import label_of
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
-from gaplab.services.figures.words import number_of, titled
+from gaplab.services.figures.words import number, number_of, spoken, titled
 from gaplab.services.findings import tables as findings
 from gaplab.services.findings.sentences import POOLED
+from gaplab.services.findings.simulator_sentences import noise
 from gaplab.services.reports import tables
-from gaplab.services.reports.blocks import Block, Bullets, Drawing, Paragraph, Report, Section
-from gaplab.services.reports.content import Facts, facts_of
+from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Paragraph, Report, Section
+from gaplab.services.reports.content import Facts, Outcome, facts_of
 from gaplab.services.reports.reproduction import reproduction
 from gaplab.services.results.comparisons import Margin
 from gaplab.services.results.coordinates import simulator_coordinates
@@ -22,33 +24,87 @@ from gaplab.services.store.session import Store
 
 def report_on(store: Store, subject: StudyRead, margin: Margin | None = None) -> Report:
     """Return the report on a study."""
-    facts = facts_of(store, subject, margin)
-    several = len(facts.experiments) > 1
+    return report_of(store, facts_of(store, subject, margin))
+
+
+def report_of(store: Store, facts: Facts) -> Report:
+    """Return the report with these facts."""
+    outcome = facts.outcome
     sections = [
-        Section("Verdict", _verdict(facts.verdict)),
+        Section("Verdict", _verdict(facts)),
         Section("Curves", (Drawing(curves_figure(facts.curves, beside=facts.transferred)), tables.at_last(facts))),
-        *([Section("Which differ", _differences(facts))] if several else []),
+        *([Section("Which differ", _differences(facts))] if len(facts.experiments) > 1 else []),
+        *([Section("The best measured controller", _controller(facts, outcome))] if outcome and outcome.best else []),
+        *([Section("The tuned simulator", _tuned(facts, outcome))] if outcome and outcome.simulators else []),
         *([Section("Simulators", _simulators(store, facts))] if facts.leading else []),
         *([Section("Sensitivity of fitness to the tunables", _sensitivity(facts))] if facts.checks else []),
+        *([Section("Measurements", _measurements(facts, outcome))] if outcome and outcome.measured else []),
         Section("Cost", (tables.cost(facts),)),
         Section("Settings", _settings(facts)),
         Section("Provenance", _provenance(facts)),
         Section("How to reproduce it", tuple(reproduction(facts))),
     ]
-    repetitions = sum(experiment.progress.completed for experiment in facts.experiments)
     return Report(
         id=facts.id,
-        title=facts.name if several else titled(facts.name, facts.experiments[0].strategy, 200),
-        subtitle=f"Study {facts.id}: {number_of('experiment', len(facts.experiments))}, "
-        f"{number_of('completed repetition', repetitions)}",
+        title=titled(facts.name, facts.experiments[0].strategy, 200) if outcome else facts.name,
+        subtitle=_subtitle(facts, outcome),
         headline=facts.verdict.headline,
         sections=tuple(sections),
     )
 
 
-def _verdict(verdict: VerdictRead) -> tuple[Block, ...]:
-    rules = [Paragraph(f"Rule {number}. {rule}", note=True) for number, rule in enumerate(verdict.rules, 1)]
-    return (Bullets(verdict.sentences), *rules)
+def said(facts: Facts) -> tuple[str, ...]:
+    """Return the sentences of the verdict; of a single experiment, also what its samples say about the tunables."""
+    found = [*facts.verdict.sentences]
+    for misfit in facts.misfits.values() if facts.outcome else ():
+        found += [f"{remark[0].upper()}{remark[1:]}." for remark in misfit.remarks]
+        found += [verdict.sentence for verdict in misfit.verdicts]
+        found += [] if misfit.noise is None else [noise(misfit.noise, misfit.unit)]
+    return tuple(found) or ("There are too few results for a verdict.",)
+
+
+def _subtitle(facts: Facts, outcome: Outcome | None) -> str:
+    parts = [number_of("experiment", len(facts.experiments))]
+    if outcome:
+        spec = spec_of(facts.experiments[0].spec)
+        measured = f"{number_of('measurement', len(outcome.measured))}{from_before(len(spec.reality.samples))}"
+        parts = [spoken(label_of(spec.robot)), f"simulated in {spoken(spec.engine.name)}", measured]
+    completed = sum(experiment.progress.completed for experiment in facts.experiments)
+    parts.append(number_of("completed repetition", completed))
+    return f"{'Experiment' if outcome else 'Study'} {facts.id}: {', '.join(parts)}"
+
+
+def _verdict(facts: Facts) -> tuple[Block, ...]:
+    rules = [Paragraph(f"Rule {number}. {rule}", note=True) for number, rule in enumerate(facts.verdict.rules, 1)]
+    return (Bullets(said(facts)), *rules)
+
+
+def _controller(facts: Facts, outcome: Outcome) -> tuple[Block, ...]:
+    best = outcome.best
+    assert best is not None
+    error = "" if best.standard_error is None else f" ± {best.standard_error:.3g} (standard error)"
+    repeats = f", the mean of {len(best.repeats)} repeats" if best.repeats else ""
+    when = f"{best.kind.value} of iteration {best.iteration} in repetition {best.repetition}, by {best.measured_by}"
+    lucky = "The best of many measurements is partly luck. Measure it again before you rely on its number."
+    return (
+        Paragraph(f"Fitness {number(best.fitness)}{error} {facts.unit}{repeats}: the {when}."),
+        Paragraph(lucky, note=True),
+        Code(", ".join(f"{gene:.6g}" for gene in best.genome)),
+    )
+
+
+def _tuned(facts: Facts, outcome: Outcome) -> tuple[Block, ...]:
+    error, misfit = outcome.simulators[0].error, facts.misfits.get(facts.experiments[0].id)
+    unit = f" {misfit.error_unit}" if misfit and misfit.error_unit else ""
+    left = [] if error is None else [Paragraph(f"Error per sample: {error:.3g}{unit}.")]
+    return (tables.best_simulator(facts, outcome), *left)
+
+
+def _measurements(facts: Facts, outcome: Outcome) -> tuple[Block, ...]:
+    more = len(outcome.measured) - tables.MOST_SHOWN
+    where = f"are in the archive that gaplab export {facts.experiments[0].id} writes"
+    rest = [Paragraph(f"{number_of('more measurement', more)} {where}.", note=True)] if more > 0 else []
+    return (tables.measurements(facts, outcome), *rest)
 
 
 def _differences(facts: Facts) -> tuple[Block, ...]:
@@ -86,7 +142,7 @@ def _simulators(store: Store, facts: Facts) -> tuple[Block, ...]:
     remarks = tuple(
         f"{one.name}: {remark}."
         for one in facts.judged
-        if one.curve.experiment in facts.misfits
+        if not facts.outcome and one.curve.experiment in facts.misfits
         for remark in facts.misfits[one.curve.experiment].remarks
     )
     error = squared_error_figure(tuned.errors, tuned.error, samples=tuned.samples, title=leading.name)

@@ -4,21 +4,24 @@ from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 
 from gaplab.schemas.provenance import Provenance
-from gaplab.services.figures.words import number_of, spoken
+from gaplab.services.core.tunables.labels import unit_of
+from gaplab.services.figures.words import number_of, spoken, with_unit
 from gaplab.services.findings import tables as findings
 from gaplab.services.findings.judged import Judged
 from gaplab.services.findings.wording import MISSING, bracketed, number, share
 from gaplab.services.reports.blocks import Grid
-from gaplab.services.reports.content import Facts
+from gaplab.services.reports.content import Facts, Outcome
 from gaplab.services.specs.differences import SpecColumn, all_settings
 from gaplab.services.store.queries.costs import Work
+
+MOST_SHOWN = 60
+"""Most measurements in a report."""
 
 
 def at_last(facts: Facts) -> Grid:
     """Return the fitness of each experiment at the common count."""
-    unit = next((one.curve.unit for one in facts.judged), "")
     baseline = next((one.mean for one in facts.judged if one.curve.direct and one.mean > 0), None)
-    head = ("Experiment", "n", f"Mean ({unit})", "SD", "95 % interval", "Share of direct", "End of the curve")
+    head = ("Experiment", "n", f"Mean ({facts.unit})", "SD", "95 % interval", "Share of direct", "End of the curve")
     caption = "Recorded fitness at the last number of real-world evaluations that the experiments share"
     return Grid(caption, head, tuple(_at_last(one, baseline) for one in facts.judged))
 
@@ -31,6 +34,50 @@ def _at_last(one: Judged, baseline: float | None) -> tuple[str, ...]:
     since = f" since {one.end.since}" if one.end and end == "flat" else ""
     ends = bracketed(one.point.lower, one.point.upper).strip() or MISSING
     return (one.name, str(one.point.n), number(one.mean), number(one.point.sd), ends, of_direct, end + since)
+
+
+def best_simulator(facts: Facts, outcome: Outcome) -> Grid:
+    """Return the values of the best tuned simulator."""
+    simulator, (experiment,) = outcome.simulators[0], facts.experiments
+    misfit = facts.misfits.get(experiment.id)
+    verdicts = {each.name: each.verdict.value for each in misfit.verdicts} if misfit else {}
+    rows = tuple(
+        (
+            with_unit(spoken(name), [unit_of(name)]),
+            f"{simulator.parameters[name]:.6g}",
+            _ends((simulator.intervals or {}).get(name)),
+            f"{tunable['lower']:g} to {tunable['upper']:g}",
+            verdicts.get(name, MISSING),
+        )
+        for tunable in experiment.spec["tunables"]
+        for name in [tunable["name"]]
+    )
+    caption = (
+        f"Best simulator of iteration {simulator.iteration} in repetition {simulator.repetition}, tuned on "
+        f"{number_of('sample', outcome.samples)}"
+    )
+    return Grid(caption, ("Tunable", "Value", "95 % interval", "Bounds", "Verdict"), rows, words=True)
+
+
+def _ends(found: tuple[float, float] | None) -> str:
+    return MISSING if found is None else f"{found[0]:.4g} to {found[1]:.4g}"
+
+
+def measurements(facts: Facts, outcome: Outcome) -> Grid:
+    """Return the first measurements that succeeded."""
+    rows = tuple(
+        (
+            f"{each.repetition}, {each.iteration}",
+            each.kind.value,
+            number(each.fitness) or MISSING,
+            number(each.standard_error, 2) or MISSING,
+            each.measured_by,
+            f"{each.measured_at:%Y-%m-%d %H:%M}",
+        )
+        for each in outcome.measured[:MOST_SHOWN]
+    )
+    head = ("Repetition, iteration", "Kind", f"Fitness ({facts.unit})", "Standard error", "Measured by", "At")
+    return Grid("Measurements that succeeded", head, rows, words=True)
 
 
 def cost(facts: Facts) -> Grid:

@@ -3,6 +3,7 @@
 import io
 import json
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from typing import Any, TypeAlias
@@ -10,23 +11,29 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from gaplab.schemas.records import SampleRead
+from gaplab.schemas.records import ExperimentRead, SampleRead
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.traces import TRACE_COLUMNS
 from gaplab.services.bench import motions
 from gaplab.services.core import robot_library
 from gaplab.services.core.arrays import frozen, known
 from gaplab.services.core.csv_tables import csv_text
-from gaplab.services.core.errors import GaplabError
+from gaplab.services.core.errors import Conflict, GaplabError
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.tunables.labels import unit_of
+from gaplab.services.experiments.reading import read, read_experiment
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.sent_specs import sent
 from gaplab.services.replay.traces import expected_motion
+from gaplab.services.reports.content import Facts, Outcome, facts_of
+from gaplab.services.reports.document import report_of, said
 from gaplab.services.reports.html import render_html
-from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
-from gaplab.services.reports.outcome_page import MOST_SHOWN, outcome_report, verdict_sentences
 from gaplab.services.reports.plain_mujoco import plain_motion, tuned_mjcf
 from gaplab.services.reports.reproduction import spec_text, submitted
+from gaplab.services.reports.tables import MOST_SHOWN
 from gaplab.services.results.files import entry_of
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Store
@@ -38,7 +45,7 @@ MOTIONS: dict[motions.MotionFormat, str] = {"csv": "motion.csv", "json": "motion
 
 README = """What experiment {id} ({name}) found, by gaplab {version}.
 
-page.html          all of this on a page to print
+report.html        all of this, and more, as a report to read and to print
 controller.json    genome and fitness of the best measured controller
 motion.*           its motion as CSV, JSON and a ROS 2 JointTrajectory; none if the controller observes while it acts
 simulator.json     the tuned simulator with its intervals, and the rest of the ensemble
@@ -62,21 +69,25 @@ Files that would be empty are left out.
 """
 
 
-def takehome_page(store: Store, experiment_id: str) -> str:
-    """Return the outcome of an experiment as one HTML page to print.
+@dataclass(frozen=True)
+class _Home:
+    """An experiment whose results are taken home."""
 
-    Raises:
-        NotFound: no such experiment.
-        Conflict: nothing has been measured or tuned yet.
-        InvalidSpec: its robot is not installed here.
-    """
-    return _page(outcome_of(store, experiment_id))
+    facts: Facts
+    outcome: Outcome
+    spec: ResolvedSpec
+    robot: Robot
+
+    @property
+    def experiment(self) -> ExperimentRead:
+        """The experiment."""
+        return self.facts.experiments[0]
 
 
 def takehome_zip(
     store: Store, process: RolloutProcess, experiment_id: str, draw: Callable[[Callable[[], str]], str]
 ) -> bytes:
-    """Return the outcome of an experiment as a zip.
+    """Return a zip of the report on an experiment and of what it found as files for programs.
 
     `draw` calls a function that draws figures, perhaps after waiting for a turn.
 
@@ -85,17 +96,26 @@ def takehome_zip(
         Conflict: nothing has been measured or tuned yet.
         InvalidSpec: its robot is not installed here.
     """
-    outcome, content = outcome_of(store, experiment_id), io.BytesIO()
+    home, content = _home(store, experiment_id), io.BytesIO()
+    report = report_of(store, home.facts)
     with ZipFile(content, "w") as archive:
-        archive.writestr(entry_of("page.html"), draw(lambda: _page(outcome)))
+        made = f"Made by gaplab {version('gaplab')}."
+        archive.writestr(entry_of("report.html"), draw(lambda: render_html(report, made)))
         readings, traces = _answered(store, experiment_id)
-        for name, text in (*_files(outcome, readings), *traces, *_expected(outcome, process)):
+        for name, text in (*_files(home, readings), *traces, *_expected(home, process)):
             archive.writestr(entry_of(name), text)
     return content.getvalue()
 
 
-def _page(outcome: ExperimentOutcome) -> str:
-    return render_html(outcome_report(outcome), f"Made by gaplab {version('gaplab')}.")
+def _home(store: Store, experiment_id: str) -> _Home:
+    facts = facts_of(store, read(store, read_experiment(store, experiment_id).id))
+    outcome, (experiment,) = facts.outcome, facts.experiments
+    assert outcome is not None
+    if outcome.best is None and not outcome.simulators:
+        later = f", and is {experiment.state}" if experiment.state.ended else " yet; try again later"
+        raise Conflict(f"experiment {experiment_id!r} has measured and tuned nothing{later}")
+    spec = spec_of(experiment.spec)
+    return _Home(facts, outcome, spec, robot_of(spec))
 
 
 def _answered(store: Store, experiment_id: str) -> tuple[Readings, list[tuple[str, str]]]:
@@ -110,16 +130,16 @@ def _answered(store: Store, experiment_id: str) -> tuple[Readings, list[tuple[st
     return readings, traces
 
 
-def _expected(outcome: ExperimentOutcome, process: RolloutProcess) -> Iterator[tuple[str, str]]:
+def _expected(home: _Home, process: RolloutProcess) -> Iterator[tuple[str, str]]:
     """Yield the motion of measured controllers in the best tuned simulator, and fitness there; nothing if none runs."""
-    if not (outcome.simulators and outcome.robot.world.bodies):
+    if not (home.outcome.simulators and home.robot.world.bodies):
         return
-    spec, fitness, apart_m = sent(outcome.spec), dict[str, float | None](), dict[str, float | None]()
-    parameters = tuple(outcome.simulators[0].parameters[ref.name] for ref in outcome.spec.tunables)
+    spec, fitness, apart_m = sent(home.spec), dict[str, float | None](), dict[str, float | None]()
+    parameters = tuple(home.outcome.simulators[0].parameters[ref.name] for ref in home.spec.tunables)
     call = partial(process.call, plugins=spec.plugins)
-    tuned = call(tuned_mjcf, spec, parameters, f"Tuned by gaplab: experiment {outcome.experiment.id}.")
+    tuned = call(tuned_mjcf, spec, parameters, f"Tuned by gaplab: experiment {home.experiment.id}.")
     yield from (("tuned.xml", text) for text in [tuned] if text)
-    for each in outcome.measured[:MOST_SHOWN]:
+    for each in home.outcome.measured[:MOST_SHOWN]:
         name = f"{each.repetition}-{each.iteration}-{each.kind.value}"
         try:
             times_s, poses, expected = call(expected_motion, spec, each.genome, parameters)
@@ -136,70 +156,71 @@ def _expected(outcome: ExperimentOutcome, process: RolloutProcess) -> Iterator[t
     yield from (("expected/plain_mujoco_m.json", _json(found)) for found in [apart_m] if found)
 
 
-def _files(outcome: ExperimentOutcome, readings: Readings) -> Iterator[tuple[str, str]]:
-    """Yield name and text of each file beside the page."""
-    yield from (("robot.json", text) for text in robot_library.needed_by(outcome.spec.robot))
-    experiment, best = outcome.experiment, outcome.best
+def _files(home: _Home, readings: Readings) -> Iterator[tuple[str, str]]:
+    """Yield name and text of each file beside the report."""
+    yield from (("robot.json", text) for text in robot_library.needed_by(home.spec.robot))
+    experiment, best = home.experiment, home.outcome.best
     yield "README.txt", README.format(id=experiment.id, name=experiment.name, version=version("gaplab"))
-    yield "verdict.txt", "\n\n".join((outcome.facts.verdict.headline, *verdict_sentences(outcome))) + "\n"
-    yield "spec.json", spec_text(submitted(outcome.facts).spec) + "\n"
-    yield "provenance.json", outcome.facts.provenance[experiment.id].model_dump_json(indent=1) + "\n"
-    if best is not None or outcome.spec.reality.samples:
-        yield "samples.csv", samples_csv(outcome, readings)
+    yield "verdict.txt", "\n\n".join((home.facts.verdict.headline, *said(home.facts))) + "\n"
+    yield "spec.json", spec_text(submitted(home.facts).spec) + "\n"
+    yield "provenance.json", home.facts.provenance[experiment.id].model_dump_json(indent=1) + "\n"
+    if best is not None or home.spec.reality.samples:
+        yield "samples.csv", _samples_csv(home, readings)
     if best is not None:
-        yield "controller.json", _json(best.model_dump(mode="json") | {"unit": outcome.robot.unit})
-        yield "samples.json", _json([sample.model_dump(mode="json") for sample in outcome.measured])
+        yield "controller.json", _json(best.model_dump(mode="json") | {"unit": home.robot.unit})
+        yield "samples.json", _json([sample.model_dump(mode="json") for sample in home.outcome.measured])
         genome = frozen(best.genome)
-        for form in motions.forms_of(outcome.robot, genome):
-            yield MOTIONS[form], motions.written(outcome.spec, genome, form)
-    if outcome.simulators:
-        yield "simulator.json", _json(_simulator(outcome))
+        for form in motions.forms_of(home.robot, genome):
+            yield MOTIONS[form], motions.written(home.spec, genome, form)
+    if home.outcome.simulators:
+        yield "simulator.json", _json(_simulator(home))
 
 
-def samples_csv(outcome: ExperimentOutcome, readings: Readings) -> str:
+def _samples_csv(home: _Home, readings: Readings) -> str:
     """Return all measurements as a table of samples, those from before the experiment first.
 
     Equal ones are there once, since a sample may also be a probe.
     """
     found: dict[Any, list[float | None]]
-    found = {(each.genome, each.values): _cells(each.readings) for each in outcome.spec.reality.samples if each.values}
-    for sample in outcome.measured:
+    found = {(each.genome, each.values): _cells(each.readings) for each in home.spec.reality.samples if each.values}
+    for sample in home.outcome.measured:
         key = sample.genome, sample.repeats or (sample.fitness,)
-        found[key] = _cells(readings.get(key)) or (_readings(sample, outcome) if len(key[1]) == 1 else [])
+        found[key] = _cells(readings.get(key)) or (_readings(sample, home) if len(key[1]) == 1 else [])
     repeats = max(len(values) for _, values in found)
     ends = ["", *(f"#{number}" for number in range(2, repeats + 1))]
     read = any(set(told) - {None} for told in found.values())
-    names = [f"{name}{end}" for end in ends for name in outcome.robot.sensors.columns] if read else []
+    names = [f"{name}{end}" for end in ends for name in home.robot.sensors.columns] if read else []
     values = ["value"] if repeats == 1 else [f"value_{number}" for number in range(1, repeats + 1)]
     rows = (
         [*genome, *measured, *[None] * (repeats - len(measured)), *(told + [None] * len(names))[: len(names)]]
         for (genome, measured), told in found.items()
     )
-    return csv_text([*(f"gene_{place}" for place in range(outcome.robot.space.size)), *values, *names], rows)
+    return csv_text([*(f"gene_{place}" for place in range(home.robot.space.size)), *values, *names], rows)
 
 
 def _cells(readings: Sequence[Any] | None) -> list[float | None]:
     return [cell for table in readings or () for row in table for cell in row]
 
 
-def _readings(sample: SampleRead, outcome: ExperimentOutcome) -> list[float | None]:
+def _readings(sample: SampleRead, home: _Home) -> list[float | None]:
     """Return the readings of a measurement in the sensors' units, empty where one failed."""
-    size = outcome.robot.sensors.size
+    size = home.robot.sensors.size
     if sample.readings is None or len(sample.readings) != size:
         return [None] * size
-    told = outcome.robot.sensors.values(frozen([float("nan") if each is None else each for each in sample.readings]))
+    told = home.robot.sensors.values(frozen([float("nan") if each is None else each for each in sample.readings]))
     return [None if value != value else value for value in told.ravel().tolist()]  # noqa: PLR0124 - nan
 
 
-def _simulator(outcome: ExperimentOutcome) -> dict[str, Any]:
-    best, misfit = outcome.simulators[0], outcome.misfit
+def _simulator(home: _Home) -> dict[str, Any]:
+    best, misfit = home.outcome.simulators[0], home.facts.misfits.get(home.experiment.id)
+    verdicts = {each.name: each for each in misfit.verdicts} if misfit else {}
     return {
-        "experiment": outcome.experiment.id,
-        "robot": outcome.spec.robot.model_dump(mode="json"),
-        "engine": outcome.spec.engine.model_dump(mode="json"),
+        "experiment": home.experiment.id,
+        "robot": home.spec.robot.model_dump(mode="json"),
+        "engine": home.spec.engine.model_dump(mode="json"),
         "repetition": best.repetition,
         "iteration": best.iteration,
-        "samples": outcome.samples,
+        "samples": home.outcome.samples,
         "error": best.error,
         "error_unit": misfit.error_unit if misfit else "",
         "held_out_error": best.held_out_error,
@@ -210,14 +231,14 @@ def _simulator(outcome: ExperimentOutcome) -> dict[str, Any]:
                 "value": best.parameters[ref.name],
                 "interval": (best.intervals or {}).get(ref.name),
                 "bounds": [ref.lower, ref.upper],
-                "verdict": outcome.identified[ref.name].verdict if ref.name in outcome.identified else None,
-                "sentence": outcome.identified[ref.name].sentence if ref.name in outcome.identified else None,
+                "verdict": verdicts[ref.name].verdict if ref.name in verdicts else None,
+                "sentence": verdicts[ref.name].sentence if ref.name in verdicts else None,
             }
-            for ref in outcome.spec.tunables
+            for ref in home.spec.tunables
         ],
         "ensemble": [
             {"parameters": each.parameters, "squared_error": each.squared_error, "weight": each.weight}
-            for each in outcome.simulators
+            for each in home.outcome.simulators
         ],
     }
 

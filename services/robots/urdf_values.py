@@ -48,7 +48,7 @@ _REQUIRED = _ABOVE_0 | {("mass", "value"), *(("inertia", name) for name in _NUMB
 
 
 def check_values(root: Element, notes: Notes) -> None:
-    """Refuse what is missing, no finite number or out of its range, and limits in the wrong order; name each line.
+    """Refuse what is missing, not a finite number or out of its range, and limits in the wrong order; name each line.
 
     A joint whose limits are equal is free in MuJoCo, which is noted.
     """
@@ -69,13 +69,13 @@ def _wrong(element: Element, name: str, given: str | None, count: int) -> str | 
     found = list(_parsed(given))
     reason = None
     if len(found) != count or not all(map(math.isfinite, found)):
-        reason = f"not {count} finite numbers" if count > 1 else "no finite number"
+        reason = f"not {count} finite numbers" if count > 1 else "not a finite number"
     elif what in _AT_LEAST_0 and found[0] < 0:
         reason = "below 0"
     elif what in _ABOVE_0 and is_used and min(found) <= 0:
         reason = f"not {count} numbers above 0" if count > 1 else "not above 0"
     elif what == ("axis", "xyz") and not any(found) and element.getparent().get("type") in _MOVING:
-        reason = "no direction; give one like '0 1 0'"
+        reason = "not a direction; give one like '0 1 0'"
     return reason and f"{name} {given!r} is {reason}"
 
 

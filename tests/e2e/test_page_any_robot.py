@@ -1,7 +1,9 @@
-"""A robot with every shape, a slide and a slope in a real browser: its replay, and its picture in the form."""
+"""A robot with every shape, a slide and a slope in a real browser: its replay, as a video too, and its picture."""
 
+from base64 import b64encode
 from io import BytesIO
 from typing import Any
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -12,10 +14,30 @@ from gaplab.services.core.robots.robot_file import Imported
 from tests.e2e.browser import axe, fits, screenshot
 from tests.e2e.test_page_replay import FLAT, eventually, time_of
 
+FRAMES = """async (video) => {
+  const [shown, canvas] = [document.createElement("video"), document.createElement("canvas")];
+  const pen = canvas.getContext("2d", { willReadFrequently: true });
+  const seen = () => { pen.drawImage(shown, 0, 0); return canvas.toDataURL(); };
+  shown.muted = true;
+  shown.src = URL.createObjectURL(await (await fetch(video)).blob());
+  await new Promise((resume, fail) => Object.assign(shown, { onloadeddata: resume, onerror: fail }));
+  Object.assign(canvas, { width: shown.videoWidth, height: shown.videoHeight });
+  const ended = new Promise((resume) => { shown.onended = resume; });
+  await new Promise((resume) => { shown.requestVideoFrameCallback(resume); shown.play(); });
+  const first = seen();
+  await ended;
+  return [first, seen()];
+}"""
+"""Returns the first and the last frame of a video as pictures."""
 
-def seen(page: Any) -> Any:
+
+def seen(page: Any, place: Any = ".stage-canvas") -> Any:
     """The first world as pixels."""
-    return np.asarray(Image.open(BytesIO(page.locator(".stage-canvas").first.screenshot())).convert("RGB"), dtype=int)
+    return pixels(page.locator(place).first.screenshot())
+
+
+def pixels(png: bytes) -> Any:
+    return np.asarray(Image.open(BytesIO(png)).convert("RGB"), dtype=int)
 
 
 def share(picture: Any, colour: tuple[int, int, int]) -> float:
@@ -81,6 +103,28 @@ def test_a_replay_is_played_seen_from_elsewhere_and_changed(visit: Any, api: Any
     assert page.url.endswith("repetition=0&iteration=1&kind=sample&simulator=0")
 
 
+def test_a_replay_is_saved_as_a_video_of_both_worlds(visit: Any, api: Any, known: Any) -> None:
+    page = replay(visit, api, known)
+    width = page.locator(".stage-canvas").first.evaluate("({ width }) => width")
+    page.get_by_label("Speed", exact=True).select_option("2")
+
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Record a video").click()
+    name, content = download.value.suggested_filename, download.value.path().read_bytes()
+
+    assert name in {f"gaplab-{known.strider}-0-0.{ending}" for ending in ("webm", "mp4")}
+    assert page.get_by_role("button", name="Record a video").is_enabled()
+    video = f"data:video/{name.rpartition('.')[2]};base64,{b64encode(content).decode()}"
+    blank = page.context.new_page()
+    first, last = blank.evaluate(FRAMES, video)
+    blank.close()
+    frames = [np.asarray(Image.open(urlopen(each)).convert("RGB"), dtype=int) for each in (first, last)]
+    assert abs(frames[0].shape[1] - 2 * width) <= 4
+    for half in (slice(None, width), slice(width, None)):
+        assert all(share(frame[:, half], (123, 135, 148)) > 0.02 for frame in frames)  # torso and legs
+        assert (np.abs(frames[0] - frames[1])[:, half].max(axis=-1) > 40).mean() > 0.005
+
+
 @pytest.mark.release
 def test_without_webgl_the_ground_rises_in_the_picture_too(visit: Any, api: Any, known: Any) -> None:
     page = visit(f"{api.url}/#/toy")
@@ -117,6 +161,8 @@ def test_the_form_shows_the_chosen_robot_and_tunes_what_is_usual_for_it_until_th
     page.wait_for_selector(f"{ticked}:has-text('Restitution')")
     page.wait_for_selector(".robot-picture[alt='The robot Strider'][src]")
     assert picture.evaluate("(image) => image.decode().then(() => image.naturalWidth)") == 640
+    assert share(seen(page, ".robot-picture"), (123, 135, 148)) > 0.03  # torso and legs
+    assert share(seen(page, ".robot-picture"), (0, 114, 178)) > 0.003  # the head
     light = picture.get_attribute("src")
     page.emulate_media(color_scheme="dark")
     page.wait_for_function("(before) => document.querySelector('.robot-picture').src !== before", arg=light)

@@ -1,4 +1,4 @@
-"""What leaves the page besides figures: settings that differ, coordinates, reports and videos, in a real Chromium."""
+"""What leaves the page besides figures: settings that differ, coordinates and reports, in a real Chromium."""
 
 import re
 from typing import Any
@@ -7,9 +7,11 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.e2e.browser import fits, screenshot
-from tests.waiting import wait_until
 
 STUDY = "Fig. 4, lean: MuJoCo in MuJoCo"
+
+PRINTED_PX = 680
+"""Width of A4 between its margins."""
 
 
 @pytest.fixture
@@ -110,17 +112,13 @@ def test_a_report_is_saved_with_the_verdict_that_the_service_gives(api: Any, kno
 
 
 @pytest.mark.release
-def test_a_replay_is_saved_as_a_video_of_the_controller_that_is_shown(archive: Any, walker: Any, visit: Any) -> None:
-    query = "repetition=0&iteration=1&kind=sample"
-    computed = lambda: archive.http.get(f"/experiments/{walker}/replay?{query}").status_code  # noqa: E731
-    # the first rollouts of a process take long
-    wait_until(lambda: computed() == 200, within_s=1_500, otherwise=computed)
+@pytest.mark.parametrize("of", ["experiments", "studies"])
+def test_a_report_is_printed_whole_on_a4(archive: Any, study: Any, walker: Any, visit: Any, of: str) -> None:
+    page = visit(f"{archive.url}/{of}/{study['id'] if of == 'studies' else walker}/report", width=PRINTED_PX)
+    page.emulate_media(media="print")
 
-    page = visit(f"{archive.url}/#/replay?experiment={walker}&{query}")
+    fits(page)
 
-    name, content = saved(page, "GIF")
-
-    assert (name, content[:6]) == (f"gaplab-{walker}-0-1.gif", b"GIF89a")
-    for format_ in ("WEBP", "MP4"):
-        link = page.get_by_role("link", name=format_, exact=True)
-        expect(link).to_have_attribute("href", re.compile(rf"iteration=1&kind=sample.*format={format_.lower()}"))
+    printed = page.pdf(prefer_css_page_size=True)
+    assert printed.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) > 3

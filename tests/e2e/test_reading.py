@@ -32,9 +32,7 @@ from tests.parameters import few
 LEAVES = {
     "tutorial": ["curves.svg", "curves.pdf", "curves.html", "study.zip"],
     "day": [
-        "walk.gif",
         "report.html",
-        "report.pdf",
         "curves.pdf",
         "simulators.pdf",
         "study.zip",

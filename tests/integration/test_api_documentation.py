@@ -60,7 +60,6 @@ ENDPOINTS = {
     "GET /experiments/{id}/misfit",
     "GET /experiments/{id}/predictions",
     "GET /experiments/{id}/replay",
-    "GET /experiments/{id}/video",
     "GET /experiments/{id}/repetitions/{number}/attempts",
     "POST /studies/{id}/pause",
     "POST /studies/{id}/resume",
@@ -92,7 +91,7 @@ ENDPOINTS = {
     "GET /studies/{id}/export",
     "POST /import",
     "GET /catalogue",
-    "GET /catalogue/robots/{name}/picture",
+    "GET /catalogue/robots/{name}/shapes",
     "GET /livez",
     "GET /readyz",
     "GET /metrics",
@@ -152,14 +151,13 @@ OPERATIONS = {
     "draw_squared_error",
     "draw_gait",
     "draw_readings",
-    "draw_video",
     "read_spec_differences",
     "report_study",
     "draw_toy",
     "submit_sensitivity",
     "read_sensitivity",
     "read_catalogue",
-    "draw_robot",
+    "read_robot_shapes",
     "live",
     "ready",
     "add_robot",
@@ -381,7 +379,7 @@ def test_real_answers_fit_their_documented_schema(document: dict[str, Any], sqli
     experiment = made["experiments"][0]
     ids = {"studies": made["id"], "experiments": experiment["id"], "sensitivity": experiment["sensitivity"]}
     ids["requests"] = _waiting(sqlite_store)
-    without_json = ("/export", "/replay", "/video", "/takehome", "/attachments/{id}")
+    without_json = ("/export", "/replay", "/takehome", "/attachments/{id}")
     for name, operation in operations(document):
         if name.startswith("GET") and "{id}" in name and not name.endswith(without_json):
             path = name.split()[1].format(id=ids[name.split("/")[1]], number=0)

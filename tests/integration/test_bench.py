@@ -31,8 +31,7 @@ from gaplab.services.experiments.deletion import Deleter, delete
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.reading import list_samples, read, read_experiment
 from gaplab.services.experiments.states import settle
-from gaplab.services.reports.content import verdict_on
-from gaplab.services.reports.outcome import outcome_of
+from gaplab.services.reports.content import facts_of, verdict_on
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
@@ -594,15 +593,17 @@ def test_without_iterations_one_tunes_on_what_was_measured_before(store: Store) 
     assert compute(store) == 1
 
     assert pending(store) == ()
-    read = read_experiment(store, experiment.id)
+    shown = read_experiment(store, experiment.id)
     (log,) = log_of(store, experiment)
     found = misfit(store, experiment.id)
-    assert (read.state, read.level, read.progress.counted_iterations) == (State.COMPLETED, False, 0)
+    assert (shown.state, shown.level, shown.progress.counted_iterations) == (State.COMPLETED, False, 0)
     assert log[0].simulators[0].squared_error < 1e-2
     assert [(point.error.n, point.held_out_error.n) for point in found.points] == [(1, 1)]
     assert found.verdicts
     assert tuned_simulators(store, experiment.id).samples == {0: {0: 3}}
-    assert outcome_of(store, experiment.id).samples == 3
+    outcome = facts_of(store, read(store, experiment.id)).outcome
+    assert outcome is not None
+    assert outcome.samples == 3
 
     with pytest.raises(InvalidSpec, match="0 iterations tune on samples from before alone, and the spec has none"):
         resolve_experiment(bench(iterations=0))

@@ -264,7 +264,7 @@ def test_without_a_library_of_notebooks_the_message_is_the_line_that_installs_it
 ) -> None:
     id = client.submit(SMALL).id
     monkeypatch.setitem(sys.modules, "pandas", None)
-    monkeypatch.setitem(sys.modules, "plotly", None)
+    monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
 
     with pytest.raises(ExtraMissing, match=r"needs pandas, which is not installed: pip install 'gaplab\[notebook\]'"):
         client.curve(id)

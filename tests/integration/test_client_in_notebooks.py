@@ -64,11 +64,6 @@ def test_an_option_of_a_figure_changes_neither_its_format_nor_its_experiments(cl
         client.figure(id, format="png", experiment="x")
 
 
-def test_a_picture_of_a_robot_is_a_png(client: Client, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"q\.svg has another suffix; permitted: \.png"):
-        client.robot_picture("quadruped", tmp_path / "q.svg")
-
-
 def test_archives_are_written_to_a_path_and_read_from_one(
     client: Client, finish: Callable[[], None], tmp_path: Path
 ) -> None:

@@ -278,14 +278,12 @@ def test_a_figure_that_cannot_be_drawn_is_a_sentence_and_no_file(gaplab: Gaplab,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_option_that_no_replay_has_is_refused_by_its_name(
-    gaplab: Gaplab, url: str, study: str, tmp_path: Path
-) -> None:
+def test_an_option_that_no_replay_has_is_refused_by_its_name(gaplab: Gaplab, url: str, study: str) -> None:
     with Client(url) as client:
         experiment = client.study(study).experiments[0].id
 
     for name in ("id", "self", "file"):
-        said = gaplab("replay", experiment, "-o", str(tmp_path / "a.gif"), "-s", "iteration=1", "-s", f"{name}=2")
+        said = gaplab("replay", experiment, "-s", "iteration=1", "-s", f"{name}=2")
 
         assert said.code == Exit.INVALID
         assert f"unknown parameter '{name}'" in said.err

@@ -101,7 +101,7 @@ def serving(
         def close(self) -> None:
             """Close nothing."""
 
-    app.state.feed = app.state.rollout_process = app.state.drawing_process = Feed()
+    app.state.feed = app.state.rollout_process = Feed()
     app.state.connections = most
     listener = listen("127.0.0.1", 0)
     served = Server(app, type("Connection", (connection,), times))

@@ -48,7 +48,6 @@ def running(store: Store) -> Iterator[FastAPI]:
     app = create_app(store)
     yield app
     app.state.rollout_process.close()
-    app.state.drawing_process.close()
 
 
 @pytest.fixture(scope="module")
@@ -332,25 +331,25 @@ class Walker(Quadruped):
 """
 
 
-def test_replays_and_predictions_follow_an_edit_of_a_plug_in(
+def test_replays_and_predictions_follow_an_edit_of_a_plug_in_from_the_next_start(
     sqlite_store: Store, put: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    home = put(walker=WALKER)
-    monkeypatch.setenv(VARIABLE, str(home))
+    monkeypatch.setenv(VARIABLE, str(put(walker=WALKER)))
     experiment, log, _ = walked(sqlite_store, robot="walker")
 
-    def computed(api: TestClient) -> tuple[float, float]:
+    def computed(app: FastAPI) -> tuple[float, float]:
+        api = TestClient(app)
         replay = api.get(f"/experiments/{experiment}/replay?iteration=1").json()
         prediction = predicted(api, experiment)["items"][0]
         return replay["simulation"]["fitness"], prediction["simulated_after"]
 
     with running(sqlite_store) as app:
-        api = TestClient(app)
-        before = computed(api)
-        (home / "walker.py").write_text(WALKER.replace("1 *", "2 *"))
+        before = computed(app)
+    put(walker=WALKER.replace("1 *", "2 *"))
+    with running(sqlite_store) as app:
+        after = computed(app)
 
-        assert before == (log[6].fitness,) * 2
-        wait_until(lambda: computed(api) == (2 * log[6].fitness,) * 2)
+    assert (before, after) == ((log[6].fitness,) * 2, (2 * log[6].fitness,) * 2)
 
 
 def test_without_an_iteration_the_last_measured_controller_is_replayed(sqlite_store: Store, api: Any) -> None:

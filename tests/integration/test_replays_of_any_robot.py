@@ -2,20 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
-from PIL import Image
 
-from gaplab import Client
 from gaplab.api.app import create_app
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.records import MeasurementKind
-from gaplab.schemas.replays import Replay
+from gaplab.schemas.replays import Replay, RobotShapes
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.bench import motions
 from gaplab.services.core.arrays import frozen
@@ -30,7 +26,8 @@ from gaplab.services.store.lease import Requested
 from gaplab.services.store.session import Store
 from tests.drawn_robot import FILES, strode
 from tests.experiments import submit_one
-from tests.integration.test_client import InProcess
+
+QUADRUPED = "/catalogue/robots/quadruped/shapes"
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +42,6 @@ def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FastAPI]:
         app = create_app(Store("sqlite://"))
         yield app
         app.state.rollout_process.close()
-        app.state.drawing_process.close()
     loading.load(())
 
 
@@ -86,21 +82,6 @@ def test_heights_and_speeds_are_those_of_the_observed_body_that_slides(sqlite_st
     assert any("Mean height of head" in row[0] for row in figure["table"]["rows"])
 
 
-@pytest.mark.release
-def test_its_video_shows_each_colour(sqlite_store: Store, api: TestClient) -> None:
-    experiment = strode(sqlite_store)
-
-    answer = api.get(f"/experiments/{experiment}/video?width=320&format=gif")
-
-    assert answer.status_code == 200, answer.text
-    with Image.open(BytesIO(answer.content)) as film:
-        frame = np.asarray(film.convert("RGB")).astype(int)
-    orange = (frame[..., 0] > 100) & (frame[..., 0] > 1.5 * frame[..., 1]) & (frame[..., 2] < 40)
-    blue = (frame[..., 2] > 70) & (frame[..., 0] < 20)
-    assert orange.sum() > 20
-    assert blue.sum() > 50
-
-
 def test_a_controller_in_a_loop_has_no_motion_to_take_to_the_bench(sqlite_store: Store, api: TestClient) -> None:
     spec = {"strategy": "simulated_fit", "robot": "strider", "engine": "puppet", "iterations": 1, "repetitions": 1}
     bench = spec | {"budget": "smoke", "reality": {"kind": "physical", "probes": "each"}}
@@ -132,42 +113,26 @@ def test_velocities_are_not_written_as_the_positions_of_a_trajectory() -> None:
     assert motions.forms_of(robot, robot.known) == ("csv", "json")
 
 
-@pytest.mark.release
-def test_each_robot_with_a_body_has_a_picture_in_both_themes(api: TestClient) -> None:
+def test_each_robot_with_a_body_has_shapes_as_it_stands_at_the_start(api: TestClient) -> None:
     bodies = {each["name"]: each["details"]["bodies"] for each in api.get("/catalogue").json()["robots"]}
-    assert bodies["strider"] == 7
-    assert bodies["toy_function"] == 0
+    assert (bodies["strider"], bodies["toy_function"]) == (7, 0)
 
-    answers = {
-        (name, theme): api.get(f"/catalogue/robots/{name}/picture?theme={theme}&width=160")
-        for name in ("strider", "quadruped")
-        for theme in ("light", "dark")
-    }
+    answer = api.get("/catalogue/robots/strider/shapes")
+    strider, quadruped = (RobotShapes.model_validate_json(each.content) for each in (answer, api.get(QUADRUPED)))
 
-    assert len({answer.content for answer in answers.values()}) == 4
-    for answer in answers.values():
-        assert answer.headers["content-type"] == "image/png"
-        with Image.open(BytesIO(answer.content)) as picture:
-            assert picture.size == (160, 120)
-    tag = answers["strider", "dark"].headers["ETag"]
-    address = "/catalogue/robots/strider/picture?theme=dark&width=160"
-    assert api.get(address, headers={"If-None-Match": tag}).status_code == 304
+    assert (len(strider.positions_m[0]), len(strider.orientations[0])) == (21, 28)
+    assert {shape.kind for shape in strider.shapes} == {"plane", "box", "capsule", "cylinder", "hull", "sphere"}
+    assert strider.slope_rad == 0.12
+    assert len(quadruped.contacts) == 4
+    assert quadruped.scale == pytest.approx(0.8, abs=0.1)
+    assert quadruped.middle_m[:2] == pytest.approx((0.0, 0.0), abs=0.01)
+    tag = answer.headers["ETag"]
+    assert api.get("/catalogue/robots/strider/shapes", headers={"If-None-Match": tag}).status_code == 304
 
 
-def test_what_has_no_picture_says_why(api: TestClient) -> None:
-    nobody, toy = api.get("/catalogue/robots/nobody/picture"), api.get("/catalogue/robots/toy_function/picture")
+def test_what_has_no_shapes_says_why(api: TestClient) -> None:
+    nobody, toy = (api.get(f"/catalogue/robots/{name}/shapes") for name in ("nobody", "toy_function"))
 
     assert (nobody.status_code, toy.status_code) == (404, 404)
     assert "there is no robot 'nobody'; permitted: quadruped" in nobody.json()["detail"]
     assert "'toy_function' has no body" in toy.json()["detail"]
-    assert api.get("/catalogue/robots/quadruped/picture?theme=pink").status_code == 422
-
-
-def test_the_client_writes_a_picture_into_a_file(sqlite_store: Store, api: TestClient, tmp_path: Path) -> None:
-    network = InProcess(sqlite_store)
-    with Client("http://test", transport=network, pauses_s=(0.0, 0.0, 0.0)) as client:
-        file = client.robot_picture("strider", tmp_path / "pictures" / "strider.png", width=80)
-    network.close()
-
-    with Image.open(file) as picture:
-        assert (picture.format, picture.width) == ("PNG", 80)

@@ -94,7 +94,7 @@ def test_what_is_no_whole_backup_of_this_version_is_refused_and_nothing_is_touch
     spoil(copied, damage)
     before = (tmp_path / "gaplab.db").read_bytes()
 
-    with pytest.raises(StoreUnavailable, match=r"damaged|no database of gaplab|later version"):
+    with pytest.raises(StoreUnavailable, match=r"damaged|not a database of gaplab|later version"):
         restore(url, copied)
 
     assert (tmp_path / "gaplab.db").read_bytes() == before

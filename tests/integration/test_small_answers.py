@@ -66,7 +66,7 @@ def test_every_command_is_in_a_group_of_the_help() -> None:
 
 
 @pytest.mark.parametrize("terminal", [pytest.param(True, marks=pytest.mark.release), False])
-def test_a_figure_and_a_report_as_pdf_log_no_fonts(
+def test_a_figure_and_a_report_log_no_fonts(
     gaplab: Gaplab, sqlite_store: Store, tmp_path: Path, terminal: bool
 ) -> None:
     study = submission.submit(sqlite_store, StudySpec.model_validate(SMALL))
@@ -77,7 +77,7 @@ def test_a_figure_and_a_report_as_pdf_log_no_fonts(
     try:
         logs.configure(log)
         assert gaplab("figure", "curves", study.id, "--out", str(tmp_path / "a.pdf")).code == 0
-        assert gaplab("report", study.id, "--save", str(tmp_path / "b.pdf")).code == 0
+        assert gaplab("report", study.id, "--save", str(tmp_path / "b.html")).code == 0
     finally:
         root.handlers[:] = before[0]
         root.setLevel(before[1])

@@ -232,7 +232,7 @@ def test_a_stored_robot_stays_usable_where_later_checks_would_refuse_it(
 
     assert [each["name"] for each in http.get("/robots").json()] == ["walker"]
     assert {each["name"]: each["available"] for each in http.get("/catalogue").json()["robots"]}["walker"]
-    assert http.get("/catalogue/robots/walker/picture").headers["content-type"] == "image/png"
+    assert http.get("/catalogue/robots/walker/shapes").json()["shapes"]
     with store.reading() as session:
         assert next(repetition(setting(ResolvedSpec.model_validate(session.get_one(ExperimentRow, made.id).spec), 0)))
     with pytest.raises(InvalidSpec, match="1 to 3 bodies"):

@@ -1,9 +1,7 @@
-"""Reports: verdicts that follow from their rules, and the same content as HTML and as PDF."""
+"""Reports: verdicts that follow from their rules, and one page with all that they rest on."""
 
-import re
 import shutil
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -19,7 +17,6 @@ from gaplab.services.experiments import extension, lifecycle, listing, reading, 
 from gaplab.services.reports.blocks import Code, Paragraph
 from gaplab.services.reports.content import verdict_on
 from gaplab.services.reports.document import report_on
-from gaplab.services.reports.pdf import render_pdf
 from gaplab.services.running import execution
 from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.store.lease import Claim
@@ -214,27 +211,6 @@ def test_a_name_cannot_become_markup(sqlite_store: Store, api: TestClient) -> No
     assert EVIL in Page(text).words
 
 
-@pytest.mark.release
-def test_the_same_report_is_the_same_pdf(published: Store, study: str) -> None:
-    report, at = report_on(published, reading.read(published, study)), datetime(2026, 1, 1, tzinfo=UTC)
-
-    first, second = (render_pdf(report, "made", at) for _ in range(2))
-
-    assert first.startswith(b"%PDF")
-    assert first == second
-    assert len(re.findall(rb"/Type /Page\b", first)) > 3
-
-
-@pytest.mark.release
-def test_the_pdf_is_served(sqlite_store: Store, api: TestClient) -> None:
-    made = submit_one(sqlite_store, toy()).id
-
-    answer = api.get(f"/studies/{made}/report", params={"format": "pdf"})
-
-    assert answer.headers["content-type"] == "application/pdf"
-    assert answer.content.startswith(b"%PDF")
-
-
 def test_hidden_parameters_of_reality_are_in_no_report(sqlite_store: Store, api: TestClient) -> None:
     secret = 0.7319462853
     reality = {"parameters": {"static_friction": secret, "dynamic_friction": 0.3}}
@@ -311,5 +287,5 @@ def test_experiments_without_a_single_spec_have_a_spec_each(sqlite_store: Store)
 
 
 def test_there_is_no_report_of_nothing(api: TestClient) -> None:
-    for format_ in ("html", "pdf", "json"):
+    for format_ in ("html", "json"):
         assert api.get("/studies/nope/report", params={"format": format_}).status_code == 404

@@ -70,7 +70,7 @@ const WORLD = {
   orientations: [[0, 0, 0, 1], [0, 0, -HALF, -HALF], [0, 0, HALF, HALF]],
   contacts: [[[0, 0.5], [1, 2]], []],
   shapes: [
-    { kind: "plane", body: null }, { kind: "box", body: 0, position_m: [1, 0, 0], orientation: [0, 0, 0, 1] },
+    { kind: "plane", body: null }, { kind: "box", body: 0, role: "foot", position_m: [1, 0, 0], orientation: [0, 0, 0, 1] },
     { kind: "sphere", body: null, position_m: [5, 5, 5], orientation: [0, 0, 0, 1] }],
 };
 
@@ -88,7 +88,7 @@ test("shapes move with their bodies, stand without one, and the ground is not a 
 
 test("the path ends at the time, and the feet on the ground are those with contact then", () => {
   assert.deepEqual(pathUntil(WORLD, [0, 1, 2], 1.2), [[0, 0], [2, 0]]);
-  assert.deepEqual([0.2, 0.7, 2].map((time) => feetOnGround(WORLD, time)), [[0], [], [0]]);
+  assert.deepEqual([0.2, 0.7, 2].map((time) => [...feetOnGround(WORLD, time)]), [[0], [], [0]]);
 });
 
 const HULL = { vertices_m: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2]], faces: [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] };
@@ -163,6 +163,22 @@ test("a clock goes to no time before its beginning or after its end, from where 
   time.play();
   assert.equal(time.time, 0);
   time.play(false);
+});
+
+test("a clock that plays once stops at the end, or when it is told, and says so", () => {
+  const { told, time } = timed(2);
+  let stops = 0;
+  time.goTo(1);
+  for (const end of [9000, 500]) {
+    time.playOnce(() => { stops += 1; });
+    assert.equal(time.time, 0);
+    frames.run(0);
+    frames.run(end);
+    if (end === 500) time.play(false);
+    assert.equal(time.time, Math.min(end / 1000, 2));
+  }
+  assert.equal(stops, 2);
+  assert.deepEqual(told.playing, [true, false, true, false]);
 });
 
 test("a clock of a view that was left stops", () => {

@@ -35,7 +35,7 @@ ROOMS = {
     "results": (("core", "store", "figures", "findings", "specs", "experiments"), {"numpy"}),
     "replay": (
         ("core", "store", "specs", "plugins", "experiments", "waiting_line"),
-        {"numpy", "scipy", "PIL", "av"},
+        {"numpy", "scipy"},
     ),
     "notifications": (("core", "store", "experiments", "settings"), {"sqlalchemy", "httpx2"}),
     "archives": (
@@ -47,7 +47,7 @@ ROOMS = {
             *("core", "engines", "store", "figures", "findings", "specs", "experiments", "running", "bench"),
             *("results", "replay"),
         ),
-        {"numpy", "jinja2", "fpdf", "matplotlib", "PIL"},
+        {"numpy", "jinja2"},
     ),
 }
 """Rooms of services, each below those that may import it: what of services each may import, and what of others."""

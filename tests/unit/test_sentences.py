@@ -80,7 +80,7 @@ WET = {**AT, "by": "Bea", "reason": "it was wet"}
         ("submitted", {"repetitions": "many"}, "submitted"),
         ("edited", {"fields": ["add_tags"], "add_tags": ["gait", "wet"]}, "Edited: added the tags gait, wet"),
         ("edited", {"fields": ["name", "tags"], "remove_tags": ["wet"]}, "Edited: name; removed the tag wet"),
-        ("edited", {"fields": ["tags"], "tags": ["a_b"], "of_study": True}, "Its study was edited: set the tag a_b"),
+        ("edited", {"fields": ["tags"], "tags": ["a_b"]}, "Edited: set the tag a_b"),
         ("edited", {"fields": ["name", "remove_tags"]}, "Edited: name, remove tags"),
     ],
 )

@@ -13,7 +13,7 @@ PARTS = {"scipy.stats", "scipy.special", "scipy.spatial", "scipy.signal", "scipy
 
 UNUSED = {
     "gaplab.api.commands.cli": {"numpy", "scipy", "sqlalchemy", "psycopg", "fastapi", "ray"},
-    "gaplab.api.app": {*PARTS, "matplotlib", "plotly", "fpdf", "ray"},
+    "gaplab.api.app": {*PARTS, "matplotlib", "plotly", "ray"},
     "gaplab.workers.task": {"scipy", "sqlalchemy", "psycopg", "pybullet", "mujoco", "sapien"},
     "gaplab.services.engines.mujoco, gaplab.services.engines.pybullet, gaplab.services.engines.physx, "
     "gaplab.services.core.tuners.gauss_newton": {*PARTS, "mujoco", "numba", "pybullet", "sapien"},

@@ -49,10 +49,12 @@ export function figureDownloads(kind, query, name, ...others) {
 }
 
 /**
+ * Save content under a name, as a link to a file does.
+ *
  * @param {Blob} content
  * @param {string} name
  */
-function save(content, name) {
+export function save(content, name) {
   const address = URL.createObjectURL(content);
   const link = h("a", { href: address, download: name, hidden: true });
   document.body.append(link);

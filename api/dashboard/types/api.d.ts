@@ -582,16 +582,16 @@ declare namespace Api {
     reality: Array<Array<number | null>> | null;
   }
   interface ReplayWorld {
-    engine: string;
     shapes: Array<Shape>;
-    fitness: number | null;
-    recorded: number | null;
     positions_m: Array<Array<number>>;
     orientations: Array<Array<number>>;
     slope_rad: number;
+    contacts: Array<Array<[number, number]>>;
+    engine: string;
+    fitness: number | null;
+    recorded: number | null;
     heights_m: Array<number>;
     speeds_m_s: Array<number>;
-    contacts: Array<Array<[number, number]>>;
   }
   interface RequestRead {
     id: string;
@@ -633,6 +633,15 @@ declare namespace Api {
     mass_kg: number;
     lost: Array<string>;
     created_at: string;
+  }
+  interface RobotShapes {
+    shapes: Array<Shape>;
+    positions_m: Array<Array<number>>;
+    orientations: Array<Array<number>>;
+    slope_rad: number;
+    contacts: Array<Array<[number, number]>>;
+    scale: number;
+    middle_m: [number, number, number];
   }
   interface Safety {
     simulators: number;

@@ -169,6 +169,9 @@ declare namespace Page {
     simulator: number | string | null;
   };
 
+  /** What draws a robot: in a replay, or as it stands at the start. */
+  type Shown = Pick<Api.ReplayWorld, "shapes" | "positions_m" | "orientations" | "contacts">;
+
   type Vector = number[];
   type Matrix = Float32Array<ArrayBuffer>;
   type Colour = [number, number, number, number];

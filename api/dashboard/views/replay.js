@@ -3,7 +3,7 @@
 
 import { get, queryString } from "../lib/api.js";
 import { h } from "../lib/dom.js";
-import { downloadLink, figureDownloads } from "../lib/downloads.js";
+import { figureDownloads } from "../lib/downloads.js";
 import { number, readableName } from "../lib/format.js";
 import { empty, failed, loading } from "../lib/placeholders.js";
 import { plot } from "../lib/plot.js";
@@ -11,9 +11,8 @@ import { isPhysical } from "../lib/robots.js";
 import { choices } from "./replay/choices.js";
 import { gait } from "./replay/gait.js";
 import { player } from "./replay/player.js";
+import { recording } from "./replay/recording.js";
 import { worlds } from "./replay/worlds.js";
-
-const VIDEOS = ["gif", "webp", "mp4"];
 
 /**
  * Fill `root` with the replay that the parameters ask for, until `signal`.
@@ -95,11 +94,13 @@ async function fill(place, choice, isOnBench, signal) {
     const stages = worlds(replay, isOnBench, signal);
     const showTime = (/** @type {number} */ time) => {
       stages.draw(time);
+      film.take(time);
       figure.moveCursor(time);
     };
     const timeline = player(replay.times_s[replay.times_s.length - 1], showTime, signal);
+    const film = recording(stages.canvases, `gaplab-${experiment}-${choice.repetition}-${choice.iteration}`, timeline.playOnce, signal);
     const figure = gait(choice, (time) => timeline.goTo(time), signal);
-    place.replaceChildren(stages.element, timeline.element, videos(choice), ...differences(replay), figure.element,
+    place.replaceChildren(stages.element, timeline.element, ...(stages.canvases.length ? [film.element] : []), ...differences(replay), figure.element,
       ...(replay.readings ? [readings(choice, signal)] : []));
     timeline.begin();
   } catch (error) {
@@ -121,18 +122,6 @@ function readings(choice, signal) {
   plot(place, "readings", signal)(choice);
   const downloads = figureDownloads("readings", choice, `gaplab-${choice.experiment}-readings`);
   return h("section", { class: "card" }, h("h2", {}, "Readings of the sensors"), place, downloads);
-}
-
-/**
- * Return links to the replay as a video; the service draws it, so it looks the same wherever it was made.
- *
- * @param {Page.ReplayChoice} choice
- */
-function videos({ experiment, ...query }) {
-  const name = `gaplab-${experiment}-${query.repetition}-${query.iteration}`;
-  const links = VIDEOS.map((format) =>
-    downloadLink(format.toUpperCase(), `/experiments/${experiment}/video`, { ...query, format }, `${name}.${format}`, "Drawing the video"));
-  return h("p", { class: "files" }, "Save the replay as ", ...links.flatMap((link) => [link, " "]));
 }
 
 /**

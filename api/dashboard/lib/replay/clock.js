@@ -22,15 +22,18 @@ export function clock(lengthS, { changed, toggled, signal }) {
   let isPlaying = false;
   /** @type {number | null} */
   let lastFrame = null;
+  /** @type {(() => void) | null} told when it stops, while it plays once */
+  let stopped = null;
 
   /** @param {number} now */
   function tick(now) {
     if (!isPlaying || signal.aborted) return;
     if (lastFrame !== null) time += (speed * (now - lastFrame)) / 1000;
     lastFrame = now;
-    if (time > lengthS) time %= lengthS;
+    if (time > lengthS) time = stopped ? lengthS : time % lengthS;
     changed(time);
-    requestAnimationFrame(tick);
+    if (stopped && time === lengthS) play(false);
+    else requestAnimationFrame(tick);
   }
 
   function play(on = !isPlaying) {
@@ -40,6 +43,10 @@ export function clock(lengthS, { changed, toggled, signal }) {
     if (on && time >= lengthS) time = 0;
     toggled(on);
     if (on) requestAnimationFrame(tick);
+    else {
+      stopped?.();
+      stopped = null;
+    }
   }
 
   return {
@@ -49,6 +56,14 @@ export function clock(lengthS, { changed, toggled, signal }) {
     goTo(newTime) {
       time = Math.min(Math.max(newTime, 0), lengthS);
       changed(time);
+    },
+    /** @param {() => void} whenStopped called at the end, or when it is stopped before */
+    playOnce(whenStopped) {
+      play(false);
+      time = 0;
+      changed(time);
+      stopped = whenStopped;
+      play(true);
     },
     /** @param {number} newSpeed 1 is as fast as the world */
     setSpeed(newSpeed) { speed = newSpeed; },

@@ -4,14 +4,13 @@
 const NAMES = ["trunk", "limb", "foot-up", "foot-down", "floor", "floor-other", "sky", "shadow", "trail"];
 
 /**
- * Return the colours of the custom properties `--stage-…` inside an element; red, green, blue and opacity go from 0 to 1.
+ * Return the colours of the custom properties `--stage-…`; red, green, blue and opacity go from 0 to 1.
  *
- * @param {Element} element
  * @returns {Page.Palette}
  */
-export function colours(element) {
+export function colours() {
   const probe = document.createElement("span");
-  element.append(probe);
+  document.body.append(probe);
   const palette = Object.fromEntries(NAMES.map((name) => {
     probe.style.color = `var(--stage-${name})`;
     return [name, components(getComputedStyle(probe).color)];

@@ -20,7 +20,7 @@ export function frameAt(timesS, time) {
 /**
  * Return the matrix of each body at a time.
  *
- * @param {Api.ReplayWorld} world
+ * @param {Page.Shown} world
  * @param {number[]} timesS
  * @param {number} time
  */
@@ -48,7 +48,7 @@ export const solidsOf = (shapes) => shapes.filter(({ kind }) => kind !== "plane"
 /**
  * Return the matrix of each solid shape; one without a body stands still.
  *
- * @param {Api.ReplayWorld} world
+ * @param {Page.Shown} world
  * @param {Page.Matrix[]} poses of the bodies
  */
 export function shapePoses(world, poses) {
@@ -75,10 +75,12 @@ export function pathUntil(world, timesS, time, body = 0) {
 }
 
 /**
- * Return the numbers of the feet that are on the ground at a time.
+ * Return the bodies of the feet that are on the ground at a time.
  *
- * @param {Api.ReplayWorld} world
+ * @param {Page.Shown} world
  * @param {number} time
  */
-export const feetOnGround = (world, time) =>
-  world.contacts.flatMap((intervals, foot) => (intervals.some(([from, to]) => from <= time && time <= to) ? [foot] : []));
+export function feetOnGround({ shapes, contacts }, time) {
+  const feet = [...new Set(shapes.filter(({ role }) => role === "foot").map(({ body }) => body))];
+  return new Set(feet.filter((_, foot) => contacts[foot]?.some(([from, to]) => from <= time && time <= to)));
+}

@@ -17,6 +17,17 @@ import * as webgl from "./webgl.js";
  */
 
 /**
+ * Return a painter of shapes on a canvas that has none yet, and its context; flat without WebGL.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {Api.Shape[]} shapes
+ */
+export function painterOf(canvas, shapes) {
+  const gl = webgl.context(canvas);
+  return { gl, paint: gl ? webgl.painter(canvas, gl, shapes) : sideView.painter(canvas, shapes) };
+}
+
+/**
  * Return the canvas of a world, and `draw(time)`, which draws the same time as before if none is given.
  *
  * @param {Api.ReplayWorld} world
@@ -26,7 +37,6 @@ import * as webgl from "./webgl.js";
  */
 export function stage(world, timesS, label, { camera, lookAt, observed, signal }) {
   const canvas = h("canvas", { class: "stage-canvas", tabindex: "0", role: "img", "aria-label": label });
-  const feet = [...new Set(world.shapes.filter(({ role }) => role === "foot").map(({ body }) => body))];
   /** @type {WebGL2RenderingContext | null} */
   let gl = null;
   /** @type {Page.Painter | null} */
@@ -35,23 +45,21 @@ export function stage(world, timesS, label, { camera, lookAt, observed, signal }
   let palette = {};
   let lastTime = 0;
 
-  const readColours = () => { palette = colours(/** @type {Element} */ (canvas.parentElement)); };
-
   function begin() {
-    gl = webgl.context(canvas);
-    readColours();
+    const made = painterOf(canvas, world.shapes);
+    gl = made.gl;
+    palette = colours();
     canvas.dataset.drawn = gl ? "webgl" : "flat";
-    return gl ? webgl.painter(canvas, gl, world.shapes) : sideView.painter(canvas, world.shapes);
+    return made.paint;
   }
 
   function draw(time = lastTime) {
     lastTime = time;
     if (!canvas.width || !canvas.isConnected || signal.aborted) return;
     paint ??= begin();
-    const grounded = new Set(feetOnGround(world, time).map((foot) => feet[foot]));
     const { target, further } = lookAt(time);
     const models = shapePoses(world, bodyPoses(world, timesS, time));
-    paint(models, grounded, camera.viewpoint(target, further, world.slope_rad), palette, pathUntil(world, timesS, time, observed));
+    paint(models, feetOnGround(world, time), camera.viewpoint(target, further, world.slope_rad), palette, pathUntil(world, timesS, time, observed));
     canvas.dataset.time = time.toFixed(3);
   }
 
@@ -67,7 +75,7 @@ export function stage(world, timesS, label, { camera, lookAt, observed, signal }
   });
   onTheme(() => {
     if (!paint) return;
-    readColours();
+    palette = colours();
     draw();
   }, signal);
   canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());

@@ -41,6 +41,7 @@ export function player(lengthS, changed, signal) {
       time.play(false);
       time.goTo(newTime);
     },
+    playOnce: time.playOnce,
     begin() {
       time.goTo(0);
       if (!matchMedia("(prefers-reduced-motion: reduce)").matches) time.play(true);

@@ -11,7 +11,7 @@ import { stage } from "../../lib/replay/stage.js";
 const SMOOTHING = 12;  // frames to each side over which the camera's path is averaged
 
 /**
- * Return both stages in one element, and `draw(time)` for both.
+ * Return both stages in one element, `draw(time)` for both, and their canvases.
  *
  * @param {Api.Replay} replay
  * @param {boolean} isPhysical whether reality is a robot on a bench
@@ -40,7 +40,7 @@ export function worlds(replay, isPhysical, signal) {
     worldPanel(replay.simulation, simulated, "This controller evolved in reality itself."),
     worldPanel(replay.reality, "In reality", isPhysical ? "Reality is a robot on a bench, whose motion is measured, not computed."
       : "The archive of this experiment does not contain reality's parameters."));
-  return { element, draw };
+  return { element, draw, canvases: stages.map(({ canvas }) => canvas) };
 }
 
 /**
