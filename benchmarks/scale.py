@@ -65,7 +65,7 @@ def phases(spec: ExperimentSpec) -> Iterator[Calls]:
         return
     yield Calls((iterations + 1) * (spec.budget.controller_evaluations or 0), 1)
     if strategy.searches:
-        simulators = strategy.selection_simulators(len(spec.tunables))
+        simulators = strategy.selection_simulators(len(spec.tunables), learned=False)
         yield Calls(iterations * (spec.budget.selection_evaluations or 0), simulators)
     for samples in range(1, iterations + 1):
         yield Calls(spec.budget.simulator_evaluations or 0, samples)

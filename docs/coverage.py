@@ -17,7 +17,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.discrepancies.readings import Readings
-from gaplab.services.core.misspecification import fit_of, widened
+from gaplab.services.core.linear_models import fit_of, widened
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.space import Space

@@ -8,8 +8,8 @@ from alembic.config import Config
 from alembic.migration import MigrationContext
 from sqlalchemy import Connection, text
 
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.store import database_errors
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.models.base import is_later, other_schema
 from gaplab.services.store.sqlite_file import file_of, refuse_damaged

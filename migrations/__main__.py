@@ -3,8 +3,8 @@
 import sys
 
 from gaplab.migrations import upgrade
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.settings import Settings
+from gaplab.services.store.database_errors import StoreUnavailable
 
 
 def main() -> None:

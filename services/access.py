@@ -15,7 +15,7 @@ from secrets import token_hex
 from sqlalchemy import func, select, update
 
 from gaplab.schemas.access import Role, TokenRead
-from gaplab.services.core.errors import Forbidden, NotFound, Unauthenticated
+from gaplab.services.core.errors import Forbidden, GaplabError, NotFound
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import TokenRow
 from gaplab.services.store.queries.experiments import new_id
@@ -31,6 +31,12 @@ _NO_DIGEST = "0" * 64
 """Digest to compare with if no such token exists, so that the answer takes as long."""
 
 _TOKEN = re.compile(r"gaplab_([a-z0-9]{1,32})_([0-9a-f]{64})")
+
+
+class Unauthenticated(GaplabError):
+    """The request has no token, or an invalid one."""
+
+    kind, title = "unauthenticated", "A valid token is needed"
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from sqlalchemy import select
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.store.models import ExperimentRow
-from gaplab.services.store.queries import totals
+from gaplab.services.store.queries import costs
 from gaplab.services.store.session import Session, Store, snapshot
 
 RECENTLY_S = 600.0
@@ -32,7 +32,7 @@ def warnings(store: Store, silent_s: float) -> tuple[str, ...]:
 @snapshot
 def _of_supervisors(session: Session, silent_s: float) -> tuple[str, ...]:
     """Return sentences about supervisors that are missing, silent, or die again and again."""
-    ages = totals.ages(session)
+    ages = costs.ages(session)
     found = []
     if ages and min(ages) > silent_s:
         found.append(

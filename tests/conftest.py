@@ -209,9 +209,9 @@ def ray(shared_ray: ExitStack) -> None:
     """This process has a Ray with two cores."""
     import ray  # takes a second
 
-    from gaplab.services.core.errors import ClusterUnusable
     from gaplab.services.settings import Settings
     from gaplab.workers.cluster import cluster
+    from gaplab.workers.errors import ClusterUnusable
 
     tries = 0
     while not ray.is_initialized():

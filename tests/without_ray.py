@@ -15,9 +15,8 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.session import Store
 from gaplab.workers.repetitions import Repetitions
-from gaplab.workers.run import Run
 from gaplab.workers.supervisor import Supervisor
-from gaplab.workers.task import delivered
+from gaplab.workers.task import Run, delivered
 
 SPEC = ExperimentSpec.model_validate(
     {

@@ -9,12 +9,13 @@ from math import inf
 from secrets import token_hex
 
 from gaplab.services import logs
-from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.plugins import folders
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.settings import Settings
+from gaplab.services.store.database_errors import StoreChanged, StoreUnavailable
 from gaplab.services.store.session import ANSWER_S, Store
 from gaplab.services.store.sqlite_file import in_use
+from gaplab.workers.errors import ClusterUnusable, RayGone
 
 SHORTEST_ANSWER_S = 5.0
 """Least time for a statement in Postgres, however short a lease is."""
@@ -57,9 +58,8 @@ def _work(store: Store, settings: Settings, pulse: PulsePipe) -> None:
         StoreChanged: the database has another schema, or is another one than at the start.
     """
     from gaplab.workers.cluster import cluster  # Ray takes a second to import
-    from gaplab.workers.patience import Patience
-    from gaplab.workers.stop import Stop
-    from gaplab.workers.supervisor import Supervisor
+    from gaplab.workers.supervisor import Stop, Supervisor
+    from gaplab.workers.task import Patience
 
     _refuse_other_schema(store)
     stop = Stop()

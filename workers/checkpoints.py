@@ -13,9 +13,11 @@ import numpy as np
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.answers import Answer, Answers, pack
 from gaplab.services.core.arrays import Genome
-from gaplab.services.core.errors import RealityAwaited, RealityFailed, TryAgain
+from gaplab.services.core.errors import TryAgain
 from gaplab.services.core.loop import Setting, repetition
+from gaplab.services.core.ports import RealityAwaited
 from gaplab.services.core.types import Outcome, Selected, Step, Tuned
+from gaplab.services.specs.assembly import RealityFailed
 from gaplab.services.store.lease import Checkpoint, Delivered, Pulse, Requested, TimedStep
 from gaplab.workers.permits import PermittedReality
 
@@ -40,6 +42,9 @@ log = logging.getLogger("gaplab.worker")
 
 Emit: TypeAlias = Callable[[Delivered | Pulse], None]
 
+_Item: TypeAlias = Delivered | Pulse | BaseException | None
+"""What the computation hands over: a delivery, a sign of life, the error that ended it, or None at its end."""
+
 
 def recorded(
     setting: Setting,
@@ -49,9 +54,13 @@ def recorded(
 ) -> Iterator[Delivered | Pulse]:
     """Yield the steps that follow the log, checkpoints of long steps as soon as they exist, and signs of life.
 
-    The given checkpoints are those of the next step; further ones are `every_s` seconds apart.
+    The given checkpoints are those of the next step; further ones are `every_s` seconds apart. A thread computes,
+    because checkpoints arise deep inside a step, where nothing can yield, and signs of life while it computes.
+
+    Raises:
+        BaseException: whatever the computation raises, SystemExit too.
     """
-    items: SimpleQueue[Delivered | Pulse | None] = SimpleQueue()
+    items: SimpleQueue[_Item] = SimpleQueue()
     unwanted = Event()
 
     def emit(item: Delivered | Pulse) -> None:
@@ -59,16 +68,22 @@ def recorded(
             raise _Unwanted
         items.put(item)
 
+    def compute() -> None:
+        try:
+            recorder.run(setting)
+            items.put(None)
+        except BaseException as error:  # noqa: BLE001 - SystemExit too, which would end a thread silently
+            items.put(error)
+
     recorder = StepRecorder(emit, every_s, log, checkpoints)
-    thread = _Computation(lambda: recorder.run(setting), lambda: items.put(None))
-    thread.start()
+    Thread(target=compute, name="repetition", daemon=True).start()
     try:
         while (item := _next(items, recorder)) is not None:
+            if isinstance(item, BaseException):
+                raise item
             yield item
     finally:
         unwanted.set()
-    if thread.raised is not None:
-        raise thread.raised
 
 
 class StepRecorder:
@@ -193,31 +208,8 @@ class _Unwanted(Exception):
     """The consumer has closed the iterator, and takes no further items."""
 
 
-class _Computation(Thread):
-    """A thread that computes, because checkpoints are emitted deep inside a step, where nothing can yield.
-
-    Attributes:
-        raised: the error that ended it, even SystemExit, which would end a thread silently.
-    """
-
-    def __init__(self, compute: Callable[[], None], ended: Callable[[], None]) -> None:
-        super().__init__(name="repetition", daemon=True)
-        self.raised: BaseException | None = None
-        self._compute, self._ended = compute, ended
-
-    def run(self) -> None:
-        """Compute, keep the error if there is one, and emit the end."""
-        try:
-            self._compute()
-        except _Unwanted:
-            return
-        except BaseException as error:  # noqa: BLE001 - it is raised again where the items are taken
-            self.raised = error
-        self._ended()
-
-
-def _next(items: "SimpleQueue[Delivered | Pulse | None]", recorder: StepRecorder) -> Delivered | Pulse | None:
-    """Return the next item, or a sign of life if none comes for a while; None at the end."""
+def _next(items: SimpleQueue[_Item], recorder: StepRecorder) -> _Item:
+    """Return the next item, or a sign of life if none comes for a while."""
     try:
         return items.get(timeout=PULSE_S)
     except Empty:

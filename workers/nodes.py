@@ -4,10 +4,12 @@ gaplab and its libraries concern all work: a node that has others ends the super
 only the experiments that name it: a process that has another version refuses them, and does the others.
 """
 
+import os
 import platform
+import sys
 from collections.abc import Mapping
 from hashlib import sha256
-from typing import Any
+from typing import Any, TextIO
 
 import ray
 from ray.exceptions import RayError
@@ -16,13 +18,13 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.provenance import Provenance
 from gaplab.services.core import robot_library
-from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.plugins import folders
 from gaplab.services.plugins.external import unavailable
+from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.running.versions import Versions as Versions
 from gaplab.services.running.versions import named_versions, plugin_versions
 from gaplab.services.running.versions import versions as versions
-from gaplab.workers.output import limit_prints
+from gaplab.workers.errors import ClusterUnusable
 
 ANSWER_S = 60.0
 """Longest wait for a node to start a process and name its versions."""
@@ -115,3 +117,36 @@ def _compare(node: str, found: Versions, expected: Versions) -> None:
 def _last_line(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if lines else type(error).__name__
+
+
+ROTATION = {"RAY_ROTATION_MAX_BYTES": "1000000", "RAY_ROTATION_BACKUP_COUNT": "1"}
+"""Settings of a Ray of our own: for each process and stream it keeps the last million bytes or two."""
+
+LONGEST = 1_000_000
+"""Characters of what is printed at once: Ray never cuts a line."""
+
+
+def limit_files() -> None:
+    """Let a Ray that this process starts later limit its files, unless the environment says otherwise."""
+    for name, value in ROTATION.items():
+        os.environ.setdefault(name, value)
+
+
+def limit_prints() -> None:
+    """Cut the long texts that this process prints from now on."""
+    for stream in (sys.stdout, sys.stderr):
+        if not hasattr(stream, "is_limited"):
+            _limit(stream)
+
+
+def _limit(stream: TextIO) -> None:
+    write = stream.write
+
+    def write_short(text: str) -> int:
+        if len(text) <= LONGEST:
+            return write(text)
+        write(f"{text[:LONGEST]}… ({len(text) - LONGEST:,} more characters)\n")
+        return len(text)
+
+    stream.write = write_short  # type: ignore[method-assign]
+    stream.is_limited = True  # type: ignore[attr-defined]

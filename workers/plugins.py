@@ -7,7 +7,7 @@ from time import monotonic
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.sensitivity import Checked
-from gaplab.services.core.errors import PluginDiffers
+from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.running import execution
 from gaplab.services.running.provenance import tell_refused
 from gaplab.services.running.versions import provenance

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Outcomes, Parameters
 from gaplab.services.core.ports import Sense, Simulate
-from gaplab.workers.helper_actors import CHECK_S, SENSE, SIMULATE, Handle, Helpers
-from gaplab.workers.lending import Part, SharedCall, sizes
+from gaplab.workers.lending import CHECK_S, SENSE, SIMULATE, Handle, Helpers, Part, SharedCall, sizes
 from gaplab.workers.nodes import Versions
 
 Rows: TypeAlias = NDArray[np.intp]

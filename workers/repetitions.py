@@ -8,20 +8,20 @@ from time import monotonic
 
 import ray
 
-from gaplab.services.core.errors import Conflict, StoreUnavailable
+from gaplab.services.core.errors import Conflict
 from gaplab.services.running import execution
 from gaplab.services.running.leases import Silences
 from gaplab.services.specs.blame import describe
 from gaplab.services.specs.rollouts import hardware_of
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store
 from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions, process_for
-from gaplab.workers.patience import Patience
 from gaplab.workers.permits import PERMIT_SHARE, Handle, permits_here
 from gaplab.workers.plugins import Plugins
-from gaplab.workers.run import Run
+from gaplab.workers.task import Patience, Run
 
 WAIT_S = 0.2
 """Longest wait for a delivery."""

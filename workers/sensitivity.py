@@ -9,10 +9,10 @@ from ray import ObjectRef
 from ray.exceptions import RayError, RayTaskError
 
 from gaplab.schemas.sensitivity import Checked, Sensitivity
-from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort
 from gaplab.services.core.sensitivity import check as check_tunables
+from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.running import sensitivity
 from gaplab.services.running.execution import STALE_AFTER_S
 from gaplab.services.running.sensitivity import CheckClaim
@@ -20,10 +20,10 @@ from gaplab.services.specs.assembly import subject
 from gaplab.services.specs.blame import describe
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
+from gaplab.workers.errors import ClusterUnusable
 from gaplab.workers.nodes import Versions, check_here, process_for
-from gaplab.workers.patience import Patience
 from gaplab.workers.plugins import Plugins
-from gaplab.workers.task import give_back_memory, told
+from gaplab.workers.task import Patience, give_back_memory, told
 
 LOOK_S = 1.0
 """Shortest interval between checks of the queue."""

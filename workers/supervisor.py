@@ -12,21 +12,45 @@ from datetime import datetime
 from functools import partial
 from secrets import token_hex
 from threading import Event
-from time import monotonic
+from time import monotonic, sleep
 
 from gaplab.services.bench.taking import open_again
-from gaplab.services.core.errors import RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.running import execution, supervisors
 from gaplab.services.running.leases import Silences
 from gaplab.services.running.pulse import PulsePipe
+from gaplab.services.store.database_errors import StoreChanged, StoreUnavailable
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S
+from gaplab.workers.errors import RayGone
 from gaplab.workers.nodes import Versions
-from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
-from gaplab.workers.run import stuck
 from gaplab.workers.sensitivity import Checks
-from gaplab.workers.stop import Stop
+from gaplab.workers.task import Patience, stuck
+
+LOOK_S = 0.1
+"""Longest time until a request to stop is noticed."""
+
+
+class Stop:
+    """A flag without a lock, unlike an Event: a signal that arrives while an Event is being set waits for itself."""
+
+    def __init__(self) -> None:
+        self._set = False
+
+    def set(self) -> None:
+        """Request a stop; again is harmless."""
+        self._set = True
+
+    def is_set(self) -> bool:
+        """Return whether a stop was requested."""
+        return self._set
+
+    def wait(self, seconds: float) -> None:
+        """Wait, but not longer than until a stop is requested."""
+        until = monotonic() + seconds
+        while not self._set and (left := until - monotonic()) > 0:
+            sleep(min(LOOK_S, left))
+
 
 HEARTBEATS = 6
 """Number of heartbeats within the time after which a lease without one is lost."""

@@ -1,24 +1,27 @@
-"""The Ray task that runs one repetition on one core, and its deliveries."""
+"""A claimed repetition in Ray: the task that runs it on one core, its deliveries, and the limits of time for them."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from ctypes import CDLL
-from dataclasses import replace
-from time import perf_counter
+from dataclasses import dataclass, field, replace
+from time import monotonic, perf_counter
 from typing import TypeAlias
 
 import ray
-from ray.exceptions import RayTaskError
+from ray import ObjectRefGenerator
+from ray.exceptions import RayError, RayTaskError
 
-from gaplab.services.core.errors import RealityFailed
+from gaplab.services.core.answers import BLOCK
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.ports import Reality
 from gaplab.services.core.types import Measured, Probed
-from gaplab.services.specs.assembly import engine_of, setting
+from gaplab.services.plugins.folders import PluginDiffers
+from gaplab.services.specs.assembly import RealityFailed, engine_of, setting
 from gaplab.services.specs.blame import describe, raised
-from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, TimedStep
+from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, Requested, TimedStep
 from gaplab.workers.checkpoints import recorded
+from gaplab.workers.errors import ClusterUnusable
 from gaplab.workers.nodes import Versions, check_here
 from gaplab.workers.permits import Handle, PermittedReality, asking
 from gaplab.workers.pool import Pool
@@ -104,3 +107,145 @@ def batches(deliveries: Iterator[Delivered | Pulse]) -> Iterator[Batch]:
             begun = perf_counter()
     if batch:
         yield tuple(batch)
+
+
+CHECK_ROLLOUTS = 60
+"""A sensitivity check may take as long as this many of the longest rollouts."""
+
+
+@dataclass(frozen=True)
+class Patience:
+    """Longest durations of work.
+
+    Attributes:
+        rollout_s: most seconds of a rollout.
+        step_s: most seconds of a step.
+        start_s: most seconds until one of the workers begins; infinite where others may have the cores.
+    """
+
+    rollout_s: float = 60.0
+    step_s: float = 604_800.0
+    start_s: float = 120.0
+
+    @property
+    def idle_s(self) -> float:
+        """Return the seconds that may pass before the next call of the simulators ends.
+
+        A call has one controller while the duration of a rollout is unknown, in up to `BLOCK` simulators.
+        """
+        return self.rollout_s * BLOCK
+
+    @property
+    def check_s(self) -> float:
+        """Return the seconds for a sensitivity check."""
+        return self.rollout_s * CHECK_ROLLOUTS
+
+
+def stuck(runs: Collection["Run"], longest_s: float) -> str:
+    """Return a sentence if no worker has begun any of these runs, and one has waited for so long; else nothing."""
+    waits_s = [monotonic() - run.heard_at for run in runs if not run.begun]
+    if len(waits_s) < len(runs) or max(waits_s, default=0.0) <= longest_s:
+        return ""
+    return f"no worker has begun for {max(waits_s):.0f} s; the logs of Ray say why"
+
+
+@dataclass(eq=False)
+class Run:
+    """A claimed repetition that was submitted to Ray.
+
+    Attributes:
+        claim: claim of the repetition.
+        stream: batches of steps and checkpoints from the task.
+        permits: actor that gives the permit to move hardware; None if reality is only computed.
+        received: deliveries that are not stored yet.
+        begun: true once the task has a core.
+        asks: true once it has requested a measurement; the task then ends by itself.
+        ended: true once the task has ended.
+        failed: reason of a failure: an error of its code, or a limit of time.
+        pulse: the last sign of life, if no delivery has followed it.
+        heard_at: time of the last delivery or sign of life.
+        measuring: the place in the log of the step whose measurement the database knows of; None once it has ended.
+        refused: reason why its process did not begin it.
+        lost: reason why another worker must continue: the worker is gone, or the log refused a delivery.
+    """
+
+    claim: Claim
+    stream: ObjectRefGenerator
+    permits: Handle | None = None
+    received: list[Delivered] = field(default_factory=list)
+    begun: bool = False
+    asks: bool = False
+    ended: bool = False
+    failed: Failure | None = None
+    refused: PluginDiffers | None = None
+    lost: str | None = None
+    pulse: Pulse | None = None
+    heard_at: float = field(default_factory=monotonic)
+    measuring: int | None = None
+
+    def receive(self) -> None:
+        """Take the next batch if the stream has one, or its end, or its error."""
+        try:
+            self.take(ray.get(next(self.stream)))
+        except StopIteration:
+            self.ended = True
+        except RayTaskError as error:
+            if isinstance(error.cause, ClusterUnusable):
+                raise error.cause from error
+            if isinstance(error.cause, PluginDiffers):
+                self.refused = error.cause
+            else:
+                self.failed = Failure(told(error))
+        except RayError as error:
+            self.lost = f"the worker was lost: {type(error).__name__}"
+
+    def take(self, batch: Batch) -> None:
+        """Take a delivery: steps and checkpoints to store, a sign of life, or the reason of a failure."""
+        self.begun, self.heard_at, self.pulse = True, monotonic(), None
+        for item in batch:
+            if isinstance(item, Pulse):
+                self.pulse = item
+            elif isinstance(item, Failure):
+                self.failed = item
+            else:
+                self.received.append(item)
+                if isinstance(item, TimedStep) and isinstance(item.step, Measured | Probed):
+                    self.measuring = None
+                self.asks = self.asks or isinstance(item, Requested)
+
+    def cancel(self) -> None:
+        """End the task at once; one that ends by itself is left alone, since its process may have begun another."""
+        if not (self.ended or self.asks):
+            ray.cancel(self.stream, force=True)
+
+    def wait_for_end(self, longest_s: float) -> None:
+        """Wait until the task has ended, and take its last deliveries."""
+        until = monotonic() + longest_s
+        while not self.over and (left := until - monotonic()) > 0:
+            if ray.wait([self.stream], timeout=left)[0]:
+                self.receive()
+
+    def overdue(self, patience: Patience) -> str | None:
+        """Return why the task counts as hung; None if it does not. Measurements by hardware have no limit."""
+        since_s, pulse = monotonic() - self.heard_at, self.pulse
+        by_hardware = pulse is not None and pulse.measuring and self.permits is not None
+        if not self.begun or by_hardware:
+            return None
+        idle_s, permitted_s = since_s + (pulse.idle_s if pulse else 0.0), patience.idle_s
+        if idle_s > permitted_s:
+            asked = "reality did not answer" if pulse and pulse.measuring else "no rollout ended"
+            return f"{asked} for {idle_s:.0f} s; GAPLAB_ROLLOUT_LIMIT_S is {patience.rollout_s:g} s for each rollout"
+        step_s = since_s + (pulse.step_s if pulse else 0.0)
+        if step_s > patience.step_s:
+            return f"a step took {step_s:.0f} s; GAPLAB_STEP_LIMIT_S is {patience.step_s:g} s"
+        return None
+
+    @property
+    def over(self) -> bool:
+        """Whether the stream has ended, with or without an error."""
+        return self.ended or any(reason is not None for reason in (self.failed, self.refused, self.lost))
+
+    @property
+    def place(self) -> dict[str, str | int]:
+        """Experiment and number, for the log."""
+        return {"experiment": self.claim.experiment_id, "repetition": self.claim.number}

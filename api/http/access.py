@@ -16,8 +16,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from gaplab.api.http import problems
 from gaplab.schemas.access import Role
 from gaplab.services.access import ANYONE, Caller, authenticate, demand, is_loopback
-from gaplab.services.core.errors import Forbidden, GaplabError, StoreUnavailable
+from gaplab.services.core.errors import Forbidden, GaplabError
 from gaplab.services.settings import Settings
+from gaplab.services.store.database_errors import StoreUnavailable
 
 OPEN = {"/livez", "/readyz"}
 """Health checks, which reveal nothing else."""

@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel
 
 from gaplab.api.http.problems import Responses
-from gaplab.services.core.errors import ConditionMissing
+from gaplab.services.core.errors import GaplabError
 
 IfMatch = Annotated[
     str | None,
@@ -25,6 +25,12 @@ TAGGED: Responses = {200: {"headers": {"ETag": {"description": "of the answer", 
 CACHED: Responses = TAGGED | {304: {"description": "The answer is still the one that `If-None-Match` names"}}
 
 _TAG = re.compile(r'(?:W/)?"(\d{1,9})\.[0-9a-f]+"')
+
+
+class ConditionMissing(GaplabError):
+    """A change lacks the condition `If-Match`."""
+
+    kind, title = "condition-missing", "The edit needs the header If-Match"
 
 
 def tagged(request: Request, answer: BaseModel, edits: int = 0) -> Response:

@@ -10,8 +10,8 @@ from anyio.to_thread import run_sync
 
 from gaplab.schemas.events import EventPage, EventRead
 from gaplab.services import events
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.events import WantedEvents
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.session import Store
 
 POLL_S = 0.25

@@ -11,8 +11,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.schemas.lifecycle import State
-from gaplab.services.core.errors import StoreUnavailable
-from gaplab.services.store.queries.totals import Totals, totals
+from gaplab.services.store.database_errors import StoreUnavailable
+from gaplab.services.store.queries.costs import Totals, totals
 from gaplab.services.store.session import Store
 
 CACHED_S = 5.0

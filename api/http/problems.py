@@ -17,27 +17,9 @@ from starlette.exceptions import HTTPException
 from gaplab.api.http.security_headers import page
 from gaplab.api.http.violations import MOST_ERRORS, explain, finite, without_consequences
 from gaplab.schemas.mistakes import Problem, SpecError
-from gaplab.services.core.errors import (
-    Changed,
-    ConditionMissing,
-    Conflict,
-    CostUnconfirmed,
-    EngineInterrupted,
-    EngineUnavailable,
-    Forbidden,
-    GaplabError,
-    InvalidArchive,
-    InvalidRobotFile,
-    InvalidSpec,
-    KeyReused,
-    LimitReached,
-    NotFound,
-    StoreUnavailable,
-    SupervisorUnavailable,
-    Unauthenticated,
-    Violation,
-)
+from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation
 from gaplab.services.core.nesting import MOST_LEVELS
+from gaplab.services.experiments.limits import CostUnconfirmed
 from gaplab.services.specs.blame import is_external, raised
 from gaplab.services.store.texts import brief
 
@@ -46,25 +28,27 @@ Responses = dict[int | str, dict[str, Any]]
 
 MEDIA_TYPE = "application/problem+json"
 
-KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
-    InvalidSpec: (422, "invalid-spec", "The spec is invalid"),
-    CostUnconfirmed: (422, "cost-unconfirmed", "This needs a confirmation"),
-    InvalidRobotFile: (422, "invalid-robot-file", "The robot file is invalid"),
-    NotFound: (404, "not-found", "Not found"),
-    Conflict: (409, "conflict", "The present state forbids this"),
-    Changed: (412, "changed", "It was changed in the meantime"),
-    ConditionMissing: (428, "condition-missing", "The edit needs the header If-Match"),
-    KeyReused: (422, "key-reused", "The idempotency key belongs to another request"),
-    LimitReached: (429, "limit-reached", "A limit is reached"),
-    Unauthenticated: (401, "unauthenticated", "A valid token is needed"),
-    Forbidden: (403, "forbidden", "The token does not permit this"),
-    InvalidArchive: (422, "invalid-archive", "The archive is invalid"),
-    StoreUnavailable: (503, "store-unavailable", "The database is unavailable"),
-    SupervisorUnavailable: (503, "supervisor-unavailable", "Experiments do not run"),
-    EngineUnavailable: (422, "engine-unavailable", "An engine is not installed here"),
-    EngineInterrupted: (503, "engine-interrupted", "The simulation was interrupted"),
+STATUSES: dict[str, int] = {
+    "invalid-spec": 422,
+    "cost-unconfirmed": 422,
+    "invalid-robot-file": 422,
+    "not-found": 404,
+    "conflict": 409,
+    "changed": 412,
+    "condition-missing": 428,
+    "key-reused": 422,
+    "limit-reached": 429,
+    "unauthenticated": 401,
+    "forbidden": 403,
+    "invalid-archive": 422,
+    "store-unavailable": 503,
+    "supervisor-unavailable": 503,
+    "engine-unavailable": 422,
+    "engine-interrupted": 503,
 }
+"""The status of each kind of error."""
 
+INVALID_SPEC = (422, InvalidSpec.kind, InvalidSpec.title)
 INVALID_REQUEST = (422, "invalid-request", "The request is invalid")
 
 FRAMEWORK: dict[int, tuple[int, str, str]] = {
@@ -115,12 +99,13 @@ def documented(*statuses: int) -> Responses:
 
 def of_gaplab(request: Request, error: Exception) -> Response:
     """Return the response to a request that gaplab refused."""
-    kind = next((KINDS[each] for each in type(error).__mro__ if each in KINDS), None)
-    if kind is None:
+    assert isinstance(error, GaplabError)
+    if not error.kind:
         return _of_bug(request, error)
+    kind = STATUSES[error.kind], error.kind, error.title
     if not isinstance(error, InvalidSpec):
         refused = problem(*kind, str(finite(str(error) or type(error).__name__)))
-        return _shown(request, refused, _headers(request, error))
+        return _shown(request, refused, _headers(request, error, refused.status))
     errors = [_spec_error(violation) for violation in error.violations]
     in_body = any(each.pointer.startswith("/") or not each.pointer for each in errors)
     is_named = in_body or isinstance(error, CostUnconfirmed)
@@ -135,18 +120,13 @@ def _shown(request: Request, refused: Problem, headers: dict[str, str]) -> Respo
     return response(refused, headers)
 
 
-def _headers(request: Request, error: Exception) -> dict[str, str]:
-    match error:
-        case StoreUnavailable() | EngineInterrupted():
-            return {"Retry-After": "5"}
-        case LimitReached(retry_after_s=int(seconds)):
-            return {"Retry-After": str(seconds)}
-        case Unauthenticated():
-            reason = ', error="invalid_token"' if "authorization" in request.headers else ""
-            return {"WWW-Authenticate": f'Bearer realm="gaplab"{reason}'}
-        case Forbidden():
-            return {"WWW-Authenticate": 'Bearer realm="gaplab", error="insufficient_scope"'}
-    return {}
+def _headers(request: Request, error: GaplabError, status: int) -> dict[str, str]:
+    if status == HTTPStatus.UNAUTHORIZED:
+        reason = ', error="invalid_token"' if "authorization" in request.headers else ""
+        return {"WWW-Authenticate": f'Bearer realm="gaplab"{reason}'}
+    if status == HTTPStatus.FORBIDDEN:
+        return {"WWW-Authenticate": 'Bearer realm="gaplab", error="insufficient_scope"'}
+    return {"Retry-After": str(error.retry_after_s)} if error.retry_after_s is not None else {}
 
 
 def _spec_error(violation: Violation) -> SpecError:
@@ -167,7 +147,7 @@ def _of_validation(request: Request, error: Exception) -> Response:
         where, what = found[0]["loc"][-1], found[0]["ctx"]["error"]
         return response(problem(*FRAMEWORK[400], f"The body is not JSON: {what} at character {where}."))
     errors = [explain(each, error.body, request) for each in found[:MOST_ERRORS]]
-    kind = KINDS[InvalidSpec] if all(each["loc"][0] == "body" for each in found) else INVALID_REQUEST
+    kind = INVALID_SPEC if all(each["loc"][0] == "body" for each in found) else INVALID_REQUEST
     if any(each["loc"] == ("body",) and isinstance(each["input"], bytes) for each in found):
         kind = FRAMEWORK[415]  # FastAPI did not parse it
     return response(problem(*kind, _sentence(errors, len(found)), errors))

@@ -8,8 +8,7 @@ from pathlib import Path
 from gaplab.api.clients.client import Client
 from gaplab.api.process.child_process import end, start
 from gaplab.api.process.errors import CommandError
-from gaplab.services.access import authenticate
-from gaplab.services.core.errors import Unauthenticated
+from gaplab.services.access import Unauthenticated, authenticate
 from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.store.atomic_files import private
 from gaplab.services.store.session import Store

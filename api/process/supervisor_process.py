@@ -10,10 +10,10 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from gaplab.api.process.child_process import end, kill, start
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.running import supervisors
 from gaplab.services.running.pulse import VARIABLE, Heard
 from gaplab.services.settings import Settings
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.engine import PATIENCE_S
 from gaplab.services.store.session import Store
 

@@ -12,7 +12,8 @@ from gaplab.api.http.dependencies import WRITERS
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.base import Frozen
 from gaplab.services import health
-from gaplab.services.core.errors import StoreUnavailable, SupervisorUnavailable
+from gaplab.services.core.errors import GaplabError
+from gaplab.services.store.database_errors import StoreUnavailable
 
 router = APIRouter(tags=["health"])
 
@@ -21,6 +22,12 @@ SILENT_S = 30.0
 
 ANSWER_S = 3.0
 """Longest wait for the database; docker-compose.yml waits for longer."""
+
+
+class SupervisorUnavailable(GaplabError):
+    """Experiments do not run; the message says why."""
+
+    kind, title = "supervisor-unavailable", "Experiments do not run"
 
 
 class Alive(Frozen):

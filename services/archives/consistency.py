@@ -24,7 +24,7 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.store.queries import attachments, attempts, logs, provenance
+from gaplab.services.store.queries import attachments, attempts, logs
 from gaplab.services.store.queries.experiments import members, repetitions_of
 from gaplab.services.store.session import Session
 from gaplab.services.store.texts import pack_tags, unpack_tags
@@ -138,7 +138,7 @@ def _check_tags(row: Row) -> None:
 
 
 def _check_provenance(row: Row) -> None:
-    if provenance.id_of(Provenance.model_validate(row["facts"])) != row["id"]:
+    if attempts.provenance_id(Provenance.model_validate(row["facts"])) != row["id"]:
         raise InvalidArchive(f"the facts of provenance {row['id']!r} belong to another id")
 
 

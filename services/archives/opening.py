@@ -20,8 +20,9 @@ from zlib import error as ZlibError  # noqa: N812 - it is an error
 
 from gaplab.migrations import upgrade
 from gaplab.services.archives.columns import LEFT_OUT
-from gaplab.services.core.errors import InvalidArchive, StoreUnavailable
+from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.settings import variable_of
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.models.base import REVISION
 from gaplab.services.store.queries import attachments
 from gaplab.services.store.session import new_database

@@ -45,7 +45,7 @@ from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import new_id
-from gaplab.services.store.queries.request_states import PENDING
+from gaplab.services.store.queries.requests import PENDING
 from gaplab.services.store.session import Session, Store
 from gaplab.services.store.sqlite_file import url_of
 from gaplab.services.store.tables import Kind

@@ -18,7 +18,7 @@ from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import new_id
-from gaplab.services.store.queries.request_states import become
+from gaplab.services.store.queries.requests import become
 from gaplab.services.store.session import Session, Store
 from gaplab.services.store.statements import storable
 

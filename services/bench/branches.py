@@ -10,7 +10,7 @@ from gaplab.services.findings.event_sentences import step_sentence
 from gaplab.services.running.leases import Change
 from gaplab.services.running.repetition_leases import RepetitionLeases
 from gaplab.services.store.models import BranchRow, RepetitionRow, RequestRow, StepKind, StepRow
-from gaplab.services.store.queries import checkpoints, request_states, steps
+from gaplab.services.store.queries import checkpoints, requests, steps
 from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.session import Session, snapshot
 
@@ -73,5 +73,5 @@ def _withdraw(session: Session, repetition: int, place: int, branch: int | None)
     """Withdraw what the closed steps still wait for, and say of the answered requests that they are of the branch."""
     row = RequestRow
     later = (row.repetition_id == repetition) & (row.place >= place) & row.branch.is_(None)
-    request_states.withdraw(session, later)
+    requests.withdraw(session, later)
     session.execute(update(row).where(later).values(branch=branch))

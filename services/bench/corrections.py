@@ -2,12 +2,7 @@
 
 from collections.abc import Callable
 
-from gaplab.schemas.corrections import (
-    ConflictSpec,
-    Consequences,
-    CorrectionSpec,
-    VoidSpec,
-)
+from gaplab.schemas.corrections import ConflictSpec, Consequences, CorrectionSpec, VoidSpec
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import AnswerState, MeasurementSpec
 from gaplab.services.bench import branches
@@ -20,14 +15,9 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import Admission
 from gaplab.services.running.waiting import record_answer
-from gaplab.services.store.models import (
-    AnswerRow,
-    ExperimentRow,
-    RepetitionRow,
-    RequestRow,
-)
+from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests
-from gaplab.services.store.queries.request_states import judge
+from gaplab.services.store.queries.requests import judge
 from gaplab.services.store.session import Session, Store
 
 

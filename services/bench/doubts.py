@@ -16,9 +16,8 @@ from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import AnswerState, DoubtsRead, MeasurementSpec, RequestState
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import LOG, AnswerRow, RepetitionRow, RequestRow, StepRow
-from gaplab.services.store.queries.benches import spellings
-from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.queries.requests import get, note_take
+from gaplab.services.store.queries.experiments import of_experiments
+from gaplab.services.store.queries.requests import get, note_take, spellings
 from gaplab.services.store.session import Session, snapshot
 from gaplab.services.store.statements import storable
 

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.controllers.actuation import middles
+from gaplab.services.core.controllers.parts import middles
 from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.motions import Loop, Motion, open_loop

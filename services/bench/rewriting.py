@@ -6,8 +6,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.measurements import RequestState
 from gaplab.services.bench import branches
 from gaplab.services.bench.consequences import recorded, samples_among
-from gaplab.services.core.history import History
-from gaplab.services.core.probes import recorded_fitness
+from gaplab.services.core.history import History, recorded_fitness
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.types import Probed
 from gaplab.services.experiments.archiving import show_again
@@ -19,7 +18,7 @@ from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import requests, steps
 from gaplab.services.store.queries.experiments import repetitions_of
 from gaplab.services.store.queries.logs import logs
-from gaplab.services.store.queries.request_states import become
+from gaplab.services.store.queries.requests import become
 from gaplab.services.store.session import Session
 
 

@@ -9,14 +9,7 @@ from sqlalchemy.exc import IntegrityError
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.measurements import (
-    AnswerState,
-    HolderSpec,
-    ReleaseSpec,
-    RequestRead,
-    RequestState,
-    TakeSpec,
-)
+from gaplab.schemas.measurements import AnswerState, HolderSpec, ReleaseSpec, RequestRead, RequestState, TakeSpec
 from gaplab.schemas.records import Page
 from gaplab.services.bench.doubts import doubt_others
 from gaplab.services.bench.views import view_requests
@@ -28,9 +21,8 @@ from gaplab.services.store.clock import moment
 from gaplab.services.store.cursor import decode, encode
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests
-from gaplab.services.store.queries.benches import key_of, spellings
 from gaplab.services.store.queries.experiments import get_experiment
-from gaplab.services.store.queries.request_states import become
+from gaplab.services.store.queries.requests import become, bench_key, spellings
 from gaplab.services.store.session import Session, Store, snapshot, transaction
 from gaplab.services.store.statements import storable
 
@@ -132,7 +124,7 @@ def _take(session: Session, id_: str, spec: TakeSpec) -> RequestRead:
     if state in _AT_REST:
         raise Conflict(f"experiment {repetition.experiment_id!r} is {state}: nothing is measured until it is resumed")
     _refuse_unless_open(row)
-    bench = key_of(row.bench)
+    bench = bench_key(row.bench)
     holder = session.scalars(select(RequestRow).where(RequestRow.held == bench)).first()
     if holder is not None:
         msg = f"{holder.taken_by} has taken request {holder.id} of the bench {row.bench!r}; one is taken at a time"

@@ -4,12 +4,7 @@ from collections.abc import Sequence
 
 from sqlalchemy import select
 
-from gaplab.schemas.measurements import (
-    AnswerRead,
-    RequestRead,
-    RequestState,
-    Safety,
-)
+from gaplab.schemas.measurements import AnswerRead, RequestRead, RequestState, Safety
 from gaplab.services.bench.motions import between_repeats
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.repeats import mean
@@ -20,7 +15,7 @@ from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests
-from gaplab.services.store.queries.benches import key_of
+from gaplab.services.store.queries.requests import bench_key
 from gaplab.services.store.session import Session
 
 READINGS = "The experiment tunes on readings: send a trace of the base for each repeat, or let a driver return them."
@@ -39,7 +34,7 @@ def view_requests(session: Session, rows: Sequence[RequestRow]) -> tuple[Request
         )
     }
     answers = requests.answers_of(session, {row.same_as or row.id for row in rows})
-    benches = {row.bench: key_of(row.bench) for row in rows}
+    benches = {row.bench: bench_key(row.bench) for row in rows}
     held = set(session.scalars(select(RequestRow.held).where(RequestRow.held.in_(benches.values()))))
     return tuple(
         _view(row, owners[row.repetition_id], answers.get(row.same_as or row.id, ()), benches[row.bench] in held)

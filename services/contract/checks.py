@@ -4,10 +4,11 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
-from inspect import getdoc
+from inspect import getdoc, isfunction, signature
 from keyword import iskeyword
 from pathlib import Path
 from traceback import walk_tb
+from types import ModuleType
 from typing import Any
 
 from gaplab.services.contract import (
@@ -17,10 +18,10 @@ from gaplab.services.contract import (
     optimizers,
     robots,
     strategies,
-    tasks,
     tunables,
     tuners,
 )
+from gaplab.services.contract.promises import RATING, is_described
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.plugins import loading
 from gaplab.services.plugins.ignored import NO_CLASS, why_no_plugin
@@ -28,17 +29,30 @@ from gaplab.services.specs.registries import REGISTRIES
 
 Check = Callable[[type[Any]], None]
 
-CHECKS: dict[str, tuple[Check, ...]] = {
-    "strategy": strategies.CHECKS,
-    "robot": robots.CHECKS,
-    "controller": controllers.CHECKS,
-    "task": tasks.CHECKS,
-    "engine": engines.CHECKS,
-    "tunable": tunables.CHECKS,
-    "optimizer": optimizers.CHECKS,
-    "discrepancy": discrepancies.CHECKS,
-    "tuner": tuners.CHECKS,
+MODULES = {
+    "strategy": strategies,
+    "robot": robots,
+    "controller": controllers,
+    "engine": engines,
+    "tunable": tunables,
+    "optimizer": optimizers,
+    "discrepancy": discrepancies,
+    "tuner": tuners,
 }
+
+
+def _checks_of(module: ModuleType) -> Iterator[Check]:
+    """Yield the checks of a module: its functions of nothing but a plug-in, which return nothing."""
+    for name, found in vars(module).items():
+        if isfunction(found) and found.__module__ == module.__name__ and not name.startswith("_"):
+            asked = signature(found)
+            if list(asked.parameters) == ["plugin"] and asked.return_annotation is None:
+                yield found
+
+
+CHECKS: dict[str, tuple[Check, ...]] = {
+    kind: (*_checks_of(module), is_described, *(RATING if kind == "robot" else ())) for kind, module in MODULES.items()
+} | {"task": (is_described, *RATING)}
 """The checks of each kind of plug-in."""
 
 

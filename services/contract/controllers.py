@@ -4,14 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gaplab.services.contract.promises import check_known, check_targets, is_described, numbers
+from gaplab.services.contract.promises import check_known, check_targets, numbers
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.controllers.base import Controller
 from gaplab.services.core.motions import Loop
 from gaplab.services.core.observations import GROUPS
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box
-from gaplab.services.core.world import Body, Joint, PDMotor, World
+from gaplab.services.core.world import Body, Box, Joint, PDMotor, World
 
 Plugin = type[Controller]
 
@@ -95,13 +94,3 @@ def acts_on_each_row_alone(plugin: Plugin) -> None:
             assert same, f"of {max(TOGETHER)} loops the first {count} differ from {count} alone"
         backwards = numbers(controller, world, genomes[::-1])
         assert np.array_equal(backwards[:, ::-1], whole), "loops differ with their order"
-
-
-CHECKS = (
-    is_described,
-    has_its_known_genome_in_its_space,
-    drives_every_actuator,
-    declares_whether_it_loops,
-    repeats_itself,
-    acts_on_each_row_alone,
-)

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from gaplab.services.contract.promises import check_repeats, is_described
+from gaplab.services.contract.promises import check_repeats
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Outcomes, frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 
@@ -92,15 +92,3 @@ def repeats_itself(plugin: Plugin) -> None:
         if plugin.squares:
             questions[f"a residual of outcomes {seed}"] = partial(residuals, simulated=simulated, measured=measured)
     check_repeats(plugin, questions, "use no random numbers, and keep nothing from one call for the next")
-
-
-CHECKS = (
-    gives_a_term_for_each_sample_and_simulator,
-    is_zero_where_nothing_differs,
-    judges_each_simulator_by_itself,
-    repeats_itself,
-    says_where_the_physics_failed,
-    copes_with_a_failed_sensor,
-    has_residuals_whose_squares_are_its_terms,
-    is_described,
-)

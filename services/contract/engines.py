@@ -82,6 +82,3 @@ def honours_what_it_says(plugin: Plugin) -> None:
 def _changes(engine: Engine, robot: Robot, **coefficients: float) -> bool:
     world = replace(robot.world, material=replace(robot.world.material, **coefficients))
     return not np.array_equal(flat(engine, robot), flat(engine, robot, world), equal_nan=True)
-
-
-CHECKS = (runs_a_robot, repeats_itself, observes_a_pose_at_each_time, runs_many_as_each, honours_what_it_says)

@@ -137,18 +137,3 @@ def begins_with_given_genomes(plugin: Plugin) -> None:
     assert np.array_equal(hill.asked[0], start), "the search does not begin with the given genomes"
     best = found.genomes[0]
     assert np.array_equal(best, SUMMIT), f"it was told of the summit at {SUMMIT.tolist()} and returns {best.tolist()}"
-
-
-CHECKS = (
-    asks_within_the_box,
-    climbs_the_hill,
-    returns_members_best_first,
-    keeps_the_best,
-    repeats_itself,
-    compares_by_rank,
-    lets_nan_never_win,
-    goes_on_where_everything_fails,
-    leaves_the_given_state,
-    keeps_diverse_members,
-    begins_with_given_genomes,
-)

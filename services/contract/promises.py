@@ -1,7 +1,10 @@
-"""What the contracts of several kinds ask: a description, repeated answers, motions, and ratings of them."""
+"""What the contracts of several kinds ask: a description, repeated answers, motions, and ratings of them.
+
+Each function raises AssertionError with the reason.
+"""
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -10,12 +13,12 @@ from gaplab.services.core.controllers.base import Controller
 from gaplab.services.core.motions import Loop, Motion, Trajectory
 from gaplab.services.core.observations import names
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.space import Space
 from gaplab.services.core.tasks.base import Task
 from gaplab.services.core.world import World
 
 P = TypeVar("P")
+Rates: TypeAlias = Robot | Task
 
 
 def check_repeats(make: Callable[[], P], questions: Mapping[str, Callable[[P], FloatArray]], advice: str) -> None:
@@ -27,9 +30,6 @@ def check_repeats(make: Callable[[], P], questions: Mapping[str, Callable[[P], F
         make: returns a new plug-in.
         questions: functions of a plug-in that return its answer, an array of any shape, by the answer's name.
         advice: what an author can do about a difference.
-
-    Raises:
-        AssertionError: an answer differs.
     """
     answers = {name: ask(make()) for name, ask in questions.items()}
     used = make()
@@ -39,7 +39,9 @@ def check_repeats(make: Callable[[], P], questions: Mapping[str, Callable[[P], F
 
 
 def is_described(plugin: type[Any]) -> None:
-    """Has a docstring of its own, whose first line is a sentence."""
+    """Has a docstring of its own, whose first line is a sentence; a task also has a unit."""
+    unit: str = getattr(plugin, "unit", "")
+    assert unit or not issubclass(plugin, Task), "it has no unit"
     assert (plugin.__doc__ or "").strip(), "it has no docstring of its own; say in a sentence what it does"
     summary = plugin.describe().summary
     assert summary.endswith("."), f"its summary in the catalogue is {summary!r}; end it with a full stop"
@@ -50,11 +52,7 @@ CALLS = 12
 
 
 def check_targets(motion: Motion, actuators: int) -> None:
-    """Check that a motion has finite targets for each actuator, at times that ascend from 0.
-
-    Raises:
-        AssertionError: it has not.
-    """
+    """Check that a motion has finite targets for each actuator, at times that ascend from 0."""
     expected = (len(motion.times_s), actuators)
     assert np.shape(motion.targets) == expected, f"targets have the shape {np.shape(motion.targets)}, not {expected}"
     assert np.isfinite(motion.targets).all(), "targets are not finite"
@@ -63,11 +61,7 @@ def check_targets(motion: Motion, actuators: int) -> None:
 
 
 def check_known(known: Genome, space: Space) -> None:
-    """Check that a known genome is within the bounds of its space.
-
-    Raises:
-        AssertionError: it is not.
-    """
+    """Check that a known genome is within the bounds of its space."""
     known = np.asarray(known)
     assert known.shape == (space.size,), f"its known genome has the shape {known.shape}, its space {space.size} genes"
     inside = bool(np.all((known >= space.lower) & (known <= space.upper)))
@@ -75,11 +69,7 @@ def check_known(known: Genome, space: Space) -> None:
 
 
 def numbers(mover: Controller | Robot, world: World, genomes: Genomes) -> FloatArray:
-    """Return the numbers of each genome, `(k, n, ...)`: targets; of a loop also memories, of a few calls.
-
-    Raises:
-        AssertionError: `act` returns targets or memories of another shape.
-    """
+    """Return the numbers of each genome, `(k, n, ...)`: targets; of a loop also memories, of a few calls."""
     loops = [mover.motion(genome) for genome in genomes]
     if not isinstance(loops[0], Loop):
         return np.array([[each.targets for each in loops if not isinstance(each, Loop)]])
@@ -106,17 +96,14 @@ LATE_S = 1e-9
 """Rounding by which the last reading may be later than the end of a rollout."""
 
 
-def check_times(observe_s: FloatArray, sensors: Sensors) -> None:
-    """Check that a rollout is observed at times that ascend, the last of them above 0, and is sensed within them.
-
-    Raises:
-        AssertionError: it is not, or times are not arrays of float64.
-    """
+def observes_at_times_that_ascend(plugin: type[Rates]) -> None:
+    """Observes at times that ascend, in arrays of float64, the last of them above 0; its sensors are read within."""
+    rates, observe_s = _rating(plugin)
     _check_seconds("observe_s", observe_s)
-    _check_seconds("sensors.times_s", sensors.times_s)
+    _check_seconds("sensors.times_s", rates.sensors.times_s)
     assert len(observe_s), "observe_s is empty"
     assert observe_s[-1] > 0, f"observe_s ends at {observe_s[-1]}; a rollout lasts longer than 0 s"
-    read, end_s = sensors.times_s, observe_s[-1]
+    read, end_s = rates.sensors.times_s, observe_s[-1]
     within = not len(read) or read[-1] <= end_s + LATE_S
     assert within, f"its sensors are read at {read.tolist()}, but a rollout ends at {end_s} s"
 
@@ -132,12 +119,9 @@ def _check_seconds(name: str, times_s: FloatArray) -> None:
     assert np.all(np.diff(times_s) > 0), f"{name} does not ascend: {times_s.tolist()}"
 
 
-def check_rates_many(rates: Task | Robot, observe_s: FloatArray) -> None:
-    """Check that the fitness of many trajectories at once is that of each.
-
-    Raises:
-        AssertionError: it is not.
-    """
+def rates_many_trajectories_as_each(plugin: type[Rates]) -> None:
+    """Returns for many trajectories at once the fitness of each."""
+    rates, observe_s = _rating(plugin)
     many = trajectories(observe_s)
     together = np.asarray(rates.fitness(many))
     one_by_one = [[float(rates.fitness(_one(many, row, column))) for column in range(5)] for row in range(4)]
@@ -145,25 +129,23 @@ def check_rates_many(rates: Task | Robot, observe_s: FloatArray) -> None:
     assert np.allclose(together, one_by_one), "its fitness of many trajectories differs from that of each"
 
 
-def check_failed_physics(rates: Task | Robot, observe_s: FloatArray) -> None:
-    """Check that the fitness of a trajectory of nan is nan.
-
-    Raises:
-        AssertionError: it is not.
-    """
+def has_no_fitness_of_failed_physics(plugin: type[Rates]) -> None:
+    """Returns nan for a trajectory of nan."""
+    rates, observe_s = _rating(plugin)
     count = len(observe_s)
     nothing = Trajectory(frozen(observe_s), frozen(np.full((count, 3), np.nan)), frozen(np.full((count, 4), np.nan)))
     fitness = float(rates.fitness(nothing))
     assert np.isnan(fitness), f"its fitness of a trajectory of nan is {fitness}"
 
 
-def check_sensors(rates: Task | Robot) -> None:
-    """Check that each sensor has a unit and a noise, and is read at each of its times, many trajectories as each.
-
-    Raises:
-        AssertionError: it has not, or is not.
-    """
+def reads_its_sensors(plugin: type[Rates]) -> None:
+    """Reads each sensor at each of its times, and many trajectories as each."""
+    rates, _ = _rating(plugin)
     sensors = rates.sensors
+    if not sensors.size:
+        return
+    can = plugin.sense not in {Task.sense, Robot.sense} or hasattr(rates, "_task")
+    assert can, "it has sensors, but no `sense` that reads them"
     noises = np.asarray(sensors.noises)
     assert len(sensors.units) == len(noises) == len(sensors.names), "its sensors lack units or noises"
     assert np.all(noises > 0), f"noises must be above 0, and are {noises.tolist()}"
@@ -175,6 +157,24 @@ def check_sensors(rates: Task | Robot) -> None:
     expected = (4, 5, len(sensors.times_s), len(sensors.names))
     assert values.shape == expected, f"its readings have the shape {values.shape}, not {expected}"
     assert np.allclose(values[2, 3], rates.sense(_one(many, 2, 3))), "its readings of many differ from those of each"
+
+
+RATING = (
+    observes_at_times_that_ascend,
+    rates_many_trajectories_as_each,
+    has_no_fitness_of_failed_physics,
+    reads_its_sensors,
+)
+"""The checks of robots and tasks, which rate trajectories."""
+
+
+def _rating(plugin: type[Rates]) -> tuple[Rates, FloatArray]:
+    """Return a new robot or task, and the times at which it is observed."""
+    if issubclass(plugin, Robot):
+        robot = plugin.example()
+        return robot, robot.motion(frozen(robot.known)).observe_s
+    task = plugin()
+    return task, task.observe_s
 
 
 def trajectories(times_s: FloatArray) -> Trajectory:

@@ -51,41 +51,10 @@ def repeats_itself(plugin: Plugin) -> None:
     promises.check_repeats(plugin.example, questions, advice)
 
 
-def observes_at_times_that_ascend(plugin: Plugin) -> None:
-    """Observes at times that ascend, in arrays of float64, the last of them above 0; its sensors are read within."""
-    robot = plugin.example()
-    promises.check_times(_observe_s(robot), robot.sensors)
-
-
-def rates_many_trajectories_as_each(plugin: Plugin) -> None:
-    """Returns for many trajectories at once the fitness of each."""
-    robot = plugin.example()
-    promises.check_rates_many(robot, _observe_s(robot))
-
-
-def has_no_fitness_of_failed_physics(plugin: Plugin) -> None:
-    """Returns nan for a trajectory of nan."""
-    robot = plugin.example()
-    promises.check_failed_physics(robot, _observe_s(robot))
-
-
-def reads_its_sensors(plugin: Plugin) -> None:
-    """Reads each sensor at each of its times, and many trajectories as each."""
-    robot = plugin.example()
-    if robot.sensors.size:
-        can = plugin.sense is not Robot.sense or hasattr(robot, "_task")
-        assert can, "it has sensors, but neither a task nor a `sense` that reads them"
-        promises.check_sensors(robot)
-
-
 def _genomes(robot: Robot) -> Genomes:
     """Return the known genome, the corners that are the bounds, and drawn ones, `(23, g)`, read-only."""
     space = robot.space
     return frozen(np.vstack([robot.known, space.lower, space.upper, space.draw(20, np.random.default_rng(0))]))
-
-
-def _observe_s(robot: Robot) -> FloatArray:
-    return robot.motion(frozen(robot.known)).observe_s
 
 
 def _moved(robot: Robot, genome: Genome) -> FloatArray:
@@ -94,15 +63,3 @@ def _moved(robot: Robot, genome: Genome) -> FloatArray:
     times_s = NO_READINGS if isinstance(motion, Loop) else motion.times_s
     found = promises.numbers(robot, robot.world, genome[None])
     return np.concatenate([np.ravel(each) for each in (motion.observe_s, times_s, found)])
-
-
-CHECKS = (
-    names_an_engine_that_runs_it,
-    has_its_known_genome_in_its_space,
-    drives_every_actuator,
-    repeats_itself,
-    observes_at_times_that_ascend,
-    rates_many_trajectories_as_each,
-    has_no_fitness_of_failed_physics,
-    reads_its_sensors,
-)

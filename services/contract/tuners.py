@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from gaplab.services.contract.promises import check_repeats, is_described
+from gaplab.services.contract.promises import check_repeats
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.discrepancies.readings import Readings
@@ -179,17 +179,3 @@ def states_intervals_around_its_best(plugin: Plugin) -> None:
     weights = [each.weight for each in found if each.weight is not None]
     assert len(weights) in {0, len(found)}, "some of its simulators have a weight, and others none"
     assert not weights or np.isclose(sum(weights), 1.0), f"its weights sum to {sum(weights)}; permitted: 1"
-
-
-CHECKS = (
-    finds_the_simulator,
-    returns_as_many_as_wanted,
-    states_the_discrepancy_of_each,
-    returns_its_best_first,
-    keeps_to_its_budget,
-    divides_its_evaluations,
-    repeats_itself,
-    copes_with_failed_physics,
-    states_intervals_around_its_best,
-    is_described,
-)

@@ -1,50 +1,27 @@
-"""All errors of gaplab.
-
-    GaplabError
-    ├── InvalidSpec          a spec or request is invalid; has every violation with its place
-    │   ├── CostUnconfirmed      the cost is above the limit, or a name unlikely, and not confirmed
-    │   └── InvalidRobotFile     a robot file cannot be stored
-    ├── NotFound             no such study, experiment or plug-in
-    ├── Conflict             the current state forbids the request
-    │   └── Changed              someone changed the object since it was read
-    ├── ConditionMissing     a change without the condition `If-Match`
-    ├── KeyReused            an idempotency key was used for another request
-    ├── LimitReached         too much work is in progress
-    ├── Unauthenticated      no token, or an invalid one
-    ├── Forbidden            the role of the token does not permit the request
-    ├── StoreUnavailable     the database is unreachable
-    │   ├── StoreChanged         it was replaced, restored or migrated under the process
-    │   └── StoreDamaged         its file is damaged
-    ├── SupervisorUnavailable   the supervisor hangs, or ends again and again
-    ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
-    ├── InvalidRobot         a URDF or MJCF has what a World has no place for, or what no rigid body has
-    ├── Unsupported          the request needs another kind of database
-    ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
-    │   └── RayGone              Ray died or stands still; only a new process gets another
-    ├── PluginBroken         an external plug-in file is unusable, or a plug-in breaks its contract
-    ├── PluginDiffers        a process has other versions of plug-ins than the supervisor
-    ├── RealityFailed        the code of reality raised an error
-    ├── RealityAwaited       reality is physical, and its answer is not there yet
-    ├── TryAgain             a fault that may pass: the step is repeated after a pause
-    └── EngineError
-        ├── EngineUnavailable    the engine's library is not installed
-        └── EngineInterrupted    the process died, or exceeded its time
+"""Errors that several rooms raise, and the base of all. An error of one room is defined where it is raised.
 
 Diverged physics is not an error: its fitness is nan, which never wins.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import islice
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from gaplab.services.core.arrays import FloatArray
+from typing import Any, ClassVar
 
 
 class GaplabError(Exception):
-    """Base of all errors; the message is one sentence."""
+    """Base of all errors; the message is one sentence.
+
+    Attributes:
+        kind: what the error is, for programs, like `not-found`; empty if no request should meet it.
+        title: the same for people.
+        retry_after_s: seconds after which to try again; None if unknown.
+    """
+
+    kind: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    retry_after_s: int | None = None
 
 
 @dataclass(frozen=True)
@@ -75,77 +52,45 @@ class Violation:
 class InvalidSpec(GaplabError):
     """A spec that cannot run, with its first hundred violations."""
 
+    kind, title = "invalid-spec", "The spec is invalid"
+
     def __init__(self, violations: Iterable[Violation]) -> None:
         self.violations = tuple(islice(violations, 100))
         super().__init__("; ".join(f"{each.pointer or '/'}: {each.message}" for each in self.violations))
 
 
-class InvalidRobotFile(InvalidSpec):
-    """A robot file that cannot be stored, with all its violations."""
-
-
-class CostUnconfirmed(InvalidSpec):
-    """The cost is above the limit, or a name is unlikely, and the request does not confirm it."""
-
-
 class NotFound(GaplabError):
     """No object has this name or id."""
+
+    kind, title = "not-found", "Not found"
 
 
 class Conflict(GaplabError):
     """The current state forbids the request."""
 
-
-class Changed(Conflict):
-    """The object has changed since the client read it."""
-
-
-class ConditionMissing(GaplabError):
-    """A change lacks the condition `If-Match`."""
-
-
-class KeyReused(GaplabError):
-    """The idempotency key was used for another request."""
+    kind, title = "conflict", "The present state forbids this"
 
 
 class LimitReached(GaplabError):
-    """Too much work is in progress; the message names the limit.
+    """Too much work is in progress; the message names the limit."""
 
-    Attributes:
-        retry_after_s: seconds after which to try again; None if unknown.
-    """
+    kind, title = "limit-reached", "A limit is reached"
 
     def __init__(self, message: str, retry_after_s: int | None = None) -> None:
         self.retry_after_s = retry_after_s
         super().__init__(message)
 
 
-class Unauthenticated(GaplabError):
-    """The request has no token, or an invalid one."""
-
-
 class Forbidden(GaplabError):
     """The role of the token does not permit the request."""
 
-
-class StoreUnavailable(GaplabError):
-    """The database is not usable now."""
-
-
-class StoreChanged(StoreUnavailable):
-    """The database is no longer the one that the process knows, or has another schema; only a new process may go on."""
-
-
-class StoreDamaged(StoreUnavailable):
-    """The file of the database is damaged; the message says what to do."""
-
-
-class SupervisorUnavailable(GaplabError):
-    """Experiments do not run; the message says why."""
+    kind, title = "forbidden", "The token does not permit this"
 
 
 class InvalidArchive(GaplabError):
     """The file is not a valid archive; the message says where."""
+
+    kind, title = "invalid-archive", "The archive is invalid"
 
 
 class InvalidRobot(GaplabError):
@@ -160,69 +105,18 @@ class InvalidRobot(GaplabError):
         super().__init__("; ".join(self.reasons))
 
 
-class Unsupported(GaplabError):
-    """This kind of database does not support the request; the message names an alternative."""
-
-
-class ClusterUnusable(GaplabError):
-    """Ray is unreachable, or one of its nodes would compute other numbers or fail."""
-
-
-class RayGone(ClusterUnusable):
-    """The Ray of this process died or does not answer; calls to it may never return."""
-
-
 class PluginBroken(GaplabError):
     """A plug-in file is unusable; the message says which, and why."""
-
-
-class PluginDiffers(GaplabError):
-    """A process has other versions of the external plug-ins that a spec names, or cannot use them.
-
-    Args:
-        differences: a sentence for each plug-in, by its kind and name.
-        expected: the version of each that the supervisor has.
-    """
-
-    def __init__(self, differences: Mapping[str, str], expected: Mapping[str, str]) -> None:
-        self.differences, self.expected = dict(differences), dict(expected)
-        super().__init__(self.differences, self.expected)  # the arguments, so that it can be pickled
-
-    def __str__(self) -> str:
-        """Return the sentences."""
-        return "; ".join(self.differences.values())
-
-
-class RealityAwaited(GaplabError):
-    """Reality is physical: the repetition waits for the measurement of a genome.
-
-    Attributes:
-        genome: `(g,)`.
-    """
-
-    def __init__(self, genome: "FloatArray") -> None:
-        self.genome = genome
-        super().__init__("a measurement of the physical robot is awaited")
-
-
-class RealityFailed(GaplabError):
-    """The code of reality raised the error that is this one's cause; its message may name hidden parameters."""
 
 
 class TryAgain(GaplabError):
     """A plug-in raises it for a fault that may pass by itself, like a lost connection; the step is then repeated."""
 
 
-class EngineError(GaplabError):
-    """An engine failed."""
-
-
-class EngineUnavailable(EngineError):
+class EngineUnavailable(GaplabError):
     """The library of an engine is not installed; the message says how to install it."""
 
-
-class EngineInterrupted(EngineError):
-    """The process that runs the physics ended before it answered."""
+    kind, title = "engine-unavailable", "An engine is not installed here"
 
 
 def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -> Violation:

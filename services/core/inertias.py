@@ -7,8 +7,7 @@ import scipy
 
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.kinematics import body_poses, chain, product, rotated
-from gaplab.services.core.shapes import UNTURNED, Box, Capsule, Cylinder, Hull, Shape
-from gaplab.services.core.world import Body, Inertia, World
+from gaplab.services.core.world import UNTURNED, Body, Box, Capsule, Cylinder, Hull, Inertia, Shape, World
 
 WORLDS_KEPT = 1024
 

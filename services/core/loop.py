@@ -15,22 +15,20 @@ from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import FloatArray, Genome, no_readings
-from gaplab.services.core.controller_search import Allowance, ControllerSearch
 from gaplab.services.core.discrepancies.base import Discrepancy
-from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
+from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.held_out import split, tested
-from gaplab.services.core.history import History
-from gaplab.services.core.misspecification import fitted
+from gaplab.services.core.history import History, probe_of
+from gaplab.services.core.linear_models import fitted
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Forecast, Reality, Sense, Simulate
-from gaplab.services.core.probes import probe_of
+from gaplab.services.core.search import Allowance, ControllerSearch
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.tuners.search import SearchTuner
-from gaplab.services.core.tuning import Misfit, sound
+from gaplab.services.core.tuning import Misfit, sound, split, tested
 from gaplab.services.core.types import (
     Belief,
     Budget,
@@ -135,7 +133,7 @@ def repetition(
 def next_step(setting: Setting, history: History, answers: Answers) -> Step | None:  # noqa: PLR0911 - one a kind of step
     """Return the next step, whose rollouts come from `answers`; None at the end."""
     match history.last:
-        case None if setting.known_samples and setting.strategy.tunes:
+        case None if setting.known_samples and setting.strategy.takes_samples:
             return _tune(setting, history, 0, answers)
         case None:
             return Tuned(0, _drawn(setting, 0))
@@ -162,8 +160,10 @@ def _drawn(setting: Setting, iteration: int) -> tuple[Simulator, ...]:
 
 
 def _keeps(setting: Setting, history: History) -> bool:
-    """Return whether simulators and controller stay as they are after the latest sample."""
-    return len(history.samples) > len(setting.known_samples) and not setting.strategy.learns(history.samples)
+    """Return whether simulators and controller stay as they are, since the latest sample is no lesson."""
+    if len(history.samples) == len(setting.known_samples):
+        return False
+    return all(each is not history.samples[-1] for each in setting.strategy.lessons(history.samples))
 
 
 def _belief(setting: Setting, history: History) -> Belief:
@@ -204,8 +204,6 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     measurement failed; their rollouts count as saved.
     """
     strategy = setting.strategy
-    if not strategy.tunes:
-        return Tuned(iteration, history.simulators)
     seen, unseen = split(history.samples, setting.held_out)
     evaluations = setting.budget.simulator_evaluations // setting.tuner.divisor(len(seen))
     ensemble, answers.budget = strategy.ensemble, evaluations * len(seen) + len(unseen)

@@ -31,7 +31,7 @@ class Plugin:
     """Base of all plug-ins: a class with a name, a docstring and a frozen model of its options.
 
     Attributes:
-        name: name in specs, and of the file.
+        name: name in specs.
         source: origin of its idea or its numbers.
         Options: frozen model whose fields all have defaults.
         published: options of the formula as its source prints it, which the preset `as_published` sets.

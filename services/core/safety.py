@@ -9,7 +9,7 @@ import numpy as np
 
 from gaplab.schemas.safety import LimitsSpec, Safety
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.controllers.actuation import follows_angle
+from gaplab.services.core.controllers.parts import follows_angle
 from gaplab.services.core.kinematics import clearances_m, from_start
 from gaplab.services.core.motions import Loop, Motion, Recording
 from gaplab.services.core.world import World

@@ -1,4 +1,4 @@
-"""The sensitivity check: whether a tunable changes fitness, how much, and how smoothly.
+"""The sensitivity check: whether a tunable changes fitness, how much, how smoothly, and which of them act alike.
 
 The *profile* of a tunable is the fitness of some controllers at evenly spaced values between its bounds, with the other
 tunables in the middle of theirs. The robot's values would be reality, unless a spec states another, and must stay
@@ -12,11 +12,18 @@ which the tunable acts more counts more:
     noise²       mean over c and k of 2/3 · (½ f(k−1) + ½ f(k+1) − f(k))²
     roughness    noise / effect: 0 for a profile that is smooth at this distance of values, 1 for independent values
 
+The *slope* of a tunable for a controller is that of the line through its profile, over the tunable's bounds. Two
+tunables whose slopes are proportional over all controllers can stand in for each other: what one adds to every fitness,
+the other takes away. The cosine between their slopes says how far they are from that: 1 if they are proportional, and
+near 0 for unrelated ones. In least squares, it is the collinearity of two columns of the Jacobian.
+
 Source: the estimate of noise is by Gasser, Sroka and Jennen-Steinmetz 1986. A profile for each controller is an
 individual conditional expectation (Goldstein et al. 2015). The verdicts are gaplab's.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from math import inf, isnan
 
 import numpy as np
@@ -200,3 +207,43 @@ def _relative(effect: float, spread: float) -> float:
     if effect == 0:
         return 0.0
     return effect / spread if spread != 0 else inf
+
+
+ALIKE = 0.97
+"""Least cosine of slopes that counts as alike; 1 in 60 000 pairs of independent slopes of eight controllers has it."""
+
+STRAIGHT = 0.5
+"""Least share of the variance along a profile that its lines explain; else slopes say too little."""
+
+FEWEST = 4
+"""Fewest controllers that are compared."""
+
+
+def alike(findings: Sequence[Sensitivity]) -> tuple[str, ...]:
+    """Return a warning for each pair of smooth tunables that act alike, with what to do about it."""
+    smooth = [(each.name, _slopes(each)) for each in findings if each.verdict is Verdict.SMOOTH]
+    straight = [(name, slopes) for name, slopes in smooth if slopes is not None]
+    return tuple(
+        f"{first} and {second} act alike on the fitness of all controllers of the check (cosine {cosine:.2f}), so that "
+        "fitness hardly tells them apart, however many samples there are. Tune one of the two, or tune on readings"
+        for (first, one), (second, other) in combinations(straight, 2)
+        if (cosine := _cosine(one, other)) >= ALIKE
+    )
+
+
+def _slopes(found: Sensitivity) -> FloatArray | None:
+    """Return the slopes of a profile, `(c,)`, nan where physics failed; None if lines explain too little of it."""
+    fitness = np.array(found.fitness, dtype=float)
+    across = np.linspace(-0.5, 0.5, fitness.shape[1])
+    centred = fitness - fitness.mean(axis=1, keepdims=True)
+    slopes = (centred * across).sum(axis=1) / (across * across).sum()
+    known = np.isfinite(slopes)
+    whole = float((centred[known] ** 2).sum())
+    lines = float((slopes[known] ** 2).sum() * (across * across).sum())
+    return slopes if known.sum() >= FEWEST and lines >= STRAIGHT * whole > 0 else None
+
+
+def _cosine(one: FloatArray, other: FloatArray) -> float:
+    known = np.isfinite(one) & np.isfinite(other)
+    lengths = float(np.linalg.norm(one[known]) * np.linalg.norm(other[known]))
+    return abs(float(one[known] @ other[known])) / lengths if known.sum() >= FEWEST and lengths > 0 else 0.0

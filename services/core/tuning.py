@@ -1,4 +1,7 @@
-"""What simulator tuning minimises: the discrepancy of simulators from the samples."""
+"""What simulator tuning minimises: the discrepancy of simulators from the samples; and the samples that it never sees.
+
+Held-out samples make the error of simulators on them an honest one. Source: gaplab; cross-validation.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,9 +10,9 @@ import numpy as np
 
 from gaplab.services.core import repeats
 from gaplab.services.core.answers import Answers, Following, nothing
-from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genomes, Outcomes, Parameters, frozen
+from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genomes, Outcomes, Parameters, frozen, known
 from gaplab.services.core.discrepancies.base import Discrepancy
-from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
+from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.search import Question
 from gaplab.services.core.sensors import nearest
@@ -170,3 +173,34 @@ class Misfit:
 
 def _first_of(genomes: Genomes) -> Following:
     return lambda count: genomes[:count]
+
+
+_WHOLE = 1e-9
+"""Rounding of a product that may be a whole number."""
+
+
+def is_held_out(number: int, share: float) -> bool:
+    """Return whether sample `number`, from 1, is held out: each fifth with a share of 0.2.
+
+    Samples from before the experiment are the first. It depends on nothing else, so an experiment that is extended
+    holds out the same samples.
+    """
+    return int(number * share + _WHOLE) > int((number - 1) * share + _WHOLE)
+
+
+def seen_of(samples: int, share: float) -> int:
+    """Return how many of the first samples tuning sees."""
+    return sum(not is_held_out(number, share) for number in range(1, samples + 1))
+
+
+def split(samples: Sequence[Sample], share: float) -> tuple[tuple[Sample, ...], tuple[Sample, ...]]:
+    """Return those of a repetition's samples, in the order of measurement, that tuning sees, and the others."""
+    seen = tuple(each for number, each in enumerate(samples, 1) if not is_held_out(number, share))
+    return seen, tuple(each for number, each in enumerate(samples, 1) if is_held_out(number, share))
+
+
+def tested(simulators: Sequence[Simulator], misfit: Misfit) -> tuple[Simulator, ...]:
+    """Return the simulators, best first, of which the best knows its discrepancy from held-out samples."""
+    best, *others = simulators
+    error = float(misfit.of(best.parameters[None, :])[0])
+    return (replace(best, held_out_error=known(error)), *others)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Parameters, Readings, no_readings
 from gaplab.services.core.discrepancies.base import Discrepancy
-from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
+from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.space import Space
 
 

@@ -1,15 +1,88 @@
 """Engine-neutral description of what is simulated: immutable, edited by `dataclasses.replace` and `World.edited`.
 
-SI units throughout; z points up; the ground is the plane z = 0.
+SI units throughout; lengths of boxes are full edges, not halves; z points up; the ground is the plane z = 0.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from pydantic import Field
 
-from gaplab.services.core.shapes import ORIGIN, UNTURNED, Part, Quaternion, Shape, Vector
+Vector: TypeAlias = tuple[float, float, float]
+
+Quaternion: TypeAlias = tuple[float, float, float, float]
+"""A rotation as x, y, z, w, of length 1."""
+
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+UNTURNED: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+MOST_VERTICES = 64
+"""Largest number of vertices of a hull, that all engines accept."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A cuboid with edges `size_m`."""
+
+    size_m: Vector
+    kind: Literal["box"] = field(default="box", kw_only=True, repr=False)
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball."""
+
+    radius_m: float
+    kind: Literal["sphere"] = field(default="sphere", kw_only=True, repr=False)
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A cylinder along z with half a ball at each end; `length_m` is the cylinder's."""
+
+    radius_m: float
+    length_m: float
+    kind: Literal["capsule"] = field(default="capsule", kw_only=True, repr=False)
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder along z."""
+
+    radius_m: float
+    length_m: float
+    kind: Literal["cylinder"] = field(default="cylinder", kw_only=True, repr=False)
+
+
+@dataclass(frozen=True)
+class Hull:
+    """The convex hull of points, of which there are at most `MOST_VERTICES`."""
+
+    points_m: Annotated[tuple[Vector, ...], Field(max_length=MOST_VERTICES, fail_fast=True)]
+    kind: Literal["hull"] = field(default="hull", kw_only=True, repr=False)
+
+
+Shape: TypeAlias = Annotated[Box | Sphere | Capsule | Cylinder | Hull, Field(discriminator="kind")]
+"""A solid shape; its `kind` says in a robot file which it is."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A shape on a body.
+
+    Attributes:
+        center_m: place of the shape's frame, in the frame of the body.
+        turn: rotation of the shape's frame.
+        collides: true if it collides with the ground.
+    """
+
+    shape: Shape
+    center_m: Vector = ORIGIN
+    turn: Quaternion = UNTURNED
+    collides: bool = True
+
 
 MOST_PARTS = 64
 """Largest number of parts of a body."""
@@ -243,3 +316,54 @@ class World:
     @cached_property
     def _as_built(self) -> "World":
         return replace(self.kind, origin=None, edits=frozenset())
+
+
+STIFFNESS, DAMPING, FEED, STRONGEST = 0, 1, 2, 3
+"""Indices into a PDLaw, for compiled code that has its constants in an array."""
+
+
+class PDLaw(NamedTuple):
+    """The torque of a PDMotor: stiffness (u - q) - damping c + feed u, limited to ± strongest; PDLaw() gives none.
+
+    Attributes:
+        stiffness: N·m/rad; N/m for a joint that slides, and likewise below.
+        damping: N·m·s/rad.
+        feed: torque by target.
+        strongest_nm: largest torque.
+    """
+
+    stiffness: float = 0.0
+    damping: float = 0.0
+    feed: float = 0.0
+    strongest_nm: float = 0.0
+
+
+def pd_law(motor: PDMotor, inverse_inertia: float, step_s: float) -> PDLaw:
+    """Return the law of a motor of a joint with this inverse inertia, 1/(kg m²): see `inverse_inertias`."""
+    kp, kd, strongest = motor.kp, motor.kd, motor.max_torque_nm
+    if motor.follows == "torque":
+        return PDLaw(0.0, 0.0, 1.0, strongest)
+    if motor.follows == "velocity":
+        damping = kd / (1.0 + step_s * kd * inverse_inertia)
+        return PDLaw(0.0, damping, damping, strongest)
+    divisor = 1.0 + step_s * (kd + step_s * kp) * inverse_inertia
+    return PDLaw(kp / divisor, (kd + step_s * kp) / divisor, 0.0, strongest)
+
+
+def pd_torque(target: float, angle: float, coasting: float, law: Sequence[float], at: int = 0) -> float:
+    """Return the torque of a motor in a step; nan if any number is nan.
+
+    Args:
+        target: its target.
+        angle: of its joint at the start of the step.
+        coasting: speed of its joint at the end of the step without the motor; the speed at its start, if all else that
+            moves the joint is unknown, makes the motor give way by more than load / kp.
+        law: constants of a PDLaw, `(≥ at + 4,)`.
+        at: index of the first.
+    """
+    asked = law[at + STIFFNESS] * (target - angle) - law[at + DAMPING] * coasting + law[at + FEED] * target
+    if asked > law[at + STRONGEST]:
+        return law[at + STRONGEST]
+    if asked < -law[at + STRONGEST]:
+        return -law[at + STRONGEST]
+    return asked

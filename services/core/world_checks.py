@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from gaplab.services.core.errors import Violation
-from gaplab.services.core.shapes import Box, Hull, Shape
-from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, PDMotor, World
+from gaplab.services.core.world import Body, Box, Hull, Inertia, Joint, Material, Motor, PDMotor, Shape, World
 
 MOST_BODIES = 200
 """Largest number of bodies, and of joints, which are fewer."""

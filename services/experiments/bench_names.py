@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core.errors import CostUnconfirmed, Violation
+from gaplab.services.core.errors import Violation
 from gaplab.services.core.robot_library import label_of
-from gaplab.services.experiments.limits import Admission
-from gaplab.services.store.queries.benches import key_of, spellings
+from gaplab.services.experiments.limits import Admission, CostUnconfirmed
+from gaplab.services.store.queries.requests import bench_key, spellings
 from gaplab.services.store.session import Session
 
 CLOSE = 0.8
@@ -23,9 +23,9 @@ def check_benches(session: Session, specs: Sequence[ResolvedSpec], admitted: Adm
     named = {each.reality.bench: None for each in specs if each.reality.bench not in (None, label_of(each.robot))}
     if not named or admitted.limits is None or admitted.cost_known:
         return
-    known = {key_of(each): each for each in spellings(session)}
+    known = {bench_key(each): each for each in spellings(session)}
     for bench in named:
-        key = key_of(bench)
+        key = bench_key(bench)
         digits = list(filter(str.isdigit, key))
         alike = [each for each in known if list(filter(str.isdigit, each)) == digits]
         if key not in known and (close := get_close_matches(key, alike, n=1, cutoff=CLOSE)):

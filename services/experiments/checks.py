@@ -16,9 +16,9 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
-from gaplab.services.core.alike import alike
 from gaplab.services.core.errors import NotFound
-from gaplab.services.core.sensitivity import VERSION, Effort, warning
+from gaplab.services.core.sensitivity import VERSION, Effort, alike, warning
+from gaplab.services.core.stored_specs import checked, subject
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move
@@ -31,7 +31,6 @@ from gaplab.services.store.models import ExperimentRow, SensitivityRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.session import Store, snapshot
 from gaplab.services.store.statements import insert_new, storable
-from gaplab.services.store.stored_specs import checked, subject
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,19 @@ from sqlalchemy import update
 from gaplab.schemas.editing import MOST_TAGS, Edit
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.records import StudyRead
-from gaplab.services.core.errors import Changed, InvalidSpec, Violation
+from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.experiments.views import view
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import Members, lock, members, whole
 from gaplab.services.store.session import Session, transaction
 from gaplab.services.store.texts import pack_tags, storable, unpack_tags
+
+
+class Changed(Conflict):
+    """The object has changed since the client read it."""
+
+    kind, title = "changed", "It was changed in the meantime"
 
 
 @transaction

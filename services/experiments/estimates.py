@@ -7,15 +7,15 @@ from gaplab.schemas.estimates import EngineCost, EstimateRead, ExperimentCost
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.core.errors import CostUnconfirmed, Violation
+from gaplab.services.core.errors import Violation
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.engines import engines
-from gaplab.services.experiments.limits import Admission, check_extent
+from gaplab.services.experiments.limits import Admission, CostUnconfirmed, check_extent
 from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import is_direct, resolve, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts
-from gaplab.services.store.queries import costs, totals
+from gaplab.services.store.queries import costs
 from gaplab.services.store.session import Session, Store
 
 LATEST = 100
@@ -44,7 +44,7 @@ def estimate(
     check_extent(resolved, limits)
     with store.reading() as session:
         measured = _measured(costs.latest(session, LATEST))
-        working = sum(age < SILENT_S for age in totals.ages(session))
+        working = sum(age < SILENT_S for age in costs.ages(session))
     found = tuple(_experiment(each, _cost(each, measured)) for each in resolved)
     total = sum(each.core_seconds for each in found)
     shared = min(cores, len(resolved) * (spec.max_parallel or cores))

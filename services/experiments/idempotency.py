@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 from sqlalchemy import delete, select, update
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.errors import KeyReused
+from gaplab.services.core.errors import GaplabError
 from gaplab.services.experiments.limits import Admission
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import IdempotencyRow
@@ -21,6 +21,12 @@ KEYS_LIVE = timedelta(days=7)
 """Time for which an idempotency key is kept."""
 
 R = TypeVar("R", bound=Frozen)
+
+
+class KeyReused(GaplabError):
+    """The idempotency key was used for another request."""
+
+    kind, title = "key-reused", "The idempotency key belongs to another request"
 
 
 @dataclass(frozen=True)

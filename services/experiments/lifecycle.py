@@ -20,7 +20,7 @@ from gaplab.services.store.models import ExperimentRow, RepetitionRow, RequestRo
 from gaplab.services.store.queries import attempts, checkpoints
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import Members, lock, members, with_failures
-from gaplab.services.store.queries.request_states import withdraw
+from gaplab.services.store.queries.requests import withdraw
 from gaplab.services.store.session import Session, transaction
 
 _EVENTS = {

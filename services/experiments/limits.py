@@ -20,6 +20,12 @@ RETRY_AFTER_S = 60
 _LOCK = 0x67617071  # among the advisory locks of a Postgres database
 
 
+class CostUnconfirmed(InvalidSpec):
+    """The cost is above the limit, or a name is unlikely, and the request does not confirm it."""
+
+    kind, title = "cost-unconfirmed", "This needs a confirmation"
+
+
 @dataclass(frozen=True)
 class Admission:
     """The sender of a submission, and its limits.

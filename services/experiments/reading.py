@@ -14,6 +14,7 @@ from gaplab.schemas.records import (
     StudyRead,
 )
 from gaplab.schemas.spec import SpecRead
+from gaplab.services.core.stored_specs import without_truth
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view, view_experiments, view_repetition
 from gaplab.services.specs.differences import SpecColumn, differences
@@ -22,7 +23,6 @@ from gaplab.services.store.cursor import next_cursor
 from gaplab.services.store.queries import attempts, results
 from gaplab.services.store.queries.experiments import get_experiment, members, repetitions_of
 from gaplab.services.store.session import Session, Store, snapshot
-from gaplab.services.store.stored_specs import without_truth
 
 
 @snapshot

@@ -12,7 +12,7 @@ from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, LeasedRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.request_states import withdraw
+from gaplab.services.store.queries.requests import withdraw
 
 _CLAIMABLE = (State.QUEUED, State.RUNNING)
 

@@ -9,12 +9,12 @@ from gaplab.schemas.plugin import PluginRead, PluginRef
 from gaplab.schemas.robots import RobotRead
 from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.spec import SharedSettings
-from gaplab.services.core.errors import InvalidRobotFile, InvalidSpec, NotFound, Violation, unknown_name
+from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, unknown_name
 from gaplab.services.core.robot_files import RobotFile, read_robot_file, stored_robot_file
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.core.sample_tables import read_samples
-from gaplab.services.specs.default_engines import default_engine
+from gaplab.services.specs.defaults import default_engine
 from gaplab.services.specs.robots import Driven, ref_of_file, robot_of, robot_of_file
 from gaplab.services.store.models import RobotRow
 from gaplab.services.store.queries import robots as rows
@@ -23,6 +23,12 @@ from gaplab.services.store.texts import storable
 
 R = TypeVar("R")
 S = TypeVar("S", bound=SharedSettings)
+
+
+class InvalidRobotFile(InvalidSpec):
+    """A robot file that cannot be stored, with all its violations."""
+
+    kind, title = "invalid-robot-file", "The robot file is invalid"
 
 
 def add_robot(store: Store, text: str | bytes) -> RobotRead:

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, Progress, RepetitionRead, StudyRead
-from gaplab.services.core.stored_specs import discrepancy_of
+from gaplab.services.core.stored_specs import checked, discrepancy_of, without_truth
 from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.fitness import best_of, fitness_of
@@ -23,7 +23,6 @@ from gaplab.services.store.queries.experiments import Members
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
 from gaplab.services.store.queries.requests import doubtful
 from gaplab.services.store.queries.results import best_recorded
-from gaplab.services.store.stored_specs import checked, without_truth
 from gaplab.services.store.texts import unpack_tags
 
 _MOVING = (State.RUNNING, State.PAUSING, State.STOPPING)

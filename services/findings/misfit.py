@@ -17,8 +17,8 @@ import numpy as np
 from gaplab.schemas.misfit import Distribution, MisfitPoint, TunableDistribution
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.discrepancies.base import Discrepancy
-from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
-from gaplab.services.core.misspecification import CREDIBLE, SURPRISING
+from gaplab.services.core.discrepancies.fitness import SquaredFitness
+from gaplab.services.core.linear_models import CREDIBLE, SURPRISING
 from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.space import Space
 from gaplab.services.core.types import Fit

@@ -6,7 +6,7 @@ import numpy as np
 
 from gaplab.schemas.curves import from_before
 from gaplab.schemas.misfit import Identification, MisfitPoint, TunableDistribution
-from gaplab.services.core.misspecification import SURPRISING
+from gaplab.services.core.linear_models import SURPRISING
 from gaplab.services.core.sensors import Sensors
 from gaplab.services.findings.misfit import OFTEN, Doubt, SensorError, Tuning, sensor_errors, surprise
 from gaplab.services.findings.wording import many, number, share, spread

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from gaplab.schemas.notifications import Channel
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.notifications import outbox
 from gaplab.services.notifications.delivery import deliver
 from gaplab.services.settings import Notify
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.session import Store
 
 EVERY_S = 2.0

@@ -16,7 +16,7 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.plugins.loading import here
-from gaplab.services.specs.default_engines import default_engine
+from gaplab.services.specs.defaults import default_engine
 from gaplab.services.specs.presets import PRESETS
 
 

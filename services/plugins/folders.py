@@ -10,7 +10,7 @@ import platform
 from collections.abc import Mapping
 from pathlib import Path
 
-from gaplab.services.core.errors import PluginDiffers
+from gaplab.services.core.errors import GaplabError
 from gaplab.services.plugins import contents, loading
 from gaplab.services.plugins.contents import Contents, module_of
 from gaplab.services.plugins.threads import leave_threads
@@ -19,6 +19,23 @@ from gaplab.services.specs.registries import REGISTRIES
 VARIABLE = "GAPLAB_PLUGINS"
 
 log = logging.getLogger("gaplab.plugins")
+
+
+class PluginDiffers(GaplabError):
+    """A process has other versions of the external plug-ins that a spec names, or cannot use them.
+
+    Args:
+        differences: a sentence for each plug-in, by its kind and name.
+        expected: the version of each that the supervisor has.
+    """
+
+    def __init__(self, differences: Mapping[str, str], expected: Mapping[str, str]) -> None:
+        self.differences, self.expected = dict(differences), dict(expected)
+        super().__init__(self.differences, self.expected)  # the arguments, so that it can be pickled
+
+    def __str__(self) -> str:
+        """Return the sentences."""
+        return "; ".join(self.differences.values())
 
 
 def named() -> tuple[Path, ...]:

@@ -12,8 +12,9 @@ from multiprocessing.process import BaseProcess
 from threading import Lock, Thread
 from typing import Any, TypeAlias, TypeVar
 
-from gaplab.services.core.errors import EngineError, EngineInterrupted, EngineUnavailable, PluginDiffers
+from gaplab.services.core.errors import EngineUnavailable, GaplabError
 from gaplab.services.plugins import folders
+from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.store.texts import brief
 from gaplab.services.waiting_line import WaitingLine
 
@@ -37,6 +38,13 @@ NONE: Mapping[str, str] = {}
 Key: TypeAlias = tuple[str | int | None, ...]
 
 log = logging.getLogger(__name__)
+
+
+class EngineInterrupted(GaplabError):
+    """The process that runs the physics ended before it answered."""
+
+    kind, title = "engine-interrupted", "The simulation was interrupted"
+    retry_after_s = 5
 
 
 class AnswerCache:
@@ -154,7 +162,7 @@ class RolloutProcess:
         if succeeded:
             return answer  # type: ignore[no-any-return]
         kind, text = answer
-        known: Mapping[str, type[EngineError]] = {
+        known: Mapping[str, type[GaplabError]] = {
             EngineUnavailable.__name__: EngineUnavailable,
             PluginDiffers.__name__: EngineInterrupted,
         }

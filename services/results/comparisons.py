@@ -22,7 +22,7 @@ from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.specs.robots import unit
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments
-from gaplab.services.store.queries.benches import key_of
+from gaplab.services.store.queries.requests import bench_key
 from gaplab.services.store.session import Session, Store
 
 MOST_WITH_INTERVALS = 20
@@ -177,7 +177,7 @@ def _warnings(first: _Setting, second: _Setting) -> Iterator[str]:
 
 
 def _setup(spec: ResolvedSpec) -> tuple[object, ...]:
-    bench = key_of(spec.reality.bench or "")
+    bench = bench_key(spec.reality.bench or "")
     return spec.reality.kind, spec.reality.engine, bench, sorted(spec.reality.parameters)
 
 

@@ -20,8 +20,7 @@ from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot
 from gaplab.services.core.world import Body, Joint, Material, Surfaces, World
 from gaplab.services.robots.bodies import FREE, Bodies, joint_name
 from gaplab.services.robots.motors import with_motors, with_swings
-from gaplab.services.robots.notes import Notes
-from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.options import ImportOptions, Notes
 from gaplab.services.robots.poses import base_pose, start_angles, with_starts
 from gaplab.services.robots.reading import Source, body_name, mujoco_library, read_source
 from gaplab.services.robots.xml import decoded

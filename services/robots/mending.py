@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.robots.notes import Notes
+from gaplab.services.robots.options import Notes
 
 LEAST_KG = 0.001
 """Mass that a moving body without one gets."""

@@ -7,13 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Joint, Motor, PDMotor
-from gaplab.services.robots.bodies import joint_name
-from gaplab.services.robots.efforts import PLACEHOLDER, effort, needed_torque
-from gaplab.services.robots.joint_inertias import joint_inertias
-from gaplab.services.robots.notes import Notes, listed
-from gaplab.services.robots.options import ImportOptions
-from gaplab.services.robots.reading import Source
+from gaplab.services.robots.bodies import FREE, joint_name, joint_number
+from gaplab.services.robots.options import ImportOptions, Notes, listed
+from gaplab.services.robots.reading import Source, mujoco_library
 
 REACH_RAD, REACH_M = 0.35, 0.02
 """Error at which a motor whose gain is computed has its largest torque: a share of a usual step of a leg."""
@@ -234,3 +232,49 @@ def _with_swing(joint: Joint) -> Joint:
     lower, upper = joint.limits
     nearer = min(joint.start - lower, upper - joint.start)
     return replace(joint, swing=min(swing, max(nearer, 0.1 * (upper - lower))))
+
+
+PLACEHOLDER = 50.0
+"""Effort, as a multiple of what bears the robot's weight, that stands in files whose author did not know it."""
+
+
+def effort(model: Any, name: str) -> float | None:  # noqa: ANN401
+    """Return the largest effort of a joint in the file, N·m or N; None if it has none."""
+    at = joint_number(model, name)
+    largest = float(np.abs(model.jnt_actfrcrange[at]).max())
+    return largest if model.jnt_actfrclimited[at] and largest > 0 else None
+
+
+def needed_torque(model: Any, name: str) -> float:  # noqa: ANN401
+    """Return half the torque that bears the robot at the farthest point of the limb, as legs share the weight."""
+    mujoco = mujoco_library()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    at = joint_number(model, name)
+    moved = {int(model.jnt_bodyid[at])}
+    for body in range(model.nbody):
+        if int(model.body_parentid[body]) in moved:
+            moved.add(body)
+    geoms = [geom for geom in range(model.ngeom) if int(model.geom_bodyid[geom]) in moved]
+    reaches = [np.linalg.norm(data.geom_xpos[geom] - data.xanchor[at]) + model.geom_rbound[geom] for geom in geoms]
+    weight = float(model.body_mass.sum()) * 9.81
+    return weight if model.jnt_type[at] == 2 else 0.5 * weight * float(max(reaches, default=0.1))
+
+
+def joint_inertias(source: Source) -> Mapping[str, float]:
+    """Return the inertia of each joint, kg m² or kg; a fixed base does not give way to its motors."""
+    model = source.model
+    dofs = [dof for dof in range(model.nv) if model.jnt_type[model.dof_jntid[dof]] != FREE]
+    is_held = source.fixed and model.jnt_type[0] == FREE
+    inverse = _inverse_on_a_fixed_base(model) if is_held else model.dof_invweight0
+    return {joint_name(model, int(model.dof_jntid[dof])): 1 / float(inverse[dof]) for dof in dofs}
+
+
+def _inverse_on_a_fixed_base(model: Any) -> FloatArray:  # noqa: ANN401
+    """Return `(nv,)`: the inverse inertia of each degree of freedom, 0 for the six of the base."""
+    mujoco = mujoco_library()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    matrix = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, matrix)
+    return np.concatenate([np.zeros(6), np.diag(np.linalg.inv(matrix[6:, 6:]))])

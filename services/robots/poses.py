@@ -9,12 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Quaternion
-from gaplab.services.core.world import Body, Joint
-from gaplab.services.robots.bodies import FREE, Bodies, joint_name, joint_number
-from gaplab.services.robots.geometry import quaternion, rotation_of
-from gaplab.services.robots.notes import Notes, listed
-from gaplab.services.robots.options import ImportOptions
+from gaplab.services.core.world import Body, Box, Capsule, Cylinder, Hull, Joint, Part, Quaternion
+from gaplab.services.robots.bodies import FREE, Bodies, joint_name, joint_number, quaternion, rotation_of
+from gaplab.services.robots.options import ImportOptions, Notes, listed
 from gaplab.services.robots.reading import Source, mujoco_library
 
 ROUNDED = 1e-4

@@ -12,14 +12,11 @@ from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot
 from gaplab.services.core.world import World
 from gaplab.services.engines.mujoco.plain import LOST, mjcf_of
 from gaplab.services.robots.bodies import Bodies
-from gaplab.services.robots.changes import Change, Place, changes
+from gaplab.services.robots.changes import Change, Place, changes, inertials
+from gaplab.services.robots.documents import MjcfDocument, UrdfDocument
 from gaplab.services.robots.importing import import_robot
-from gaplab.services.robots.inertials import inertials
-from gaplab.services.robots.mjcf_writing import MjcfDocument
-from gaplab.services.robots.notes import Notes
-from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.options import ImportOptions, Notes
 from gaplab.services.robots.reading import read_source
-from gaplab.services.robots.urdf_writing import UrdfDocument
 from gaplab.services.robots.xml import decoded
 
 T = TypeVar("T")

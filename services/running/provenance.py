@@ -5,7 +5,6 @@ architecture, the version of the spec, its external plug-ins. A supervisor with 
 A supervisor that cannot use a plug-in skips all experiments that name it; they stay queued, and tell why.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -21,9 +20,9 @@ from gaplab.services.plugins.external import named_in, still_holds, tells_unavai
 from gaplab.services.store.lease import Claim
 from gaplab.services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow
 from gaplab.services.store.queries import robots
+from gaplab.services.store.queries.attempts import insert_provenances, provenance_id
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import get_experiment, lock, members
-from gaplab.services.store.queries.provenance import id_of, insert_unless_there
 from gaplab.services.store.session import snapshot, transaction
 from gaplab.services.store.statements import insert_new, storable
 
@@ -64,8 +63,8 @@ def accept_versions(session: Session, id_: str) -> StudyRead:
         why = f"has ended: it is {ended}" if ended else "has not started, so it has no versions yet"
         raise Conflict(f"{found} {why}; there is nothing to accept")
     for experiment in bound:
-        told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
-        note(session, EventKind.VERSIONS_ACCEPTED, experiment.id, **told)
+        versions = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
+        note(session, EventKind.VERSIONS_ACCEPTED, experiment.id, **versions)
         experiment.computed_with = experiment.refused_by = None
     session.flush()
     return view(session, found)[0]
@@ -74,10 +73,10 @@ def accept_versions(session: Session, id_: str) -> StudyRead:
 def decisive(under: Provenance, spec: Mapping[str, Any]) -> str:
     """Return the part of a provenance that all supervisors of an experiment with this spec must share."""
     chosen = {ref["name"] for ref in (spec["engine"], spec["reality"]["engine"]) if ref}
-    engines = (_engine(under, name) for name in sorted(chosen))
+    engines = (f"{name} ({under.engines.get(name, 'none')})" for name in sorted(chosen))
     plugins = (plugin for plugin in named_in(spec) if not plugin.startswith("engine "))
-    external = (_external(under, plugin) for plugin in plugins if plugin in under.outside)
-    return ", ".join([*engines, *_machine(under), *external])
+    external = (f"{plugin} ({under.outside[plugin]})" for plugin in plugins if plugin in under.outside)
+    return ", ".join([*engines, under.architecture, f"spec {under.spec_version}", *external])
 
 
 def permitted(session: Session, under: Provenance, refused: Mapping[str, str] = NONE) -> ColumnElement[bool]:
@@ -87,12 +86,22 @@ def permitted(session: Session, under: Provenance, refused: Mapping[str, str] = 
     says why processes of the supervisor refuse plug-ins, by kind and name.
     """
     row = ExperimentRow
-    begun = row.claimable.is_(True) & row.computed_with.is_not(None)
-    used = session.scalars(select(row.computed_with).where(begun).distinct())
-    same = row.computed_with.in_([text for text in used if text is not None and _holds(text, under)])
-    told = [text for text in _refusals_of_plugins(session) if still_holds(text, refused)]
-    usable = row.refused_by.is_(None) | row.refused_by.not_in(told)
+    same = row.computed_with.in_(_shared(session, under))
+    holding = [text for text in _refusals_of_plugins(session) if still_holds(text, refused)]
+    usable = row.refused_by.is_(None) | row.refused_by.not_in(holding)
     return (row.spec_version <= under.spec_version) & (row.computed_with.is_(None) | same) & usable
+
+
+def _shared(session: Session, under: Provenance) -> list[str]:
+    """Return those versions, of all that claimable experiments are bound to, that this provenance has too.
+
+    Which are decisive follows from a spec, so one experiment speaks for all that are bound to the same ones.
+    """
+    row = ExperimentRow
+    readable = row.claimable.is_(True) & (row.spec_version <= under.spec_version)
+    bound = select(func.min(row.id)).where(readable, row.computed_with.is_not(None)).group_by(row.computed_with)
+    specs = select(row.computed_with, row.spec).where(row.id.in_(bound))
+    return [versions for versions, spec in session.execute(specs) if versions == decisive(under, spec)]
 
 
 def refuse_unusable(session: Session, repetitions: Sequence[int], refused: Mapping[str, str]) -> list[str]:
@@ -113,9 +122,9 @@ def refuse_unusable(session: Session, repetitions: Sequence[int], refused: Mappi
 
 def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None:
     """Store the provenance of claims, and bind starting experiments to it. The experiments must be locked."""
-    id_, experiment = id_of(under), ExperimentRow
+    id_, experiment = provenance_id(under), ExperimentRow
     specs = {claim.experiment_id: claim.spec.model_dump(mode="json") for claim in claims}
-    insert_unless_there(session, [{"id": id_, "facts": under.model_dump(mode="json")}])
+    insert_provenances(session, [{"id": id_, "facts": under.model_dump(mode="json")}])
     uses = [{"experiment_id": each, "provenance_id": id_} for each in specs]
     session.execute(insert_new(session, ExperimentProvenanceRow).values(uses))
     session.execute(update(experiment).where(experiment.id.in_(specs)).values(refused_by=None))
@@ -196,23 +205,3 @@ def uses(session: Session, experiment_id: str) -> tuple[ProvenanceUse, ...]:
         ProvenanceUse(id=id_, since=since, repetitions=count, provenance=Provenance.model_validate(facts))
         for id_, since, count, facts in rows
     )
-
-
-def _holds(text: str, under: Provenance) -> bool:
-    """Return whether this provenance has each version in a `decisive` text."""
-    true = [*(_engine(under, name) for name in under.engines), *_machine(under)]
-    true += [_external(under, plugin) for plugin in under.outside]
-    part = "|".join(map(re.escape, true))
-    return re.fullmatch(rf"(?:{part})(?:, (?:{part}))*", text) is not None
-
-
-def _engine(under: Provenance, name: str) -> str:
-    return f"{name} ({under.engines.get(name, 'none')})"
-
-
-def _machine(under: Provenance) -> tuple[str, str]:
-    return under.architecture, f"spec {under.spec_version}"
-
-
-def _external(under: Provenance, plugin: str) -> str:
-    return f"{plugin} ({under.outside[plugin]})"

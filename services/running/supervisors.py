@@ -4,9 +4,9 @@ from datetime import datetime, timedelta
 
 from sqlalchemy import delete, update
 
-from gaplab.services.core.errors import StoreChanged
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.store.clock import moment, now
+from gaplab.services.store.database_errors import StoreChanged
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Session, Store, transaction
 

@@ -7,8 +7,7 @@ from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.measurements import AnswerState, RequestState
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.history import History
-from gaplab.services.core.probes import probe_of
+from gaplab.services.core.history import History, probe_of
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.types import Measured, Sample, Step
 from gaplab.services.experiments.states import move, settle

@@ -10,10 +10,10 @@ from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters, frozen
 from gaplab.services.core.discrepancies import discrepancies
-from gaplab.services.core.errors import RealityFailed, gather
+from gaplab.services.core.errors import GaplabError, gather
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.ports import PhysicalReality, Reality, Sense, Simulate
+from gaplab.services.core.ports import Reality, Sense, Simulate, physical_reality
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sensitivity import Subject
 from gaplab.services.core.space import Space
@@ -24,14 +24,17 @@ from gaplab.services.core.tuners import tuners
 from gaplab.services.core.types import Budget, Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-from gaplab.services.specs.forecasts import forecast_of
 from gaplab.services.specs.measured import samples_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.rollouts import hardware_of
-from gaplab.services.specs.simulation import Simulation
+from gaplab.services.specs.simulation import Simulation, forecast_of
 
 WARM_ENGINES = 4
 """Most engines that a process keeps; each keeps worlds, of 34 MB each in Bullet. A repetition has two at most."""
+
+
+class RealityFailed(GaplabError):
+    """The code of reality raised the error that is this one's cause; its message may name hidden parameters."""
 
 
 class HiddenReality:
@@ -126,7 +129,7 @@ def _realities(
 ) -> tuple[Simulate, Reality]:
     """Return the ways to evaluate a controller in simulation and in reality."""
     if spec.reality.kind == "physical":
-        return simulation, PhysicalReality()
+        return simulation, physical_reality
     truth, real = reality_of(spec, robot)
     return EvolutionInReality(real, truth) if in_reality else simulation, MeasuredReality(real, truth)
 

@@ -12,7 +12,6 @@ from gaplab.services.core.controllers import controllers
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
-from gaplab.services.core.held_out import seen_of
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Registry
@@ -23,15 +22,23 @@ from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tasks import tasks
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuners.base import Tuner
+from gaplab.services.core.tuning import seen_of
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.blame import refusing_specs
-from gaplab.services.specs.default_engines import default_engine, runs
+from gaplab.services.specs.defaults import (
+    completed,
+    default_engine,
+    physical_reality,
+    runs,
+    shared_fields,
+    simulated_reality,
+    with_bounds,
+    with_usual_tunables,
+)
 from gaplab.services.specs.measured import bench_violations
 from gaplab.services.specs.presets import PRESETS, Preset, preset_options, with_preset
-from gaplab.services.specs.realities import completed, physical_reality, simulated_reality
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.specs.tunables import shared_fields, with_bounds, with_usual_tunables
 from gaplab.services.specs.violations import (
     budget_violations,
     engine_violations,

@@ -47,8 +47,7 @@ def robot_of(spec: NamesARobot) -> Robot:
         raise InvalidSpec(Violation(place, ref.name, message, "left out") for place, ref in named)
     driving, rating = spec.controller or robot.usual_controller, spec.task or robot.usual_task
     controller, task = gather(lambda: controllers.create(driving, "/controller"), lambda: tasks.create(rating, "/task"))
-    robot.perform(controller, task)
-    return robot
+    return robot.driven_by(controller, task)
 
 
 def robot_of_file(file: RobotFile) -> Robot:

@@ -3,10 +3,10 @@
 from hashlib import sha256
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core.controller_search import Allowance
-from gaplab.services.core.held_out import seen_of
+from gaplab.services.core.search import Allowance
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners import tuners
+from gaplab.services.core.tuning import seen_of
 from gaplab.services.engines import engines
 from gaplab.services.specs.blame import refusing_specs
 
@@ -29,7 +29,7 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
         for number in range(1, iterations + 1)
     )
     transfer = Allowance.of_transfer(strategy, budget.controller_evaluations, tunables)
-    tuned = sum(_of_tuning(spec, number) for number in range(iterations + 1)) if strategy.tunes else 0
+    tuned = sum(_of_tuning(spec, number) for number in range(iterations + 1)) if strategy.takes_samples else 0
     return transfer.rollouts * (iterations + 1) + selections + tuned
 
 

@@ -1,17 +1,20 @@
-"""The simulation of a robot on an engine, in worlds that tunables edit."""
+"""The simulation of a robot on an engine, in worlds that tunables edit; and what it forecasts for a physical robot."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.safety import Safety
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
-from gaplab.services.core.noise import QUIET, disturbed
+from gaplab.services.core.observations import QUIET, disturbed
 from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.safety import MOST_SIMULATORS, Extremes, extremes, recording_times, safety
 from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import Engine
@@ -142,3 +145,37 @@ def _places(all_s: FloatArray, times_s: FloatArray) -> Places:
 
 def _at(seen: Trajectory, places: Places) -> Trajectory:
     return Trajectory(seen.times_s[places], seen.positions_m[..., places, :], seen.orientations[..., places, :])
+
+
+class SafetyForecast:
+    """The safety forecast of an experiment with a physical robot, which has a body."""
+
+    def __init__(self, spec: ResolvedSpec, robot: Robot, simulation: Simulation) -> None:
+        self._limits, self._engine = spec.reality.limits, spec.engine.name
+        self._robot, self._simulation = robot, simulation
+
+    def __call__(self, genome: Genome, parameters: Parameters, progress: Callable[[], None] = lambda: None) -> Safety:
+        """Return what simulators `(m, p)`, the best first, expect of a genome `(g,)`; the first 20 are asked."""
+        rollouts, errors = list[Extremes](), set[str]()
+        for simulator in parameters[:MOST_SIMULATORS]:
+            try:
+                rollouts.append(self._extremes(genome, simulator))
+            except Exception as error:  # noqa: BLE001 - a plug-in may raise anything, and the request goes on
+                rollouts.append(Extremes())
+                errors.add(f"{type(error).__name__}: {error}"[:300])
+            progress()
+        found = safety(rollouts, self._limits, self._engine)
+        return found.model_copy(update={"unknown": (*found.unknown, *sorted(errors))})
+
+    def _extremes(self, genome: Genome, simulator: FloatArray) -> Extremes:
+        motion = self._robot.motion(genome)
+        times_s = recording_times(motion, self._robot.world)
+        world, recording = self._simulation.record(genome, simulator, times_s)
+        return extremes(world, motion, recording, float(self._robot.fitness(recording.trajectory)))
+
+
+def forecast_of(spec: ResolvedSpec, robot: Robot, simulation: Simulation) -> SafetyForecast | None:
+    """Return the forecast of a spec; None if its reality is simulated, or its robot has no body."""
+    if spec.reality.kind != "physical" or not robot.world.bodies:
+        return None
+    return SafetyForecast(spec, robot, simulation)

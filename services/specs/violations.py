@@ -19,8 +19,7 @@ from gaplab.services.core.tunables.labels import label_of, proper, tunable_of
 from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-from gaplab.services.specs.default_engines import runs
-from gaplab.services.specs.tunables import bounds_of, honoured
+from gaplab.services.specs.defaults import bounds_of, honoured, runs
 
 
 def tunable_violations(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> Iterator[Violation]:
@@ -190,9 +189,9 @@ def budget_violations(
     transfer = strategy.transfer_simulators(tunables) if shared else 1
     needed = {"controller_evaluations": (budget.controller_evaluations, least, transfer, "simulators")}
     if strategy.searches and strategy.takes_samples:
-        selection = strategy.selection_simulators(tunables) if shared else 1
+        selection = strategy.selection_simulators(tunables, learned=False) if shared else 1
         needed["selection_evaluations"] = (budget.selection_evaluations, least, selection, "simulators")
-    if strategy.tunes and strategy.takes_samples:
+    if strategy.takes_samples:
         needed["simulator_evaluations"] = (
             budget.simulator_evaluations,
             tuner.least_evaluations(of_simulators, strategy.ensemble),

@@ -5,11 +5,10 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
-from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.store import database_errors
 from gaplab.services.store.atomic_files import PRIVATE, appearing
+from gaplab.services.store.database_errors import StoreDamaged, StoreUnavailable, Unsupported, is_damage
 from gaplab.services.store.engine import open_engine
-from gaplab.services.store.sqlite_file import is_damage
 
 PG_DUMP = 'pg_dump --format=custom --file={file} "postgresql:${{GAPLAB_DATABASE_URL#*:}}"'
 """The URL may name a driver before its first colon, as in postgresql+psycopg://; pg_dump accepts none."""

@@ -7,8 +7,8 @@ from typing import Any
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError
 
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.store import sqlite_file
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.postgres import postgres_engine
 
 WRITES = "gaplab_writes"

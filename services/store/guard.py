@@ -6,7 +6,7 @@ from time import monotonic
 
 from sqlalchemy import Engine
 
-from gaplab.services.core.errors import StoreChanged, StoreDamaged, StoreUnavailable
+from gaplab.services.store.database_errors import StoreChanged, StoreDamaged, StoreUnavailable
 from gaplab.services.store.sqlite_file import HINT, file_of, identity, refuse_damaged
 
 CHECK_AGAIN_S = 10.0

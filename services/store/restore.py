@@ -10,9 +10,9 @@ from pathlib import Path
 
 from sqlalchemy import URL
 
-from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.store.atomic_files import PRIVATE, replacing
 from gaplab.services.store.backup import copy_checked
+from gaplab.services.store.database_errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.store.engine import parse
 from gaplab.services.store.models import REVISION
 from gaplab.services.store.models.base import is_later

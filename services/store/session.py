@@ -15,8 +15,8 @@ from sqlalchemy.orm import Session as Session
 from sqlalchemy.orm import sessionmaker
 from sqlalchemy.schema import CreateIndex, CreateTable, DDLElement
 
-from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
 from gaplab.services.store import database_errors
+from gaplab.services.store.database_errors import StoreDamaged, StoreUnavailable
 from gaplab.services.store.engine import HASTENS, WRITES, open_engine
 from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION, Base

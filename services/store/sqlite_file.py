@@ -8,8 +8,8 @@ from pathlib import Path
 
 from sqlalchemy import URL
 
-from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
 from gaplab.services.store.atomic_files import PRIVATE, hand_over
+from gaplab.services.store.database_errors import StoreDamaged, StoreUnavailable
 
 try:
     import fcntl
@@ -19,7 +19,6 @@ except ImportError:  # not on Windows
 HINT = "end the service and run `gaplab restore BACKUP`"
 """What to do about a database that is gone or damaged."""
 
-_DAMAGED = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
 
 LONGEST_PATH, LONGEST_NAME = 504, 247
 """Bytes of a database's path and name, which are 8 longer for its journal. Source: os_unix.c, and man 5 ext4."""
@@ -68,11 +67,6 @@ def create(file: Path) -> None:
             hand_over(descriptor, file.parent)
         finally:
             os.close(descriptor)
-
-
-def is_damage(error: BaseException | None) -> bool:
-    """Return whether SQLite found a file damaged, or no database at all."""
-    return getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED  # the low byte is the kind of error
 
 
 def is_open_to_others(file: Path) -> bool:

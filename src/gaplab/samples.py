@@ -22,7 +22,7 @@ from gaplab.services.core.traces import Trace, read_trace
 from gaplab.services.plugins import folders
 from gaplab.services.replay.traces import evaluated, expected_in, refuse_other_bodies
 from gaplab.services.specs.assembly import engine_of
-from gaplab.services.specs.default_engines import default_engine
+from gaplab.services.specs.defaults import default_engine
 from gaplab.services.specs.robots import robot_of_file
 from gaplab.services.specs.simulation import Simulation
 

@@ -9,7 +9,7 @@ import pytest
 
 from gaplab.services.contract.checks import CHECKS, check_file, results
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
+from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.toy_function import ToyFunction
@@ -89,9 +89,9 @@ class EverySecond(Strategy):
     def select(self, belief: Any, search: Any, rng: Any) -> Any:
         return search(lambda _, fitnesses: fitnesses[:, 0])
 
-    def learns(self, samples: Any) -> bool:
+    def lessons(self, samples: Any) -> Any:
         self.asked += 1
-        return self.asked % 2 == 0
+        return samples if self.asked % 2 == 0 else ()
 
 
 class Counting(SquaredFitness):
@@ -232,7 +232,7 @@ def test_a_robot_whose_sensors_cannot_be_read_is_told(changes: Any, why: str) ->
 
 def test_a_robot_with_sensors_needs_a_sense_and_no_more() -> None:
     assert not any(why in reasons("robot", sensing()) for why in ("sense", "readings", "noises"))
-    assert "it has sensors, but neither a task nor a `sense` that reads them" in reasons("robot", Senseless)
+    assert "it has sensors, but no `sense` that reads them" in reasons("robot", Senseless)
 
 
 class Rising(Task):

@@ -12,17 +12,29 @@ import pytest
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.motions import Motion, Trajectory, open_loop
-from gaplab.services.core.noise import disturbed
+from gaplab.services.core.observations import disturbed
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Shape, Sphere, Vector
 from gaplab.services.core.tunables import tunables
-from gaplab.services.core.world import Body, Inertia, Material, PDMotor, World
-from gaplab.services.engines import engines, exploding
-from gaplab.services.engines.base import Engine
+from gaplab.services.core.world import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Inertia,
+    Material,
+    Part,
+    PDMotor,
+    Shape,
+    Sphere,
+    Vector,
+    World,
+)
+from gaplab.services.engines import engines, stepped
+from gaplab.services.engines.base import USES, Engine
 from gaplab.services.engines.stepping import WARM_SCENES
-from gaplab.services.engines.uses import USES
 
 
 class Pair(NamedTuple):
@@ -371,9 +383,7 @@ def test_a_rollout_whose_energy_explodes_is_nan_and_harms_no_later_one(
     expected = embodied.roll()
 
     with monkeypatch.context() as without_limbs:  # so nothing pushes the robot
-        without_limbs.setattr(
-            exploding, "_levers_m", lambda world: np.zeros((len(world.bodies), 1 + len(world.joints)))
-        )
+        without_limbs.setattr(stepped, "_levers_m", lambda world: np.zeros((len(world.bodies), 1 + len(world.joints))))
         exploded = embodied.roll()
 
     assert np.all(np.isnan(exploded))

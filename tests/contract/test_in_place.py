@@ -10,8 +10,22 @@ import pytest
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import about
 from gaplab.services.core.motions import Motion
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Sphere, Vector
-from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, PDMotor, World
+from gaplab.services.core.world import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Inertia,
+    Joint,
+    Material,
+    Motor,
+    Part,
+    PDMotor,
+    Sphere,
+    Vector,
+    World,
+)
 from gaplab.services.engines.base import Engine
 from tests.contract.textbook import X, Y, Z, engine
 

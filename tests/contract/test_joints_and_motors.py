@@ -6,8 +6,21 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.kinematics import about, product
-from gaplab.services.core.shapes import UNTURNED, Box, Capsule, Cylinder, Hull, Part, Shape, Sphere
-from gaplab.services.core.world import Body, Inertia, Joint, PDMotor, World
+from gaplab.services.core.world import (
+    UNTURNED,
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Inertia,
+    Joint,
+    Part,
+    PDMotor,
+    Shape,
+    Sphere,
+    World,
+)
 from gaplab.services.engines.base import Engine
 from tests.contract.textbook import (
     FRAME,

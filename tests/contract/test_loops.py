@@ -11,8 +11,7 @@ from gaplab.services.core.kinematics import about, rotated
 from gaplab.services.core.motions import NO_MEMORY, Act, Loop, Motion
 from gaplab.services.core.observations import GROUPS, names
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Sphere
-from gaplab.services.core.world import Body, Joint, PDMotor, World
+from gaplab.services.core.world import Body, Box, Joint, PDMotor, Sphere, World
 from gaplab.services.engines.base import Engine
 from tests.contract.textbook import STEP_S, G, X, Y, Z, block, engine, honoured, rig, times
 

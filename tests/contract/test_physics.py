@@ -11,8 +11,7 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Motion
-from gaplab.services.core.shapes import Box, Sphere
-from gaplab.services.core.world import Body, Joint, Material, Motor, World
+from gaplab.services.core.world import Body, Box, Joint, Material, Motor, Sphere, World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 

@@ -9,8 +9,21 @@ from scipy.spatial.transform import Rotation
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import about, clearances_m, inverse, product
 from gaplab.services.core.motions import Motion
-from gaplab.services.core.shapes import UNTURNED, Box, Capsule, Cylinder, Hull, Part, Shape, Sphere
-from gaplab.services.core.world import Body, Inertia, Material, Noise, World
+from gaplab.services.core.world import (
+    UNTURNED,
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Inertia,
+    Material,
+    Noise,
+    Part,
+    Shape,
+    Sphere,
+    World,
+)
 from gaplab.services.engines.base import Engine
 from tests.contract.textbook import STEP_S, G, X, Y, block, engine, held, honoured, positions, times
 

@@ -9,6 +9,7 @@ import pytest
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract.strategies import GridSearch, belief
 from gaplab.services.core.scoring import uniqueness_penalty
+from gaplab.services.core.search import Allowance
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Sample, Simulator
@@ -165,9 +166,12 @@ def test_the_noise_envelope_transfers_what_is_fit_in_its_worst_draw_or_on_averag
 
 
 def test_equal_rollouts_divide_the_evaluations_by_the_simulators() -> None:
-    assert options_of("domain_randomization").search_evaluations(500, 20) == 500
-    assert options_of("domain_randomization", equal_rollouts=True).search_evaluations(500, 20) == 25
-    assert options_of("noise_envelope", equal_rollouts=True).search_evaluations(500, 8) == 62
+    def evaluations(name: Any, **options: Any) -> Any:
+        return Allowance.of_transfer(options_of(name, **options), 500, tunables=3).evaluations
+
+    assert evaluations("domain_randomization") == 500
+    assert evaluations("domain_randomization", equal_rollouts=True) == 25
+    assert evaluations("noise_envelope", equal_rollouts=True) == 62
 
 
 def test_estimation_exploration_selects_the_summit_of_its_best_model() -> None:
@@ -205,7 +209,7 @@ def test_a_controller_that_was_measured_is_not_tried_again() -> None:
 
 def test_what_an_evaluation_costs_follows_from_the_options() -> None:
     def simulators(name: Any, **options: Any) -> Any:
-        return options_of(name, **options).selection_simulators(3)
+        return options_of(name, **options).selection_simulators(3, learned=False)
 
     assert simulators("estimation_exploration") == 1
     assert simulators("estimation_exploration", select="disagreement") == 10

@@ -11,8 +11,8 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.tunables.labels import tunable_of
 from gaplab.services.engines import engines
 from gaplab.services.specs.assembly import edits_of
+from gaplab.services.specs.defaults import honoured
 from gaplab.services.specs.simulation import Simulation
-from gaplab.services.specs.tunables import honoured
 
 EDITS = {
     "mass(trunk)": 1.3,

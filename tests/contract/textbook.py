@@ -8,8 +8,7 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Loop, Motion
-from gaplab.services.core.shapes import Box, Sphere
-from gaplab.services.core.world import Body, Joint, World
+from gaplab.services.core.world import Body, Box, Joint, Sphere, World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 

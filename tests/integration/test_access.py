@@ -17,8 +17,8 @@ from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError
 from gaplab.schemas.access import Role
 from gaplab.services import access
-from gaplab.services.access import authenticate, create_token, is_loopback
-from gaplab.services.core.errors import Forbidden, NotFound, Unauthenticated
+from gaplab.services.access import Unauthenticated, authenticate, create_token, is_loopback
+from gaplab.services.core.errors import Forbidden, NotFound
 from gaplab.services.settings import Settings
 from gaplab.services.store.engine import PATIENCE_S, WRITES, open_engine
 from gaplab.services.store.models import TokenRow

@@ -11,8 +11,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.settings import Limits
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.session import Store
 
 MOST_BYTES = Limits().body_bytes

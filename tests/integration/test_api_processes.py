@@ -25,9 +25,9 @@ from gaplab.api.process.server import listen, require_token
 from gaplab.api.process.service import environment_of, migrate
 from gaplab.api.process.supervisor_process import SupervisorProcess
 from gaplab.schemas.access import Role
-from gaplab.services.access import create_token, revoke_token
-from gaplab.services.core.errors import StoreUnavailable, Unauthenticated
+from gaplab.services.access import Unauthenticated, create_token, revoke_token
 from gaplab.services.settings import Settings
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.session import Store
 from tests.fakes import CAREFUL
 from tests.ports import free_port

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from gaplab.schemas.lifecycle import State
-from gaplab.services.core.errors import StoreUnavailable, Unsupported
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import listing
 from gaplab.services.results import curves
@@ -18,6 +17,7 @@ from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store import backup as backing_up
 from gaplab.services.store.backup import backup
+from gaplab.services.store.database_errors import StoreUnavailable, Unsupported
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import listed, submit_one, toy

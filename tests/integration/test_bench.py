@@ -24,10 +24,11 @@ from gaplab.services.archives.rerunning import Part, verify
 from gaplab.services.bench import answering, attachments, corrections, doubts, taking
 from gaplab.services.bench.branches import list_branches
 from gaplab.services.bench.taking import RequestFilter
-from gaplab.services.core.errors import Conflict, InvalidSpec, KeyReused, NotFound
+from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.deletion import Deleter, delete
+from gaplab.services.experiments.idempotency import KeyReused
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.reading import list_samples, read, read_experiment
 from gaplab.services.experiments.states import settle

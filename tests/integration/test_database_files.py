@@ -20,10 +20,10 @@ from gaplab import migrations
 from gaplab.api.app import create_app
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.service import migrate, warn_of_readers
-from gaplab.services.core.errors import StoreChanged, StoreDamaged, StoreUnavailable
 from gaplab.services.events import WantedEvents
 from gaplab.services.running import execution, supervisors
 from gaplab.services.store import guard
+from gaplab.services.store.database_errors import StoreChanged, StoreDamaged, StoreUnavailable
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import url_of

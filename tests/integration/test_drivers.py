@@ -23,7 +23,7 @@ from gaplab.services.bench import answering, taking
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.store.models import RequestRow
-from gaplab.services.store.queries.request_states import withdraw
+from gaplab.services.store.queries.requests import withdraw
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab, served
 from tests.experiments import submit_one, toy

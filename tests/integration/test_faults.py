@@ -37,9 +37,8 @@ from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Session, Store
 from gaplab.workers import checkpoints, permits
-from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
-from gaplab.workers.run import Run, stuck
+from gaplab.workers.task import Patience, Run, stuck
 from tests.experiments import submit_one
 from tests.fakes import flat, install
 from tests.without_ray import Here, HereRepetitions, HereRun

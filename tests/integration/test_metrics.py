@@ -9,9 +9,9 @@ from sqlalchemy import event
 
 from gaplab.api.app import create_app
 from gaplab.api.http import metrics
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.experiments import reading
 from gaplab.services.running import execution, supervisors
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, submit_one, toy
 

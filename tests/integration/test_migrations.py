@@ -18,7 +18,6 @@ from sqlalchemy import Connection, MetaData, insert, inspect, select
 
 from gaplab import migrations
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.core.types import (
     Cost,
     Fit,
@@ -31,6 +30,7 @@ from gaplab.services.core.types import (
     Transferred,
     Tuned,
 )
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.models import REVISION, Base, ExperimentRow, NotificationRow, StepRow, StudyRow, ViewRow
 from gaplab.services.store.queries.logs import is_whole, logs, unknown_branch

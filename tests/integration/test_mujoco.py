@@ -14,16 +14,14 @@ import pytest
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Sphere
-from gaplab.services.core.world import Body, Joint, Material, Motor, World
+from gaplab.services.core.world import Body, Box, Joint, Material, Motor, Sphere, World
 from gaplab.services.engines.mujoco import MuJoCo
-from gaplab.services.engines.mujoco import models as models_module
-from gaplab.services.engines.mujoco.callback import callbacks
-from gaplab.services.engines.mujoco.layout import layout
+from gaplab.services.engines.mujoco import worlds as models_module
+from gaplab.services.engines.mujoco.callback import callbacks, layout
 from gaplab.services.engines.mujoco.model import named
-from gaplab.services.engines.mujoco.models import Models
 from gaplab.services.engines.mujoco.pool import in_force
 from gaplab.services.engines.mujoco.scene import ROWS
+from gaplab.services.engines.mujoco.worlds import Models
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("mujoco.introspect.structs")

@@ -10,15 +10,27 @@ import pytest
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.inertias import inverse_inertias
 from gaplab.services.core.motions import Loop, Motion
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Sphere
-from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, PDMotor, World
+from gaplab.services.core.world import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Inertia,
+    Joint,
+    Material,
+    Motor,
+    Part,
+    PDMotor,
+    Sphere,
+    World,
+)
 from gaplab.services.engines.mujoco import MuJoCo
-from gaplab.services.engines.mujoco import models as of_worlds
 from gaplab.services.engines.mujoco import scene as of_scenes
-from gaplab.services.engines.mujoco.model import Structure
+from gaplab.services.engines.mujoco import worlds as of_worlds
+from gaplab.services.engines.mujoco.model import Structure, _inverse_inertias
 from gaplab.services.engines.mujoco.model import compiled as compiled_once
-from gaplab.services.engines.mujoco.models import Models
-from gaplab.services.engines.mujoco.values import _inverse_inertias
+from gaplab.services.engines.mujoco.worlds import Models
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("numba")

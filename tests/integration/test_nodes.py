@@ -20,12 +20,12 @@ from ray.cluster_utils import Cluster
 
 from gaplab.arithmetic import FIXED
 from gaplab.schemas.lifecycle import State
-from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.experiments import reading
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
 from gaplab.workers import task
 from gaplab.workers.cluster import cluster
+from gaplab.workers.errors import ClusterUnusable
 from gaplab.workers.supervisor import Supervisor
 from tests.arithmetic import told
 from tests.experiments import submit_one

@@ -12,8 +12,7 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Sphere, Vector
-from gaplab.services.core.world import Body, Joint, Material, Motor, World
+from gaplab.services.core.world import Body, Box, Joint, Material, Motor, Sphere, Vector, World
 from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.physx.scene import PhysXScene
 from gaplab.services.specs.assembly import setting

@@ -8,10 +8,24 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.motions import Motion
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Shape, Sphere
-from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, PDMotor, World
+from gaplab.services.core.world import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Inertia,
+    Joint,
+    Material,
+    Motor,
+    Part,
+    PDMotor,
+    Shape,
+    Sphere,
+    World,
+)
 from gaplab.services.engines.physx import PhysX
-from gaplab.services.engines.physx.shapes import MOST_SURFACES
+from gaplab.services.engines.physx.robot import MOST_SURFACES
 from tests.contract.textbook import LOAD, STEP_S, G, X, Y, Z, angles, changing, held, rig, times
 
 if not PhysX.available():

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.shapes import Box, Sphere
-from gaplab.services.core.world import Body, Joint, Material, World
+from gaplab.services.core.world import Body, Box, Joint, Material, Sphere, World
 from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.physx.scene import PhysXScene
 

@@ -10,8 +10,7 @@ import pytest
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box
-from gaplab.services.core.world import Body, Material, PDMotor, World
+from gaplab.services.core.world import Body, Box, Material, PDMotor, World
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco.plain import mjcf_of, plain_positions
 from tests.real_robots import imported

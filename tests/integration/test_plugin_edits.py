@@ -13,19 +13,19 @@ from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.sensitivity import SensitivitySpec
 from gaplab.services import events
-from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.core.registry import EXTERNAL
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import checks, reading
-from gaplab.services.plugins.folders import VARIABLE
+from gaplab.services.plugins.folders import VARIABLE, PluginDiffers
 from gaplab.services.running import execution, provenance, sensitivity, versions
 from gaplab.services.settings import Settings
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.workers import nodes
 from gaplab.workers.cluster import cluster
+from gaplab.workers.errors import ClusterUnusable
 from gaplab.workers.plugins import FIRST_S, LONGEST_S, Plugins
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import some_log, submit_one, toy
@@ -59,11 +59,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 
 class Walker(Quadruped):
     name = "walker"
-
-    def __init__(self, options=None):
-        super().__init__(options)
-        self.usual_controller = PluginRef(name="gait")
-        self.perform_as_usual()
+    usual_controller = PluginRef(name="gait")
 """
 SLIPPERY = """
 from gaplab.services.core.robots.toy_function import ToyFunction

@@ -16,10 +16,11 @@ from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.resolved import SPEC_VERSION
 from gaplab.services import events
-from gaplab.services.core.errors import Conflict, StoreUnavailable
+from gaplab.services.core.errors import Conflict
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import reading
 from gaplab.services.running import execution, provenance, versions
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.session import Store
 from tests.experiments import run, same, some_log, submit_one, toy
 

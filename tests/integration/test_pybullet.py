@@ -15,11 +15,10 @@ from gaplab.services.core.controllers.cpg import Cpg
 from gaplab.services.core.kinematics import about, body_poses
 from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Hull, Part, Sphere
-from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, PDMotor, World
+from gaplab.services.core.world import Body, Box, Hull, Inertia, Joint, Material, Motor, Part, PDMotor, Sphere, World
 from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.engines.pybullet.stick_slip import StickSlip
-from gaplab.services.specs.default_engines import default_engine
+from gaplab.services.engines.pybullet.scene import StickSlip
+from gaplab.services.specs.defaults import default_engine
 
 pytest.importorskip("pybullet")
 

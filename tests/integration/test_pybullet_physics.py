@@ -8,10 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gaplab.services.core.shapes import Box, Sphere
-from gaplab.services.core.world import Body, Joint, Material, World
-from gaplab.services.engines.pybullet.scene import PyBulletScene
-from gaplab.services.engines.pybullet.stick_slip import StickSlip
+from gaplab.services.core.world import Body, Box, Joint, Material, Sphere, World
+from gaplab.services.engines.pybullet.scene import PyBulletScene, StickSlip
 
 pybullet: ModuleType = pytest.importorskip("pybullet")
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 import ray
 
-from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.settings import Settings
 from gaplab.workers.__main__ import choose_authentication
 from gaplab.workers.cluster import cluster
+from gaplab.workers.errors import ClusterUnusable
 from tests.waiting import LONGEST_S
 
 OWN = """
@@ -24,7 +24,7 @@ from gaplab.workers.__main__ import choose_authentication
 choose_authentication(Settings())
 import ray
 from gaplab.workers.cluster import cluster
-from gaplab.workers.output import limit_prints
+from gaplab.workers.nodes import limit_prints
 
 def listening():
     sockets = {}

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.store.backup import PG_DUMP, backup
+from gaplab.services.store.database_errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.restore import restore
 from gaplab.services.store.session import Store

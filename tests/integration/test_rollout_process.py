@@ -14,10 +14,10 @@ from typing import Any
 
 import pytest
 
-from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
+from gaplab.services.core.errors import EngineUnavailable, LimitReached
 from gaplab.services.core.strategies import strategies
 from gaplab.services.plugins import contents
-from gaplab.services.replay.process import MOST_OUTPUT, NICENESS, AnswerCache, RolloutProcess
+from gaplab.services.replay.process import MOST_OUTPUT, NICENESS, AnswerCache, EngineInterrupted, RolloutProcess
 from gaplab.services.waiting_line import WaitingLine
 from tests.fakes import CAREFUL
 from tests.waiting import wait_until

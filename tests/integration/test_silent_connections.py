@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from sqlalchemy import make_url, text
 
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.store import postgres as connections
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.engine import open_engine
 from gaplab.services.store.session import Store
 from tests.conftest import Postgres

@@ -16,7 +16,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines import engines
 from gaplab.services.experiments import submission
 from gaplab.services.plugins import loading
-from gaplab.services.specs.default_engines import default_engine
+from gaplab.services.specs.defaults import default_engine
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 

@@ -17,8 +17,7 @@ from gaplab.arithmetic import chosen, has
 from gaplab.schemas.archives import RepetitionRerun
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import export, rerunning
-from gaplab.services.archives.recomputing import Recorded, difference, rerun, result_of
-from gaplab.services.archives.rerunning import rerun_all, submitted_spec
+from gaplab.services.archives.rerunning import Recorded, difference, rerun, rerun_all, result_of, submitted_spec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition

@@ -14,9 +14,9 @@ import pytest
 from sqlalchemy import event, text
 
 from gaplab import migrations
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.experiments import listing
 from gaplab.services.running import execution
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.engine import parse
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.session import Store

@@ -15,11 +15,11 @@ from ray.exceptions import RayTaskError, WorkerCrashedError
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting, subject
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.lease import Failure, Pulse
 from gaplab.services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
 from gaplab.services.store.queries.logs import logs

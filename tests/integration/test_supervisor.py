@@ -22,16 +22,17 @@ from sqlalchemy import select
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.schemas.measurements import TakeSpec
 from gaplab.services.bench import taking
-from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged
 from gaplab.services.experiments import reading
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.running import execution
 from gaplab.services.running.leases import Silences
 from gaplab.services.running.pulse import PulsePipe
+from gaplab.services.store.database_errors import StoreChanged
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
-from gaplab.workers import watch
-from gaplab.workers.ray_folder import PREFIX, ray_folder
+from gaplab.workers import cluster
+from gaplab.workers.cluster import PREFIX, ray_folder
+from gaplab.workers.errors import ClusterUnusable, RayGone
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import submit_one, toy
 from tests.integration.test_bench import bench, compute, pending
@@ -80,15 +81,15 @@ def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(supervisor:
 @pytest.mark.usefixtures("ray")
 def test_a_ray_that_answers_no_more_or_lost_a_part_is_told_from_one_that_works(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
-    watched = watch.RayWatch(own=True, clock=lambda: now[0])
+    watched = cluster.RayWatch(own=True, clock=lambda: now[0])
     watched.stop()
 
     assert watched.cores() == 2
-    now[0] += watch.SILENT_S + 1
+    now[0] += cluster.SILENT_S + 1
     with pytest.raises(RayGone, match="does not answer: it was last heard of 16 s ago"):
         watched.cores()
     dead = SimpleNamespace(dead_processes=lambda: [("log_monitor", None), ("raylet", None)])
-    monkeypatch.setattr(watch, "_node", lambda: dead)
+    monkeypatch.setattr(cluster, "_node", lambda: dead)
     with pytest.raises(RayGone, match="Ray died on this machine: its raylet ended"):
         watched.cores()
 

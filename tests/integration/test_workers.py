@@ -20,7 +20,6 @@ from ray.exceptions import RayError
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.sensitivity import SensitivitySpec, Verdict
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
@@ -37,10 +36,10 @@ from gaplab.services.store.session import Store
 from gaplab.workers import nodes, task
 from gaplab.workers import sensitivity as checking
 from gaplab.workers.checkpoints import recorded
-from gaplab.workers.patience import Patience
+from gaplab.workers.errors import ClusterUnusable
 from gaplab.workers.permits import Permits, PermittedReality, asking
-from gaplab.workers.run import Run
 from gaplab.workers.supervisor import Supervisor
+from gaplab.workers.task import Patience, Run
 from tests.arithmetic import told
 from tests.experiments import cancel, submit_one
 from tests.fakes import flat, install

@@ -21,7 +21,7 @@ import httpx2
 from gaplab import migrations
 from gaplab.schemas.access import Role
 from gaplab.services import access
-from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.session import Store
 from tests.ports import free_port
 from tests.soak import witness

@@ -200,7 +200,7 @@ def test_states_are_written_in_one_place() -> None:
                         pairs = zip(keys, values, strict=True)
                         named = [ast.unparse(value) for key, value in pairs if getattr(key, "value", None) == "state"]
                         writers |= {path.as_posix() for each in named if each.startswith("State.")}
-    assert writers == {"services/experiments/states.py", "services/store/queries/request_states.py"}
+    assert writers == {"services/experiments/states.py", "services/store/queries/requests.py"}
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:

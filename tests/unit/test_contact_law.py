@@ -5,10 +5,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.core.motor_law import PDLaw
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.engines.mujoco.law import apply_impulses, coast, damp, drive, press, stop, touch
-from gaplab.services.engines.mujoco.settings import PD, Servo, settings
+from gaplab.services.core.world import PDLaw
+from gaplab.services.engines.mujoco.law import (
+    PD,
+    Servo,
+    apply_impulses,
+    coast,
+    damp,
+    drive,
+    press,
+    settings,
+    stop,
+    touch,
+)
 
 WORLD = Quadruped().world
 STEP_S = WORLD.time_step_s

@@ -9,9 +9,8 @@ import pytest
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract import controllers as contract
 from gaplab.services.core.controllers import controllers
-from gaplab.services.core.controllers.actuation import Limbs, middles
-from gaplab.services.core.controllers.layers import weighted
 from gaplab.services.core.controllers.mlp import Mlp
+from gaplab.services.core.controllers.parts import Limbs, middles, weighted
 from gaplab.services.core.controllers.plastic import Plastic
 from gaplab.services.core.controllers.sine import Sine
 from gaplab.services.core.errors import InvalidSpec

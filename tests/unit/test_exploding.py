@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.shapes import Box, Sphere
-from gaplab.services.core.world import Body, Joint, World
-from gaplab.services.engines.exploding import checked_s, explodes
+from gaplab.services.core.world import Body, Box, Joint, Sphere, World
+from gaplab.services.engines.stepped import checked_s, explodes
 
 HOPPER = World(
     bodies=(Body("base", 1.0, Box((0.2, 0.1, 0.1))), Body("leg", 0.1, Sphere(0.02), (0.0, 0.0, -0.28))),

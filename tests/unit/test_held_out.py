@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.core.held_out import is_held_out, split
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners.search import SearchTuner
+from gaplab.services.core.tuning import is_held_out, split
 from gaplab.services.core.types import Measured, Sample, Tuned
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts

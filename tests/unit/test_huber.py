@@ -5,8 +5,7 @@ import pytest
 
 from gaplab.services.core.arrays import NO_READINGS
 from gaplab.services.core.discrepancies.base import Discrepancy
-from gaplab.services.core.discrepancies.huber import Huber, HuberOptions
-from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
+from gaplab.services.core.discrepancies.fitness import Huber, HuberOptions, SquaredFitness
 
 FITNESSES = np.linspace(0.0, 40.0, 4001)
 """One of each simulator, the same for every sample."""

@@ -7,10 +7,21 @@ import pytest
 
 from gaplab.services.core.inertias import inertia_of, inverse_inertias
 from gaplab.services.core.kinematics import about, rotated
-from gaplab.services.core.motor_law import pd_law, pd_torque
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Sphere
-from gaplab.services.core.world import Body, Inertia, Joint, PDMotor, World
+from gaplab.services.core.world import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Inertia,
+    Joint,
+    PDMotor,
+    Sphere,
+    World,
+    pd_law,
+    pd_torque,
+)
 
 TURN = about(np.array([0.6, 0.0, 0.8]), np.array([0.7]))[0]
 

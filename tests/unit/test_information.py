@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gaplab.services.core.information import beside, fisher_information, log_determinant, moved, trace
+from gaplab.services.core.scoring import beside, fisher_information, log_determinant, moved, trace
 from gaplab.services.core.space import Space
 
 SPACE = Space.box([0.0, -2.0], [1.0, 2.0])

@@ -5,8 +5,7 @@ import pytest
 
 from gaplab.services.core.kinematics import about, body_poses, clearances_m, product, rotated
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Sphere
-from gaplab.services.core.world import Body, Joint, Motor, World
+from gaplab.services.core.world import Body, Box, Joint, Motor, Sphere, World
 from gaplab.services.replay.shapes import labels, shapes_of
 
 QUARTER = np.pi / 2

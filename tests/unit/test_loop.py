@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.core.discrepancies.absolute_fitness import AbsoluteFitness
+from gaplab.services.core.discrepancies.fitness import AbsoluteFitness
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.history import History
+from gaplab.services.core.history import History, recorded_fitness
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.probes import recorded_fitness
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import DiverseOptions, Strategy
 from gaplab.services.core.strategies.informative import Informative

@@ -9,9 +9,9 @@ import pytest
 from gaplab.schemas.misfit import Identification
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import NO_READINGS, frozen
+from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.discrepancies.readings import Readings
-from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
-from gaplab.services.core.misspecification import SURPRISING, fit_of, widened
+from gaplab.services.core.linear_models import SURPRISING, fit_of, widened
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.space import Space

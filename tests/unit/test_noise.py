@@ -8,7 +8,7 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.motions import Loop, Trajectory, open_loop
-from gaplab.services.core.noise import disturbed
+from gaplab.services.core.observations import disturbed
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.robots.toy_function import ToyFunction
 from gaplab.services.core.world import Noise

@@ -6,11 +6,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.core.clearances import Clearances
-from gaplab.services.core.kinematics import about, body_poses, clearances_m, observed_poses, product
+from gaplab.services.core.kinematics import Clearances, about, body_poses, clearances_m, observed_poses, product
 from gaplab.services.core.observations import GROUPS, Bearing, feet, gravity_m_s2, names, noises, observations
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Shape, Sphere
-from gaplab.services.core.world import Body, Inertia, Joint, Motor, Noise, PDMotor, World
+from gaplab.services.core.world import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Inertia,
+    Joint,
+    Motor,
+    Noise,
+    Part,
+    PDMotor,
+    Shape,
+    Sphere,
+    World,
+)
 
 RNG = np.random.default_rng(1)
 AXIS = (0.6, 0.0, 0.8)

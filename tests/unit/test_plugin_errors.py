@@ -32,10 +32,6 @@ class Hopper(Robot):
         joints=(Joint("hip", "trunk", "leg", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), Motor(0.1, 4.0), swing=0.4),),
         start_height_m=0.15,
     )
-
-    def __init__(self, options=None):
-        super().__init__(options)
-        self.perform_as_usual()
 '''
 
 PAIR = '''
@@ -98,7 +94,8 @@ def test_a_tunable_that_raises_in_read_is_named_with_its_line(put: Put) -> None:
 
 
 def test_a_strategy_that_raises_while_rollouts_are_counted_is_named_with_its_line(put: Put) -> None:
-    put(careful=f"{CAREFUL}\n    def selection_simulators(self, tunables):\n        return self.options.simulators\n")
+    needed = "    def selection_simulators(self, tunables, learned):\n        return self.options.simulators\n"
+    put(careful=f"{CAREFUL}\n{needed}")
     resolved = resolve_experiment(toy(strategy="careful"))
 
     with pytest.raises(

@@ -14,7 +14,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
 from gaplab.services.plugins.faults import fault_of
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.realities import completed
+from gaplab.services.specs.defaults import completed
 from gaplab.services.specs.registries import REGISTRIES
 from gaplab.services.specs.resolution import resolve_experiment
 from tests.experiments import toy

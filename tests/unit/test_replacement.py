@@ -11,7 +11,7 @@ from pymoo.core.population import Population as PymooPopulation
 from pymoo.core.problem import Problem
 
 from gaplab.services.core.optimizers.base import Population
-from gaplab.services.core.optimizers.replacement import least_fit, less_fit_of_most_similar
+from gaplab.services.core.optimizers.steady_state import least_fit, less_fit_of_most_similar
 from gaplab.services.core.space import Space
 
 SPACE = Space.box([0.0, 0.0], [1.0, 10.0])

@@ -13,8 +13,22 @@ from gaplab.schemas.robots import RobotSource
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.robot_files import MOST_BYTES, RobotFile, read_robot_file
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Sphere
-from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, Noise, PDMotor, World
+from gaplab.services.core.world import (
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Inertia,
+    Joint,
+    Material,
+    Motor,
+    Noise,
+    Part,
+    PDMotor,
+    Sphere,
+    World,
+)
 
 TETRAHEDRON = Hull(((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)))
 PARTS = tuple(

@@ -11,11 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.motor_law import pd_law, pd_torque
 from gaplab.services.core.robot_files import read_robot_file
-from gaplab.services.core.shapes import Box, Capsule, Hull
-from gaplab.services.core.world import Joint, Motor, PDMotor, World
-from gaplab.services.robots.geometry import simplify
+from gaplab.services.core.world import Box, Capsule, Hull, Joint, Motor, PDMotor, World, pd_law, pd_torque
+from gaplab.services.robots.bodies import simplify
 from gaplab.services.robots.importing import ImportedFile, import_robot
 from gaplab.services.robots.options import ImportOptions
 from tests import real_robots

@@ -9,8 +9,7 @@ import pytest
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.core.robot_files import LONGEST_LINE
 from gaplab.services.robots.importing import ImportedFile, import_robot
-from gaplab.services.robots.notes import Notes
-from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.options import ImportOptions, Notes
 
 mujoco = pytest.importorskip("mujoco")
 

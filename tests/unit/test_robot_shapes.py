@@ -10,8 +10,7 @@ from scipy.spatial import ConvexHull
 
 from gaplab.services.core.kinematics import about
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Sphere
-from gaplab.services.core.world import Body, Inertia, Joint, World
+from gaplab.services.core.world import Body, Box, Capsule, Cylinder, Hull, Inertia, Joint, Part, Sphere, World
 from gaplab.services.replay.shapes import (
     MOST_FEET,
     extent_of,

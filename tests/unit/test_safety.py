@@ -16,8 +16,8 @@ from gaplab.services.core.safety import Extremes, expected, extremes, recording_
 from gaplab.services.core.world import World
 from gaplab.services.engines import engines
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.forecasts import SafetyForecast
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.specs.simulation import SafetyForecast
 from tests.experiments import toy
 
 ROBOT = Quadruped()

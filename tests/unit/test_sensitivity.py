@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.sensitivity import Verdict
-from gaplab.services.core.alike import alike
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import (
     Effort,
     Subject,
+    alike,
     check,
     controllers,
     effect_and_roughness,

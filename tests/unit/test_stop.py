@@ -5,11 +5,11 @@ import signal
 import subprocess
 import sys
 
-from gaplab.workers.stop import Stop
+from gaplab.workers.supervisor import Stop
 
 MANY_SIGNALS = """
 import os, signal, threading
-from gaplab.workers.stop import Stop
+from gaplab.workers.supervisor import Stop
 
 stop = Stop()
 signal.signal(signal.SIGTERM, lambda *_: stop.set())

@@ -1,4 +1,4 @@
-"""What a strategy of one's own may decide: its transfer, its simulators, its lessons, and whether it tunes."""
+"""What a strategy of one's own may decide: its transfer, its simulators and its lessons."""
 
 from dataclasses import replace
 from typing import Any
@@ -40,19 +40,17 @@ class Robust(Plain):
 
 
 class Patient(Plain):
-    """Learns after every second sample, and from those alone whose fitness is high."""
-
-    def learns(self, samples: Any) -> Any:
-        return len(samples) % 2 == 0
+    """Learns after every second sample."""
 
     def lessons(self, samples: Any) -> Any:
-        return [each for each in samples if each.fitness > 0.5]
+        return samples[: len(samples) // 2 * 2]
 
 
 class Stubborn(Plain):
-    """Keeps its random simulators."""
+    """Learns nothing."""
 
-    tunes = False
+    def lessons(self, samples: Any) -> Any:
+        return ()
 
 
 def steps_of(strategy: Any, **changes: Any) -> Any:
@@ -159,21 +157,21 @@ def test_after_a_sample_that_teaches_nothing_simulators_controller_and_probe_sta
     assert probed[3].recorded == max(probed[3].fitness, *samples)
 
 
-def test_samples_that_are_no_lessons_are_not_tuned_on() -> None:
-    class Deaf(Plain):
-        def lessons(self, samples: Any) -> Any:
-            return ()
-
-    steps = steps_of(Deaf())
-
-    assert [step.cost for step in of(Tuned, steps)] == [Cost(), *(Cost(saved=50 * count) for count in (1, 2, 3))]
-
-
-def test_a_strategy_that_does_not_tune_keeps_its_first_simulators_at_no_cost() -> None:
+def test_a_strategy_without_lessons_keeps_its_first_simulators_at_no_cost() -> None:
     tuned = of(Tuned, steps_of(Stubborn()))
 
     assert len({flat(step.simulators) for step in tuned}) == 1
-    assert {step.cost for step in tuned} == {Cost()}
+    assert [step.cost for step in tuned] == [Cost(), *(Cost(saved=50 * count) for count in (1, 2, 3))]
+
+
+def test_samples_that_are_no_lessons_are_not_tuned_on() -> None:
+    class Choosy(Plain):
+        def lessons(self, samples: Any) -> Any:
+            return samples[-1:]
+
+    tuned = of(Tuned, steps_of(Choosy()))
+
+    assert [step.cost for step in tuned[1:]] == [Cost(rollouts=50 * 1, saved=50 * count) for count in (0, 1, 2)]
 
 
 @pytest.mark.parametrize("strategy", [Robust(), Patient(), Stubborn()], ids=lambda each: type(each).__name__)

@@ -14,13 +14,12 @@ from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.inertias import inertia_of
 from gaplab.services.core.kinematics import body_poses, clearances_m
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.shapes import Box, Sphere
+from gaplab.services.core.robots.robot_file import usual_tunables
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.noise_envelope import NoiseEnvelope, NoiseEnvelopeOptions
 from gaplab.services.core.tunables.base import Tunable, matching
-from gaplab.services.core.tunables.defaults import usual_tunables
 from gaplab.services.core.tunables.labels import label_of, proper, separated, tunable_of, unit_of
-from gaplab.services.core.world import Inertia, Material, Noise, PDMotor
+from gaplab.services.core.world import Box, Inertia, Material, Noise, PDMotor, Sphere
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.plugins.external import named_in
 from gaplab.services.specs import resolution

@@ -7,9 +7,9 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
-from gaplab.services.core.controllers.actuation import Limbs, follows_angle, middles
 from gaplab.services.core.controllers.base import Controller
-from gaplab.services.core.controllers.pulsing import Pulses
+from gaplab.services.core.controllers.parts import Limbs, follows_angle, middles
+from gaplab.services.core.controllers.square_pulses import Pulses
 from gaplab.services.core.kinematics import inverse, rotated
 from gaplab.services.core.motions import Loop
 from gaplab.services.core.space import Space

@@ -8,8 +8,8 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
-from gaplab.services.core.controllers.actuation import Limbs, middles, sampled, sampling_times_s, swings
 from gaplab.services.core.controllers.base import Controller
+from gaplab.services.core.controllers.parts import Limbs, middles, sampled, sampling_times_s, swings
 from gaplab.services.core.controllers.sine import QUARTER
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.space import Space

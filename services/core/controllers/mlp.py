@@ -7,9 +7,8 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
-from gaplab.services.core.controllers.actuation import middles, swings
 from gaplab.services.core.controllers.base import Controller
-from gaplab.services.core.controllers.layers import Scaling, Senses, clock, weighted, with_constants
+from gaplab.services.core.controllers.parts import Scaling, Senses, clock, middles, swings, weighted, with_constants
 from gaplab.services.core.motions import NO_MEMORY, Loop
 from gaplab.services.core.space import Space
 from gaplab.services.core.world import World

@@ -7,12 +7,11 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
-from gaplab.services.core.controllers.actuation import middles, swings
 from gaplab.services.core.controllers.base import Controller
-from gaplab.services.core.controllers.layers import Scaling, Senses, weighted
-from gaplab.services.core.controllers.pulsing import Pulses
+from gaplab.services.core.controllers.parts import Scaling, Senses, middles, swings, weighted
+from gaplab.services.core.controllers.square_pulses import Pulses
 from gaplab.services.core.motions import Loop
-from gaplab.services.core.noise import stream_of
+from gaplab.services.core.observations import stream_of
 from gaplab.services.core.space import Space
 from gaplab.services.core.world import World
 

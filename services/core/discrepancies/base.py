@@ -52,12 +52,12 @@ class Discrepancy(Plugin):
         return sqrt(term)
 
     def error_unit(self, unit: str) -> str:
-        """Return the unit of the error, given that of fitness."""
-        return unit
+        """Return the unit of the error, given that of fitness: readings are in units of their noise."""
+        return "× noise" if self.senses else unit
 
     def least_error(self, fitness_error: float) -> float:
-        """Return the error below which simulators are equally good, given one in the unit of fitness."""
-        return fitness_error
+        """Return the error below which simulators are equally good, given one of fitness; of readings, their noise."""
+        return 1.0 if self.senses else fitness_error
 
     @classmethod
     def details(cls) -> dict[str, Any]:

@@ -10,9 +10,6 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Outcomes
 from gaplab.services.core.discrepancies.base import Discrepancy
 
-NOISE = "× noise"
-"""The unit of an error of readings."""
-
 
 class ReadingsOptions(Frozen):
     """Options of the discrepancy of readings."""
@@ -61,13 +58,5 @@ class Readings(Discrepancy):
         """Return the variance of one reading, 1 in units of its noise, divided by the number of readings that count."""
         return 1.0 / len(self._early(times_s))
 
-    def least_error(self, fitness_error: float) -> float:  # noqa: ARG002 - readings are in units of their noise
-        """Return 1, the noise of the sensors: a smaller error says nothing about a simulator."""
-        return 1.0
-
     def _early(self, times_s: FloatArray) -> NDArray[np.intp]:
         return np.flatnonzero(times_s <= times_s.min() + self.options.seconds + 1e-9)
-
-    def error_unit(self, unit: str) -> str:  # noqa: ARG002 - readings have no unit
-        """Return the noise of the sensors."""
-        return NOISE

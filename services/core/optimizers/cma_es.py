@@ -12,7 +12,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes
 from gaplab.services.core.optimizers.base import Optimizer, Population
-from gaplab.services.core.optimizers.replacement import insert, least_fit, less_fit_of_most_similar
+from gaplab.services.core.optimizers.steady_state import insert, least_fit, less_fit_of_most_similar
 from gaplab.services.core.space import Space
 
 CONVERGED = 1e-4

@@ -1,9 +1,10 @@
 """The contract of a robot: a world, and what drives and rates it by default."""
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRef
@@ -23,8 +24,8 @@ from gaplab.services.core.world import World
 class Robot(Plugin):
     """A morphology, with a controller that drives it and a task that rates it.
 
-    Most robots set `world`, `usual_controller` and `usual_task`, and call `perform`. A robot that brings a controller
-    and a task of its own, like a function, has neither: it sets `unit`, `space` and `known`, and overrides `motion` and
+    Most robots set `world`, `usual_controller` and `usual_task`. A robot that brings a controller and a task of its
+    own, like a function, has neither of these: it sets `unit`, `space` and `known`, and overrides `motion` and
     `fitness`.
 
     Attributes:
@@ -58,26 +59,32 @@ class Robot(Plugin):
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
         self.label = self.name
+        self.build()
+        if self.usual_controller is not None and self.usual_task is not None:
+            usual = controllers.create(self.usual_controller, "/robot"), tasks.create(self.usual_task, "/robot")
+            self._perform(*usual)
+
+    def build(self) -> None:
+        """Set what depends on the options, like `world` or `usual_task`; by default nothing does."""
 
     @classmethod
     def example(cls) -> "Robot":
         """Return a robot of this class, for the catalogue and the checks of the contract."""
         return cls()
 
-    def perform(self, controller: Controller, task: Task) -> None:
-        """Let a controller drive the robot, and a task rate it; both are new, and serve this robot alone."""
+    def driven_by(self, controller: Controller, task: Task) -> Self:
+        """Return this robot, driven by a controller and rated by a task; both are new, and serve that robot alone."""
+        robot = copy(self)
+        robot._perform(controller, task)
+        return robot
+
+    def _perform(self, controller: Controller, task: Task) -> None:
         controller.prepare(self.world, task.observe_s)
         self._controller, self._task = controller, task
         self.unit, self.sensors, self.space = task.unit, task.sensors, controller.space
         known = self.designed.get(controller.name)
         fits = known is not None and known.shape == controller.known.shape
         self.known = known if known is not None and fits else controller.known
-
-    def perform_as_usual(self) -> None:
-        """Let the usual controller drive the robot, and the usual task rate it."""
-        assert self.usual_controller is not None
-        assert self.usual_task is not None
-        self.perform(controllers.create(self.usual_controller, "/robot"), tasks.create(self.usual_task, "/robot"))
 
     def motion(self, genome: Genome) -> Motion | Loop:
         """Return the motion that the genome `(g,)` describes."""

@@ -8,8 +8,7 @@ from gaplab.schemas.base import Frozen, Real
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import Genome, frozen
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.shapes import Box, Sphere, Vector
-from gaplab.services.core.world import Body, Joint, Material, Motor, World
+from gaplab.services.core.world import Body, Box, Joint, Material, Motor, Sphere, Vector, World
 
 BODY_M: Vector = (0.30, 0.20, 0.06)
 BODY_KG = 1.5
@@ -63,16 +62,13 @@ class Quadruped(Robot):
     engine = "pybullet"
     Options = QuadrupedOptions
     options: QuadrupedOptions
+    usual_controller = PluginRef(name="square_pulses", options={"period_s": PERIOD_S})
 
-    def __init__(self, options: Frozen | None = None) -> None:
-        super().__init__(options)
-        self.world = _world()
-        self.usual_controller = PluginRef(name="square_pulses", options={"period_s": PERIOD_S})
-        self.usual_task = PluginRef(
-            name="walk", options={"settling_s": SETTLING_S, "counted_s": self.options.counted_s}
-        )
-        self.designed = {"square_pulses": _trot()}
-        self.perform_as_usual()
+    def build(self) -> None:
+        """Set the world, and a task of the counted time."""
+        self.world, self.designed = _world(), {"square_pulses": _trot()}
+        timing = {"settling_s": SETTLING_S, "counted_s": self.options.counted_s}
+        self.usual_task = PluginRef(name="walk", options=timing)
 
 
 def _world() -> World:

@@ -56,20 +56,14 @@ class Strategy(Plugin):
     Attributes:
         searches: true if a selection searches, which spends its budget.
         selects_transferred: true if its search has the transfer's goal, the fittest controller in the best simulator.
-        takes_samples: false if it transfers a controller at once: a level across the figure of curves.
-        tunes: false if its first simulators stay as they are, at no cost.
+        takes_samples: false if nothing is tuned and a controller transferred at once: a level across the figure.
         in_reality: true for the direct baseline, which evolves in reality and takes no samples.
     """
 
     searches: ClassVar[bool] = True
     selects_transferred: ClassVar[bool] = False
     takes_samples: ClassVar[bool] = True
-    tunes: ClassVar[bool] = True
     in_reality: ClassVar[bool] = False
-
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        cls.takes_samples = cls.takes_samples and not cls.in_reality
 
     @property
     def ensemble(self) -> int:
@@ -91,21 +85,18 @@ class Strategy(Plugin):
         """Return the tunables that its options name; a spec that does not tune them is refused."""
         return ()
 
-    def selection_simulators(self, tunables: int) -> int:  # noqa: ARG002 - for those that need it
-        """Return the most simulators that an evaluation of a selection needs, given the number of tunables."""
-        return self.ensemble
+    def selection_simulators(self, tunables: int, *, learned: bool) -> int:  # noqa: ARG002 - for those that need it
+        """Return the most simulators that an evaluation of a selection needs, by default all that are tuned.
 
-    def later_selection_simulators(self, tunables: int) -> int:
-        """Return the same maximum once a sample makes weights differ; by default it is unchanged."""
-        return self.selection_simulators(tunables)
+        Args:
+            tunables: number of tunables.
+            learned: whether a sample has made the weights of simulators differ.
+        """
+        return self.ensemble
 
     def transfer_simulators(self, tunables: int) -> int:  # noqa: ARG002 - for those that need it
         """Return the most simulators that an evaluation of a transfer needs, given the number of tunables."""
         return 1
-
-    def search_evaluations(self, budget: int, simulators: int) -> int:
-        """Return the evaluations of a search, each in this number of simulators."""
-        return budget // simulators if self.equal_rollouts else budget
 
     def draw(self, tunables: Space, names: Sequence[str], rng: Generator) -> Parameters:  # noqa: ARG002 - the port's
         """Return the simulators `(m, p)` before the first sample, by default drawn uniformly.
@@ -134,15 +125,12 @@ class Strategy(Plugin):
         """
         return search(lambda _, fitnesses: fitnesses[:, 0], parameters=belief.parameters[:1])
 
-    def learns(self, samples: Sequence[Sample]) -> bool:  # noqa: ARG002 - the port's signature
-        """Return whether to tune and transfer after the last of these samples.
-
-        Otherwise the simulators, the transferred controller and its probe stay, at no cost.
-        """
-        return True
-
     def lessons(self, samples: Sequence[Sample]) -> Sequence[Sample]:
-        """Return the samples that simulators are tuned on, by default all."""
+        """Return the samples that simulators are tuned on, by default all; it depends on the samples alone.
+
+        After a sample that is not among its own lessons, the simulators, the transferred controller and its probe stay,
+        at no cost.
+        """
         return samples
 
     @classmethod
@@ -156,7 +144,6 @@ class Untuned(Strategy):
 
     searches = False
     takes_samples = False
-    tunes = False
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Refuse, because there is nothing to select."""
@@ -229,6 +216,6 @@ class Diverse(Strategy):
         """Return the size of the diverse ensemble."""
         return self.options.simulators
 
-    def later_selection_simulators(self, tunables: int) -> int:  # noqa: ARG002 - the port's signature
-        """Return the number of simulators that count once they differ in weight."""
-        return self.options.counted
+    def selection_simulators(self, tunables: int, *, learned: bool) -> int:  # noqa: ARG002 - the port's signature
+        """Return the size of the ensemble, or the number of simulators that count once they differ in weight."""
+        return self.options.counted if learned else self.ensemble

@@ -12,4 +12,5 @@ class Direct(SimulatedFit):
 
     name = "direct"
     source = "Paper, section 3: 1.33 on average, standard deviation 0.10"
+    takes_samples = False
     in_reality = True

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Outcomes
-from gaplab.services.core.information import moved
+from gaplab.services.core.scoring import moved
 from gaplab.services.core.strategies.base import Search, Strategy
 from gaplab.services.core.types import Belief
 
@@ -65,7 +65,7 @@ class EstimationExploration(Strategy):
         """Return whether it selects by readings."""
         return self.options.select == "disagreement"
 
-    def selection_simulators(self, tunables: int) -> int:  # noqa: ARG002 - the port's signature
+    def selection_simulators(self, tunables: int, *, learned: bool) -> int:  # noqa: ARG002 - the port's signature
         """Return one, or the compared models, with as many beside them if reliability counts."""
         compared = min(self.options.compared, self.options.models)
         return compared * (2 if self.options.reliability else 1) if self.senses else 1

@@ -9,8 +9,17 @@ from numpy.random import Generator
 from pydantic import Field
 
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Outcomes, Parameters
-from gaplab.services.core.information import beside, fisher_information, log_determinant, moved, trace
-from gaplab.services.core.scoring import scaled_uniqueness_penalty, weighted_deviation, weighted_mean, weights_of
+from gaplab.services.core.scoring import (
+    beside,
+    fisher_information,
+    log_determinant,
+    moved,
+    scaled_uniqueness_penalty,
+    trace,
+    weighted_deviation,
+    weighted_mean,
+    weights_of,
+)
 from gaplab.services.core.strategies.base import Diverse, DiverseOptions, Search, Weight
 from gaplab.services.core.types import Belief
 
@@ -65,23 +74,17 @@ class Weighted(Diverse):
     Options = WeightedOptions
     options: WeightedOptions
 
-    def selection_simulators(self, tunables: int) -> int:
+    def selection_simulators(self, tunables: int, *, learned: bool) -> int:
         """Return the simulators that count, and those beside them that reliability and information need."""
-        return self._needed(self._compared(self.ensemble), tunables)
-
-    def later_selection_simulators(self, tunables: int) -> int:
-        """Return the number of simulators once weights differ, so that only those of most weight count."""
-        return self._needed(self._compared(self.options.counted), tunables)
+        compared = self._compared(super().selection_simulators(tunables, learned=learned))
+        nearby = compared if self.options.reliability_weight else 0
+        return compared + nearby + (tunables if self.options.information_weight else 0)
 
     def _compared(self, simulators: int) -> int:
         """Return how many of these simulators count: all, or the best alone."""
         options = self.options
         weights = (options.fit_weight, options.disagreement_weight, options.reliability_weight)
         return simulators if any(weights) else 1
-
-    def _needed(self, compared: int, tunables: int) -> int:
-        nearby = compared if self.options.reliability_weight else 0
-        return compared + nearby + (tunables if self.options.information_weight else 0)
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:
         """Return the controller with the highest weighted sum found."""

@@ -1,4 +1,4 @@
-"""Tunables: each file in this folder is one parameter of the simulator."""
+"""Tunables: each class in this folder with a name is one parameter of the simulator."""
 
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.tunables.base import Tunable

@@ -1,19 +1,73 @@
 """The law of motors, joints and contacts as compiled code, which MuJoCo calls in each step, from any thread.
 
-Numba compiles it. `mujoco.introspect` describes the layout of MuJoCo's data. Numba's values are untyped, hence `Any`.
+Numba compiles it. MuJoCo hands over addresses of its C structures, and its Python API does not tell where their fields
+are. So `layout` computes that from `mujoco.introspect`. `law` reads fields that another minor version may move or mean
+otherwise, so pyproject.toml permits one minor version of MuJoCo. Numba's values are untyped, hence `Any`.
 """
 
+import ctypes
 from ctypes import CDLL, c_int, c_void_p
-from functools import cache
+from functools import cache, reduce
 from importlib import import_module
+from operator import mul
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from gaplab.services.engines.mujoco.law import ROWS, apply_impulses, coast, damp, drive, press, stop, touch
-from gaplab.services.engines.mujoco.layout import layout
-from gaplab.services.engines.mujoco.settings import AHEAD, DOFS, STEP, SWEEPS
+from gaplab.services.engines.mujoco.law import (
+    AHEAD,
+    DOFS,
+    ROWS,
+    STEP,
+    SWEEPS,
+    apply_impulses,
+    coast,
+    damp,
+    drive,
+    press,
+    stop,
+    touch,
+)
+
+Offsets = dict[str, int]
+
+_SCALARS = {
+    "char": ctypes.c_char,
+    "mjtBool": ctypes.c_bool,
+    "int": ctypes.c_int,
+    "float": ctypes.c_float,
+    "mjtNum": ctypes.c_double,
+    "mjtSize": ctypes.c_int64,
+    "size_t": ctypes.c_size_t,
+    "uint64_t": ctypes.c_uint64,
+    "uintptr_t": ctypes.c_size_t,
+}
+
+
+def layout(name: str) -> tuple[Offsets, int]:
+    """Return the offset of each field of a structure, like `mjContact`, and the total size, in bytes."""
+    made = _type(name)
+    return {field: getattr(made, field).offset for field, _ in made._fields_}, ctypes.sizeof(made)
+
+
+def _type(kind: Any) -> Any:
+    """Return what ctypes has for the name of a type, or for a type of MuJoCo's without a name."""
+    match type(kind).__name__:
+        case "PointerType":
+            return ctypes.c_void_p
+        case "ArrayType":
+            return reduce(mul, kind.extents, _type(kind.inner_type))
+        case "ValueType":
+            return _type(kind.name)
+        case "AnonymousStructDecl":
+            return _struct(kind.fields)
+    return _SCALARS.get(kind) or _struct(import_module("mujoco.introspect.structs").STRUCTS[kind].fields)
+
+
+def _struct(fields: Any) -> type[ctypes.Structure]:
+    return type("Struct", (ctypes.Structure,), {"_fields_": [(each.name, _type(each.type)) for each in fields]})
+
 
 MANY = 1 << 20
 """Length of an array view whose true length the compiled code does not need."""

@@ -1,40 +1,88 @@
-"""The law of motors, joints and contacts, in place of MuJoCo's own.
+"""The law of motors, joints and contacts, in place of MuJoCo's own, and the settings that it reads of a world.
 
 A World has static friction, dynamic friction and restitution; MuJoCo's contacts have none of these. Therefore MuJoCo
 computes kinematics, collisions and the inverse inertia at contacts and limits, and this law computes the forces, in
-plain functions on arrays. `callback` compiles them.
+plain functions on arrays. `callback` compiles them. What MuJoCo's model has no place for is an array of settings.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import hypot
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motor_law import DAMPING as VISCOSITY
-from gaplab.services.core.motor_law import FEED, STIFFNESS
-from gaplab.services.core.motor_law import STRONGEST as STRONGEST_NM
-from gaplab.services.engines.mujoco.settings import (
-    AHEAD,
-    DAMPERS,
-    DAMPING,
-    DOF,
-    EACH_DAMPER,
-    EACH_MOTOR,
-    EACH_SERVO,
-    FALL,
-    FASTEST,
-    FIRST,
-    GAIN,
-    LAW,
-    MOTOR_ROTOR,
-    MOTORS,
-    ROTOR,
-    SERVOS,
-    STEP,
-    STRONGEST,
-)
+from gaplab.services.core.world import DAMPING as VISCOSITY
+from gaplab.services.core.world import FEED, STIFFNESS, PDLaw, World
+from gaplab.services.core.world import STRONGEST as STRONGEST_NM
+
+STEP, FALL, SWEEPS, DOFS, AHEAD, SERVOS, MOTORS, DAMPERS, FIRST = range(9)
+"""Indices into the settings: time step, speed that gravity adds in it, solver iterations, number of degrees of freedom,
+by how much a joint's place among the positions is ahead of that among the speeds, numbers of servos, PD motors and
+damped joints, and the first of these."""
+
+DOF = 0
+"""Index into the settings of a servo, a PD motor or a damped joint: its degree of freedom."""
+
+GAIN, FASTEST, STRONGEST, ROTOR, EACH_SERVO = range(1, 6)
+"""Indices into a servo's settings, and their number: see Servo."""
+
+LAW, MOTOR_ROTOR, EACH_MOTOR = 1, 5, 6
+"""Indices into a PD motor's settings of its PDLaw and its rotor, and their number: see PD."""
+
+DAMPING, EACH_DAMPER = 1, 2
+"""Index into a damped joint's settings, and their number."""
+
+
+class Servo(NamedTuple):
+    """The settings of a Motor: degree of freedom, share of the error closed in a step, limits, and rotor's inertia."""
+
+    dof: int
+    gain: float
+    fastest_rad_s: float
+    strongest_nm: float
+    rotor_kg_m2: float
+
+
+class PD(NamedTuple):
+    """The settings of a PDMotor: degree of freedom, law, and inertia of a rotor that turns with its joint.
+
+    The law gives the torque on joint and rotor. What the rotor takes of it makes the rest depend on the speed at the
+    end of the step.
+    """
+
+    dof: int
+    law: PDLaw
+    rotor_kg_m2: float
+
+
+def settings(
+    world: World,
+    dofs: int,
+    ahead: int,
+    servos: Sequence[Servo] = (),
+    motors: Sequence[PD] = (),
+    dampers: Sequence[tuple[int, float]] = (),
+) -> FloatArray:
+    """Return the settings of a world, as an array for the law.
+
+    Args:
+        world: world.
+        dofs: number of degrees of freedom.
+        ahead: number of positions, less that of degrees of freedom.
+        servos: its Motors.
+        motors: its PDMotors.
+        dampers: damping of degrees of freedom, by these.
+    """
+    step, sweeps = world.time_step_s, max(1, world.solver_iterations)
+    counts = (len(servos), len(motors), len(dampers))
+    tables = [
+        *(value for servo in servos for value in servo),
+        *(value for dof, law, rotor in motors for value in (dof, *law, rotor)),
+        *(value for damper in dampers for value in damper),
+    ]
+    return np.array([step, abs(world.gravity_m_s2) * step, sweeps, dofs, ahead, *counts, *tables])
+
 
 SLIDES_M_S = 0.01
 """Speed along the ground above which a contact slides: a tenth of the speed that gravity adds in 1/100 s."""

@@ -18,8 +18,7 @@ from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.world import Joint, Motor, PDMotor, World
 from gaplab.services.engines.mujoco.engine import MuJoCo
 from gaplab.services.engines.mujoco.logs import unlogged
-from gaplab.services.engines.mujoco.model import GROUND, add_geom, named, outwards, scalar_first
-from gaplab.services.engines.mujoco.values import ROTOR, inertial
+from gaplab.services.engines.mujoco.model import GROUND, ROTOR, add_geom, inertial, named, outwards, scalar_first
 
 LOST = ("material.static_friction", "material.restitution", "motor.delay_s", "noise.")
 """How names of values begin that the file has no place for."""

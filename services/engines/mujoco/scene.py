@@ -11,13 +11,11 @@ from gaplab.services.core.kinematics import observed_poses, observes_base
 from gaplab.services.core.motions import Loop, Motion
 from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.world import World
-from gaplab.services.engines.exploding import checked_s, explodes
-from gaplab.services.engines.mujoco.controls import Controls
+from gaplab.services.engines.mujoco.controls import Controls, Looping
 from gaplab.services.engines.mujoco.law import drive_torques
-from gaplab.services.engines.mujoco.looping import Looping
-from gaplab.services.engines.mujoco.models import Models, Prepared
 from gaplab.services.engines.mujoco.pool import Pool
-from gaplab.services.engines.mujoco.states import TIME, States
+from gaplab.services.engines.mujoco.worlds import TIME, Models, Prepared, States
+from gaplab.services.engines.stepped import checked_s, explodes
 from gaplab.services.engines.stepping import plausible
 
 ROWS = 64

@@ -9,8 +9,8 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.motions import Tilt
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import USUALLY_IN_PLACE
+from gaplab.services.engines.physx.robot import MOST_SURFACES
 from gaplab.services.engines.physx.scene import PhysXScene, surface_names
-from gaplab.services.engines.physx.shapes import MOST_SURFACES
 from gaplab.services.engines.stepped import SteppedEngine
 
 

@@ -10,11 +10,9 @@ from gaplab.services.core.inertias import inertia_of, inverse_inertias
 from gaplab.services.core.kinematics import inverse, rotated, tilted_pose
 from gaplab.services.core.motions import LEVEL, Tilt
 from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.shapes import Quaternion, Vector
-from gaplab.services.core.world import Material, Motor, World
+from gaplab.services.core.world import Material, Motor, Quaternion, Vector, World
 from gaplab.services.engines.physx.drives import JointDrive, resists
-from gaplab.services.engines.physx.robot import build_robot, set_masses
-from gaplab.services.engines.physx.shapes import Handle, ground_groups, pose_of, set_offsets
+from gaplab.services.engines.physx.robot import Handle, build_robot, ground_groups, pose_of, set_masses, set_offsets
 
 BOUNCE_THRESHOLD_M_S = 0.2
 """Impacts slower than this do not bounce, as in Bullet. PhysX's default, 2 m/s, is faster than walking feet."""

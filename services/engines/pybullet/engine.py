@@ -8,8 +8,7 @@ from gaplab.services.core.motions import Tilt
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS, USUALLY_IN_PLACE
 from gaplab.services.engines.pybullet.robot import MOST_LINKS, links_of
-from gaplab.services.engines.pybullet.scene import PyBulletScene
-from gaplab.services.engines.pybullet.stick_slip import StickSlip
+from gaplab.services.engines.pybullet.scene import PyBulletScene, StickSlip
 from gaplab.services.engines.stepped import SteppedEngine
 
 

@@ -1,7 +1,12 @@
-"""A World in its own Bullet server, built once and reset before each rollout."""
+"""A World in its own Bullet server, built once and reset before each rollout.
+
+Bullet has one coefficient of friction. For a static and a dynamic one, each link in contact sticks or slides.
+"""
 
 from functools import partial
+from math import hypot
 from types import ModuleType
+from typing import Any, NamedTuple
 from weakref import finalize
 
 import numpy as np
@@ -10,10 +15,8 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import inverse, rotated, tilted_pose
 from gaplab.services.core.motions import LEVEL, Tilt
 from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.shapes import UNTURNED, Quaternion, Vector
-from gaplab.services.core.world import Material, Motor, World
-from gaplab.services.engines.pybullet.robot import BASE, build_robot, inertial_frame, set_masses
-from gaplab.services.engines.pybullet.torques import Torques
+from gaplab.services.core.world import UNTURNED, Material, Motor, Quaternion, Vector, World
+from gaplab.services.engines.pybullet.robot import BASE, Torques, build_robot, inertial_frame, set_masses
 
 FAR_AWAY = (0.0, 0.0, 1e4)
 """Position of the base, m, in which nothing touches the ground."""
@@ -212,3 +215,76 @@ class PyBulletScene:
 def _shared(gain: float, steps: int) -> float:
     """Return the share of an error to close in each of some steps, so that a share `gain` of it is closed in all."""
     return gain if steps == 1 else 1.0 - max(0.0, 1.0 - gain) ** (1.0 / steps)
+
+
+SLIDES = 0.999
+"""Share of the largest static friction above which a sticking link slides."""
+
+STICKS_AGAIN = 0.9
+"""Share of the largest dynamic friction below which a sliding link sticks again."""
+
+LINK, NORMAL_FORCE, FRICTION_1, FRICTION_2 = 3, 9, 10, 12
+"""Indices into a contact point from `getContactPoints`."""
+
+UNLOADED = (0.0, 0.0)
+
+
+class _Limits(NamedTuple):
+    """A link's coefficients, and the shares of its load at which it slides and sticks again."""
+
+    static: float
+    dynamic: float
+    slides_from: float
+    sticks_below: float
+
+    @classmethod
+    def of(cls, material: Material) -> "_Limits":
+        """Return the limits in a material."""
+        dynamic = material.dynamic_friction
+        static = max(material.static_friction, dynamic)
+        return cls(static, dynamic, SLIDES * static, STICKS_AGAIN * dynamic)
+
+
+class StickSlip:
+    """Steps a scene, and sets the coefficient of each link after each step: static or dynamic.
+
+    A link in contact first sticks. It slides when its friction reaches the static limit. It sticks again when its
+    friction is clearly below the dynamic limit, which shows that less was enough to hold it, or when it bears no load.
+    For a link with several contact points, their sums count.
+    """
+
+    def __init__(self, scene: PyBulletScene) -> None:
+        self._scene = scene
+        self._limits = {link: _Limits.of(material) for link, material in scene.materials.items()}
+        self._sliding: set[int] = set()
+
+    def step(self, count: int) -> None:
+        """Advance by a number of time steps."""
+        bullet, robot, client = self._scene.bullet, self._scene.robot, self._scene.client
+        advance, contacts = self._scene.advance, bullet.getContactPoints
+        for _ in range(count * self._scene.inner_steps):
+            advance()
+            self._switch(contacts(robot, physicsClientId=client))
+
+    def _switch(self, points: tuple[tuple[Any, ...], ...]) -> None:
+        bearing: dict[int, tuple[float, float]] = {}
+        for point in points:
+            if (normal := point[NORMAL_FORCE]) > 0.0:
+                load, friction = bearing.get(point[LINK], UNLOADED)
+                bearing[point[LINK]] = load + normal, friction + hypot(point[FRICTION_1], point[FRICTION_2])
+        for link, (load, friction) in bearing.items():
+            if link in self._sliding:
+                if friction < self._limits[link].sticks_below * load:
+                    self._stick(link)
+            elif friction >= self._limits[link].slides_from * load:
+                self._slide(link)
+        for link in self._sliding.difference(bearing):
+            self._stick(link)
+
+    def _stick(self, link: int) -> None:
+        self._sliding.remove(link)
+        self._scene.set_friction(link, self._limits[link].static)
+
+    def _slide(self, link: int) -> None:
+        self._sliding.add(link)
+        self._scene.set_friction(link, self._limits[link].dynamic)

@@ -17,7 +17,7 @@ from gaplab.services.store.models import (
     RepetitionRow,
     StudyRow,
 )
-from gaplab.services.store.queries import attachments, provenance, robots
+from gaplab.services.store.queries import attachments, attempts, robots
 
 Row = dict[str, Any]
 
@@ -34,7 +34,7 @@ _AT_ONCE = 500
 _LOCK = 0x67617069  # among the advisory locks of a Postgres database
 _REPETITIONS = Base.metadata.tables["repetition"]
 _SHARED: dict[str, Callable[[Session, Sequence[Row]], None]] = {
-    "provenance": provenance.insert_unless_there,
+    "provenance": attempts.insert_provenances,
     "robot": robots.insert_unless_there,
     "attachment": attachments.insert_unless_there,
 }

@@ -1,18 +1,26 @@
-"""Attempts: the history of a repetition's leases, written in the transactions that begin and end them."""
+"""Attempts: the history of a repetition's leases, written in the transactions that begin and end them.
 
-from collections.abc import Sequence
+Beside them are the provenances under which leases begin; each is stored once, under a hash of its facts.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
+from hashlib import sha256
+from typing import Any
 
 from sqlalchemy import func, insert, select, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.records import AttemptRead
 from gaplab.services.core.errors import NotFound
 from gaplab.services.store.clock import moment, now
-from gaplab.services.store.models import AttemptRow, RepetitionRow
+from gaplab.services.store.models import AttemptRow, ProvenanceRow, RepetitionRow
 from gaplab.services.store.queries.events import note
+from gaplab.services.store.statements import insert_new
 
 _EVENTS = {
     Ending.COMPLETED: EventKind.REPETITION_COMPLETED,
@@ -96,3 +104,13 @@ def attempts_of(session: Session, experiment: str, number: int, *, secret: bool 
         )
         for each in session.scalars(select(row).where(row.repetition_id == id_).order_by(row.epoch))
     )
+
+
+def provenance_id(provenance: Provenance) -> str:
+    """Return the id of a provenance: a hash of its facts."""
+    return sha256(json.dumps(provenance.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()[:16]
+
+
+def insert_provenances(session: Session, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Add provenances whose ids are new; an equal id means equal facts."""
+    session.execute(insert_new(session, ProvenanceRow), [dict(row) for row in rows])

@@ -4,17 +4,29 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from secrets import choice
+from typing import Any
 
-from sqlalchemy import event, insert, or_, select
+from sqlalchemy import ColumnElement, Select, event, insert, literal_column, or_, select
 from sqlalchemy.orm import QueryContext, Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
+from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
 from gaplab.schemas.spec import Schedule
-from gaplab.services.core.errors import Conflict, NotFound, StoreUnavailable
+from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.store.clock import moment
-from gaplab.services.store.models import DeletionRow, ExperimentRow, RepetitionRow, StudyRow
+from gaplab.services.store.database_errors import StoreUnavailable
+from gaplab.services.store.models import (
+    LOG,
+    AnswerRow,
+    DeletionRow,
+    ExperimentRow,
+    RepetitionRow,
+    StepKind,
+    StepRow,
+    StudyRow,
+)
 from gaplab.services.store.queries import robots
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
@@ -245,3 +257,36 @@ def _admit(row: ExperimentRow, context: QueryContext) -> None:
         msg += f"{SPEC_VERSION}: use a later gaplab with this database"
         raise StoreUnavailable(msg)
     robots.learn(context.session, [row.spec])
+
+
+MEASURED = {MeasurementKind.SAMPLE: StepKind.MEASURED, MeasurementKind.PROBE: StepKind.PROBED}
+"""The kind of step that a measurement is."""
+
+
+def of_experiments(row: type[AnswerRow | StepRow], experiments: Sequence[str], *columns: Any) -> Select[Any]:  # noqa: ANN401
+    """Return a query for columns of a table, joined with the repetitions of these experiments."""
+    joined = select(*columns).join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+    return joined.where(RepetitionRow.experiment_id.in_(experiments))
+
+
+def in_log(row: type[StepRow], kind: StepKind) -> ColumnElement[bool]:
+    """Return the condition that a step is in the log, and of a kind.
+
+    Its values are part of the statement, so that databases know that the index of the curve serves it.
+    """
+    return (row.branch == literal_column(str(LOG))) & (row.kind == literal_column(f"'{kind.value}'"))
+
+
+def steps_of(experiments: Sequence[str], kind: StepKind, *columns: Any) -> Select[Any]:  # noqa: ANN401
+    """Return a query for columns of the steps of a kind in the logs of these experiments."""
+    return of_experiments(StepRow, experiments, *columns).where(in_log(StepRow, kind))
+
+
+def same_log(step: type[StepRow], other: type[StepRow], kind: StepKind) -> ColumnElement[bool]:
+    """Return the condition that another step is of the same log, and of a kind."""
+    return (other.repetition_id == step.repetition_id) & in_log(other, kind)
+
+
+def best(tuned: type[StepRow]) -> ColumnElement[Any]:
+    """Return the best simulator in the body of a tuned step, read without the others."""
+    return tuned.body["simulators", 0]

@@ -8,9 +8,9 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.records import MeasurementKind
-from gaplab.services.core.held_out import is_held_out
+from gaplab.services.core.tuning import is_held_out
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, RequestRow, StepKind, StepRow
-from gaplab.services.store.queries.repetition_rows import MEASURED, best, same_log, steps_of
+from gaplab.services.store.queries.experiments import MEASURED, best, same_log, steps_of
 
 
 @dataclass(frozen=True)

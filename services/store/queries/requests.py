@@ -1,25 +1,86 @@
-"""Rows of requests for physical measurements, and of their answers."""
+"""Rows of requests for physical measurements, and of their answers; only this module writes their states.
+
+request   open ──> taken ──> measured, failed        a void asks again: back to open
+            └────────┴─────> withdrawn;  stuck, after too many takes without an answer, until a person opens it
+answer    conflict ──> counted ──> replaced, void;  or conflict ──> dismissed
+
+However the name of a bench is spaced and capitalised, it is one bench, and spelled as it was first written.
+"""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any
 
-from sqlalchemy import ColumnElement, select, union_all
+from sqlalchemy import ColumnElement, case, func, select, union_all, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import AnswerState, RequestState
-from gaplab.services.core.errors import NotFound
-from gaplab.services.store.clock import moment
+from gaplab.services.core.errors import Conflict, NotFound
+from gaplab.services.store.clock import moment, now
 from gaplab.services.store.lease import Claim, Requested
 from gaplab.services.store.models import AnswerRow, RepetitionRow, RequestRow
-from gaplab.services.store.queries import request_states
-from gaplab.services.store.queries.benches import spellings
 from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.experiments import lock, new_id
+from gaplab.services.store.queries.experiments import lock, new_id, of_experiments
 from gaplab.services.store.queries.logs import vector
-from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.queries.request_states import ANSWERED as ANSWERED
-from gaplab.services.store.queries.request_states import PENDING as PENDING
 from gaplab.services.store.statements import storable
+
+PENDING = (RequestState.OPEN, RequestState.TAKEN, RequestState.STUCK)
+"""States of a request that is still wanted."""
+
+LET_GO_S = 60.0
+"""Longest time for which a silent holder keeps the bench of a request that is wanted no more."""
+
+ANSWERED = (RequestState.MEASURED, RequestState.FAILED)
+
+_ENDS = frozenset({*ANSWERED, RequestState.WITHDRAWN})
+
+REQUEST_MOVES = {
+    RequestState.OPEN: _ENDS | {RequestState.TAKEN},
+    RequestState.TAKEN: _ENDS | {RequestState.OPEN, RequestState.STUCK},
+    RequestState.STUCK: _ENDS | {RequestState.OPEN},
+    RequestState.MEASURED: _ENDS | {RequestState.OPEN},
+    RequestState.FAILED: _ENDS | {RequestState.OPEN},
+    RequestState.WITHDRAWN: frozenset[RequestState](),
+}
+
+ANSWER_MOVES = {
+    AnswerState.CONFLICT: {AnswerState.COUNTED, AnswerState.DISMISSED},
+    AnswerState.COUNTED: {AnswerState.REPLACED, AnswerState.VOID},
+}
+
+
+def become(session: Session, row: RequestRow, to: RequestState, **values: Any) -> None:  # noqa: ANN401 - columns of any type
+    """Move a locked request to a state, and set further columns.
+
+    Raises:
+        Conflict: the move is not permitted.
+    """
+    if to not in REQUEST_MOVES[row.state]:
+        raise Conflict(f"request {row.id} is {row.state.value} and cannot become {to.value}")
+    row.state = to
+    for name, value in values.items():
+        setattr(row, name, value)
+    session.flush()
+
+
+def judge(session: Session, row: AnswerRow, to: AnswerState, reason: str) -> None:
+    """Move an answer of a locked request to a state, for a reason.
+
+    Raises:
+        Conflict: the move is not permitted.
+    """
+    if to not in ANSWER_MOVES.get(row.state, ()):
+        raise Conflict(f"measurement {row.id} is {row.state.value} and cannot become {to.value}")
+    row.state, row.reason = to, reason
+    session.flush()
+
+
+def withdraw(session: Session, which: ColumnElement[bool]) -> None:
+    """Withdraw the requests of a condition that are still wanted; its holder has the bench until he lets go."""
+    row = RequestRow
+    values = {"ended_at": now(), "lease_s": case((row.lease_s > LET_GO_S, LET_GO_S), else_=row.lease_s)}
+    session.execute(update(row).where(which, row.state.in_(PENDING)).values(state=RequestState.WITHDRAWN, **values))
+
 
 MOST_UNANSWERED = 5
 """Takes in a row without an answer, after which a request is not offered until a person opens it again."""
@@ -142,7 +203,7 @@ def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> 
         return
     unanswered = row.unanswered + (kind is EventKind.TAKE_EXPIRED)
     to = RequestState.STUCK if unanswered >= MOST_UNANSWERED else RequestState.OPEN
-    request_states.become(session, row, to, held=None, unanswered=unanswered)
+    become(session, row, to, held=None, unanswered=unanswered)
     note_take(session, row, kind, **more)
 
 
@@ -182,3 +243,15 @@ def doubtful(session: Session, experiments: Sequence[str]) -> dict[str, tuple[st
         what = f"correct the measurement {id_}, or confirm it: gaplab decide {id_} this --reason …"
         found[experiment] = (*found.get(experiment, ()), f"{where}; {what}")
     return found
+
+
+def bench_key(bench: str) -> str:
+    """Return what the spellings of a bench share."""
+    return " ".join(storable(bench).split()).casefold()[:200]
+
+
+def spellings(session: Session, bench: str | None = None) -> list[str]:
+    """Return how requests spell a bench, or all benches if it is None; the first written is the first."""
+    row = RequestRow
+    found = session.scalars(select(row.bench).group_by(row.bench).order_by(func.min(row.created_at)))
+    return [each for each in found if bench is None or bench_key(each) == bench_key(bench)]

@@ -16,8 +16,8 @@ from gaplab.services.core.repeats import standard_error
 from gaplab.services.core.stored_specs import discrepancy_of
 from gaplab.services.store.cursor import decode, encode, key_of
 from gaplab.services.store.models import LOG, ExperimentRow, RepetitionRow, StepKind, StepRow
+from gaplab.services.store.queries.experiments import MEASURED, in_log, of_experiments, same_log, steps_of
 from gaplab.services.store.queries.logs import simulator_of
-from gaplab.services.store.queries.repetition_rows import MEASURED, in_log, of_experiments, same_log, steps_of
 from gaplab.services.store.queries.tunings import intervals, measured, per_sample
 
 _ASKED = RepetitionRow.experiment_id.in_(bindparam("experiments", expanding=True))

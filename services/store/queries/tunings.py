@@ -9,13 +9,13 @@ from sqlalchemy.orm import Session, aliased
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.discrepancies.base import Discrepancy
-from gaplab.services.core.held_out import is_held_out, seen_of
-from gaplab.services.core.misspecification import widened
+from gaplab.services.core.linear_models import widened
 from gaplab.services.core.space import Space
+from gaplab.services.core.tuning import is_held_out, seen_of
 from gaplab.services.core.types import Simulator
 from gaplab.services.store.models import LOG, ExperimentRow, RepetitionRow, StepKind, StepRow
+from gaplab.services.store.queries.experiments import best, of_experiments, same_log, steps_of
 from gaplab.services.store.queries.logs import simulator_of
-from gaplab.services.store.queries.repetition_rows import best, of_experiments, same_log, steps_of
 
 
 @dataclass(frozen=True)

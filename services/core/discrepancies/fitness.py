@@ -1,4 +1,4 @@
-"""A discrepancy that one mistyped number does not move."""
+"""Discrepancies of fitness: the paper's, that of Back-to-Reality, and one that a mistyped number does not move."""
 
 from typing import Annotated
 
@@ -8,6 +8,42 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, Outcomes
 from gaplab.services.core.discrepancies.base import Discrepancy
+
+
+class SquaredFitness(Discrepancy):
+    """The squared difference between simulated and real fitness."""
+
+    name = "squared_fitness"
+    source = "Paper, section 2: the denominator of f(sim)"
+    squares = True
+
+    def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:  # noqa: ARG002 - the contract's
+        """Return the squared differences, in the unit of fitness squared."""
+        return (simulated[..., 0] - measured[:, None, 0]) ** 2
+
+    def residuals(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:  # noqa: ARG002 - the contract's
+        """Return the differences, one for each sample."""
+        return simulated[..., :1] - measured[:, None, :1]
+
+
+class AbsoluteFitness(Discrepancy):
+    """The absolute difference between simulated and real fitness: one odd sample weighs less than if squared."""
+
+    name = "absolute_fitness"
+    source = "Zagal, Ruiz-del-Solar and Vallejos 2004, as surveyed"
+    error_text = "mean absolute difference between fitness in simulation and in reality"
+
+    def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:  # noqa: ARG002 - the contract's
+        """Return the absolute differences, in the unit of fitness."""
+        return np.abs(simulated[..., 0] - measured[:, None, 0])
+
+    def floor(self, error: float) -> float:
+        """Return the error itself."""
+        return error
+
+    def error(self, term: float) -> float:
+        """Return the term itself."""
+        return term
 
 
 class HuberOptions(Frozen):

@@ -1,0 +1,119 @@
+"""What a submitted spec gets where it names none: an engine, tunables with their bounds, and a reality."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.resolved import ResolvedReality, ResolvedTunable
+from gaplab.schemas.spec import ExperimentSpec, SharedSettings
+from gaplab.services.core.registry import Registry
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.tunables.labels import label_of, proper, tunable_of
+from gaplab.services.core.world import World
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
+
+
+def default_engine(robot: Robot | type[Robot]) -> str:
+    """Return the engine that the robot names, or another of gaplab's own if that one cannot run its world here.
+
+    PyBullet has no wheels for Python 3.12 and later. There, the quadruped's engine is MuJoCo. The resolved spec records
+    the choice, so a stored experiment does not depend on it.
+    """
+    world = (robot.example() if isinstance(robot, type) else robot).world
+    named = engines.get(robot.engine)
+    if named is None or (named.available() and runs(named, world) and not named.lacks(world)):
+        return robot.engine
+    others = (name for name, engine in engines.own.items() if engine.available())
+    able = (name for name in others if runs(engines[name], world) and not engines[name].lacks(world))
+    return next(able, robot.engine)
+
+
+def runs(engine: type[Engine], world: World) -> bool:
+    """Return whether the engine can run a robot's world; one that raises cannot."""
+    try:
+        return engine.runs(world)
+    except Exception:  # noqa: BLE001 - an external engine concerns only the specs that name it
+        return False
+
+
+def with_usual_tunables(spec: ExperimentSpec, robot: Robot) -> ExperimentSpec:
+    """Return the spec with the robot's usual tunables, if it names none and the robot has some."""
+    if "tunables" in spec.model_fields_set or not robot.usual_tunables:
+        return spec
+    return spec.model_copy(update={"tunables": tuple(TunableRef(name=label) for label in robot.usual_tunables)})
+
+
+def shared_fields(spec: SharedSettings, names: Iterable[str]) -> dict[str, Any]:
+    """Return fields of a study's spec, or of a check's, for an experiment; tunables that it leaves out stay so."""
+    left_out = set() if "tunables" in spec.model_fields_set else {"tunables"}
+    return {name: getattr(spec, name) for name in names if name not in left_out}
+
+
+def with_bounds(ref: TunableRef, robot: Robot) -> ResolvedTunable:
+    """Return a tunable by its proper label, with its bounds."""
+    tunable = tunable_of(ref.name)
+    lower, upper = bounds_of(ref, tunable, robot)
+    return ResolvedTunable(name=label_of(tunable), lower=lower, upper=upper)
+
+
+def bounds_of(ref: TunableRef, tunable: Tunable, robot: Robot) -> tuple[float, float]:
+    """Return the bounds of a tunable; a missing one is the tunable's own for the robot."""
+    lower, upper = tunable.bounds(robot.world)
+    return lower if ref.lower is None else ref.lower, upper if ref.upper is None else ref.upper
+
+
+def honoured(tunable: Tunable, engine: type[Engine]) -> bool:
+    """Return whether a tunable changes what an engine simulates; noise is put into motions, so each engine has it."""
+    return tunable.field == "noise" or tunable.field in engine.honours
+
+
+SIMULATED_PROBES, PHYSICAL_PROBES = "each", "last"
+"""Which transferred controllers are measured by default."""
+
+
+def completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:
+    """Return the reference with every option, as specs name it."""
+    _, options = registry.check(ref)
+    return PluginRef(name=ref.name, options=options.model_dump(mode="json", by_alias=True))
+
+
+def simulated_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine: type[Engine]) -> ResolvedReality:
+    """Return a simulated reality with every field."""
+    return ResolvedReality(
+        kind="simulated",
+        engine=completed(engines, ref),
+        parameters=_truth(spec, robot, engine),
+        bench=None,
+        repeats=1,
+        probes=spec.reality.probes or SIMULATED_PROBES,
+        samples=(),
+        limits=None,
+        beyond="warn",
+    )
+
+
+def physical_reality(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
+    """Return a physical reality with every field."""
+    return ResolvedReality.filled_from(
+        spec.reality,
+        engine=None,
+        parameters={},
+        bench=spec.reality.bench or robot.label,
+        probes=spec.reality.probes or ("never" if spec.iterations == 0 else PHYSICAL_PROBES),
+    )
+
+
+def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str, float]:
+    """Return the given parameters of reality, and the robot's for other tunables that reality's engine honours.
+
+    A group of unequal parts has no number that would leave the robot as it is: reality has none then.
+    """
+    world = robot.world
+    nominal = {
+        label_of(tunable): value
+        for tunable in (tunable_of(ref.name) for ref in spec.tunables)
+        if honoured(tunable, engine) and tunable.edit(world, value := tunable.read(world)) == world
+    }
+    return {**nominal, **{proper(label): value for label, value in spec.reality.parameters.items()}}
