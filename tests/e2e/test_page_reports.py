@@ -112,9 +112,9 @@ def test_a_report_is_saved_with_the_verdict_that_the_service_gives(api: Any, kno
 
 
 @pytest.mark.release
-@pytest.mark.parametrize("of", ["experiments", "studies"])
+@pytest.mark.parametrize("of", ["experiment", "study"])
 def test_a_report_is_printed_whole_on_a4(archive: Any, study: Any, walker: Any, visit: Any, of: str) -> None:
-    page = visit(f"{archive.url}/{of}/{study['id'] if of == 'studies' else walker}/report", width=PRINTED_PX)
+    page = visit(f"{archive.url}/studies/{study['id'] if of == 'study' else walker}/report", width=PRINTED_PX)
     page.emulate_media(media="print")
 
     fits(page)

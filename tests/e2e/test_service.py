@@ -197,7 +197,8 @@ def test_after_an_edit_a_service_of_an_author_starts_again_and_a_person_may_acce
     waiting = service.get(path)
     assert waiting["state"] == "RUNNING"
     assert waiting["progress"]["iterations_done"] < 2 * 5
-    assert service.http.post(f"{path}/accept-versions").status_code == 200
+    study = path.replace("experiments", "studies")
+    assert service.http.post(f"{study}/accept-versions").status_code == 200
     ended = service.finish(path)
     assert (ended["state"], ended["warnings"]) == ("COMPLETED", [])
     first, *_, last = (each["provenance"]["outside"] for each in service.get(f"{path}/provenance")["uses"])

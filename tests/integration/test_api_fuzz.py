@@ -102,7 +102,6 @@ def test_no_bytes_make_the_service_fail(api: TestClient, body: bytes) -> None:
 @given(
     path=st.sampled_from(
         [
-            "/experiments",
             "/studies",
             "/curves",
             "/comparisons",

@@ -173,7 +173,7 @@ def test_links_of_notifications_have_the_port_of_the_command(
         process.terminate()
         process.communicate(timeout=LONGEST_S)
 
-    assert json.loads(told.read_text())["url"] == f"http://127.0.0.1:{port}/#/experiments/{made}"
+    assert json.loads(told.read_text())["url"] == f"http://127.0.0.1:{port}/#/studies/{made}"
 
 
 def seen(file: Path) -> bool:

@@ -166,8 +166,9 @@ WITH_A_TOKEN = """
 import os, subprocess, sys, time
 from ray.cluster_utils import Cluster
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.experiments import reading, submission
+from gaplab.services.experiments import reading
 from gaplab.services.store.session import Store
+from tests.experiments import submit_one
 
 spec = ExperimentSpec.model_validate_json(sys.argv[1])
 store = Store(os.environ["GAPLAB_DATABASE_URL"])
