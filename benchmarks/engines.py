@@ -11,12 +11,9 @@ from mujoco import rollout as library
 
 from benchmarks.measure import Row, compared
 from gaplab.services.core.arrays import Genomes
-from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.search import maximise
 from gaplab.services.core.streams import stream
-from gaplab.services.core.tunables import tunables
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco.scene import MuJoCoScene
@@ -24,6 +21,9 @@ from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.specs.simulation import Simulation
+from gaplab.services.world.motions import Motion, open_loop
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.tunables import tunables
 
 ROBOT = Quadruped()
 TUNED = ("static_friction", "dynamic_friction", "restitution")

@@ -15,12 +15,12 @@ from rich.table import Table
 
 from benchmarks.archives import import_file, private_store
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.results.comparisons import compare
 from gaplab.services.results.curves import curves
 from gaplab.services.results.tuned_simulators import TunedSimulators, tuned_simulators
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator
 from gaplab.services.store.session import Store

@@ -3,7 +3,7 @@
 Only physics is counted. Let W be the work of a computation in core-seconds, and S the seconds of its longest chain of
 dependent steps. On P cores it takes at least max(W / P, S), and at most W / P + S if no core idles while there is work
 (Brent 1974). The longest chain is a repetition of *informative*: one newcomer after another, where
-`gaplab.workers.pool` distributes the rollouts of one newcomer.
+`gaplab.workers.lending` distributes the rollouts of one newcomer.
 """
 
 from collections.abc import Iterator
@@ -20,11 +20,11 @@ from benchmarks.engines import ROBOT, TUNED, genomes, simulation
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.arrays import Parameters
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.resolution import resolve
-from gaplab.workers.pool import LEAST_S
+from gaplab.services.world.tunables import tunables
+from gaplab.workers.lending import LEAST_S
 
 CORES = (2, 16, 64, 1_000)
 FIGURE_4 = StudySpec(direct_repetitions=100)

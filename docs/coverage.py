@@ -12,16 +12,14 @@ from dataclasses import replace
 import numpy as np
 from rich.console import Console
 
-from gaplab.schemas.misfit import Identification
 from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.results import Identification
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.discrepancies.readings import Readings
 from gaplab.services.core.linear_models import fit_of, widened
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.space import Space
-from gaplab.services.core.tunables.labels import tunable_of
 from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.gauss_newton import GaussNewton
 from gaplab.services.core.tuning import Misfit
@@ -30,6 +28,8 @@ from gaplab.services.engines import engines
 from gaplab.services.findings.identification import Means, verdicts
 from gaplab.services.findings.misfit import Doubt, Tuning, doubt, misfit_point
 from gaplab.services.specs.simulation import Simulation
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.tunables.labels import tunable_of
 
 TUNABLES = {"dynamic_friction": (0.0, 1.5), "restitution": (0.0, 0.6), "motor_gain": (0.3, 3.0)}
 SPACE = Space.box(*zip(*TUNABLES.values(), strict=True))

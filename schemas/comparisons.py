@@ -1,12 +1,13 @@
-"""Two experiments, compared: tests, intervals, and equivalence within a margin."""
+"""Experiments, compared: tests, intervals, equivalence within a margin, columns of tables, and verdicts."""
 
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Literal
 
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Id, Name, Statistic, Unit
-from gaplab.schemas.curves import Fitness
+from gaplab.schemas.results import Fitness
 
 
 class Found(StrEnum):
@@ -206,3 +207,104 @@ class Comparison(Groups, Pair):
     def is_equivalent(self) -> bool:
         """Whether the two are shown to be equivalent within the margin that was asked for."""
         return self.equivalence is not None and self.equivalence.verdict is EquivalenceVerdict.EQUIVALENT
+
+
+UNPAIRED = ("student", "welch", "mann_whitney")
+PAIRED = ("paired_t", "wilcoxon")
+TESTS = (*UNPAIRED, *PAIRED, "brown_forsythe")
+NAMES = {
+    "student": "Student",
+    "welch": "Welch",
+    "mann_whitney": "Mann-Whitney",
+    "paired_t": "Paired t",
+    "wilcoxon": "Wilcoxon",
+    "brown_forsythe": "Brown-Forsythe",
+}
+"""What a table calls each test; Brown and Forsythe's is of the spread."""
+
+_OF_A_TEST = ("statistic", "degrees_of_freedom", "p", "p_holm")
+_OF_AN_ESTIMATE = ("value", "lower", "upper")
+
+_GROUPS = ("n_first", "n_second", "difference", "effect_size")
+_SUMMARIES = tuple(
+    path
+    for side in ("summary_first", "summary_second")
+    for path in (
+        f"{side}.sd",
+        *(f"{side}.{number}.{part}" for number in ("mean", "interquartile_mean") for part in _OF_AN_ESTIMATE),
+    )
+)
+_PATHS = (
+    *("first", "first_name", "second", "second_name", "from_evaluations", "to_evaluations", "fitness"),
+    *_GROUPS,
+    *(f"{test}.{part}" for test in TESTS for part in _OF_A_TEST),
+    *("lower", "upper", *(f"improvement.{part}" for part in _OF_AN_ESTIMATE)),
+    *("shared_streams", "n_paired", "trusted.test", "trusted.p", "trusted.p_holm"),
+    *_SUMMARIES,
+    *(f"equivalence.{part}" for part in ("margin", "test", "p", "p_holm", "verdict")),
+    *(f"pooled.{part}" for part in (*_GROUPS, *(f"{test}.{each}" for test in UNPAIRED for each in _OF_A_TEST))),
+)
+
+COLUMNS = tuple(path.removesuffix(".value").replace(".", "_") for path in _PATHS)
+_NAMES = {"first", "first_name", "second", "second_name", "fitness"}
+TEXTS = frozenset({*_NAMES, "trusted_test", "equivalence_test", "equivalence_verdict"})
+
+
+def shown_tests(pairs: Sequence[Comparison]) -> tuple[str, ...]:
+    """Return the tests to show of these pairs: paired ones only if two experiments share their random streams."""
+    shared = any(pair.shared_streams for pair in pairs)
+    return tuple(test for test in TESTS if shared or test not in PAIRED)
+
+
+def row(pair: Comparison) -> tuple[object, ...]:
+    """Return the values of a pair in the order of `COLUMNS`; a missing part has None in each of its columns."""
+    return tuple(_value(pair, path) for path in _PATHS)
+
+
+def _value(pair: Comparison, path: str) -> object:
+    value: object = pair
+    for name in path.split("."):
+        value = None if value is None else getattr(value, name)
+    return value
+
+
+class Trend(StrEnum):
+    """The end of a curve; `too_few`: too few repetitions or evaluations to say."""
+
+    RISING = "rising"
+    FLAT = "flat"
+    FALLING = "falling"
+    UNCLEAR = "unclear"
+    TOO_FEW = "too_few"
+
+
+class TrendRead(Frozen):
+    """The end of one curve, by the paired gain of its repetitions."""
+
+    experiment: Id
+    name: Name
+    trend: Trend
+    n: int = Field(description="repetitions with a value at both ends of the gain", examples=[20])
+    since: int | None = Field(description="number of evaluations at which the gain begins", examples=[3])
+    last: int = Field(description="number of evaluations at which the gain ends", examples=[10])
+    gain: Statistic = Field(description="mean gain in recorded fitness between the two")
+    lower: Statistic = Field(description="lower end of its 95 % interval, by Student's t")
+    upper: Statistic = Field(description="upper end of that interval")
+    continuing: bool | None = Field(description="whether continuing is worthwhile; null: the data do not say")
+    sentence: str = Field(examples=["Random is flat since iteration 3; not worth continuing."])
+
+
+class VerdictRead(Frozen):
+    """The verdict, computed by stated rules from curves and tests."""
+
+    headline: str = Field(examples=["No pair differs at 10 real-world evaluations."])
+    sentences: tuple[str, ...] = Field(examples=[("Simulated fit reaches 94 % of the direct baseline.",)])
+    trends: tuple[TrendRead, ...]
+    evaluations: int | None = Field(
+        description="last number of real-world evaluations that the experiments share; strategies are compared there; "
+        "null without results",
+        examples=[10],
+    )
+    rules: tuple[str, ...] = Field(
+        description="the rules of the verdict", examples=[("A pair differs if its p after Holm is below 0.05.",)]
+    )

@@ -9,11 +9,11 @@ import numpy as np
 
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.robots import robots
 from gaplab.services.core.types import Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.session import Store
+from gaplab.services.world.robots import robots
 from tests.experiments import submit_one
 
 ENGINE = '''
@@ -22,8 +22,8 @@ ENGINE = '''
 import numpy as np
 
 from gaplab.plugins import Engine, Trajectory
-from gaplab.services.core.kinematics import observed_poses
-from gaplab.services.core.motions import Recording
+from gaplab.services.world.kinematics import observed_poses
+from gaplab.services.world.motions import Recording
 from gaplab.services.engines.base import ALL_FIELDS
 
 

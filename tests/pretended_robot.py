@@ -16,10 +16,10 @@ from gaplab import MeasurementFailed
 from gaplab.api.clients.motions import DriverMotion
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.robots import robots
-from gaplab.services.core.world import Material
 from gaplab.services.specs.assembly import engine_of
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.robots import robots
+from gaplab.services.world.world import Material
 
 SETTINGS = "PRETENDED_ROBOT"
 

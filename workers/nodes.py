@@ -17,13 +17,13 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.provenance import Provenance
-from gaplab.services.core import robot_library
 from gaplab.services.plugins import folders
 from gaplab.services.plugins.external import unavailable
 from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.running.versions import Versions as Versions
 from gaplab.services.running.versions import named_versions, plugin_versions
 from gaplab.services.running.versions import versions as versions
+from gaplab.services.world import robot_library
 from gaplab.workers.errors import ClusterUnusable
 
 ANSWER_S = 60.0

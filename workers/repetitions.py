@@ -9,8 +9,8 @@ from time import monotonic
 import ray
 
 from gaplab.services.core.errors import Conflict
+from gaplab.services.experiments.lease_ends import Silences
 from gaplab.services.running import execution
-from gaplab.services.running.leases import Silences
 from gaplab.services.specs.blame import describe
 from gaplab.services.specs.rollouts import hardware_of
 from gaplab.services.store.database_errors import StoreUnavailable

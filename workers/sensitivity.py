@@ -10,8 +10,8 @@ from ray.exceptions import RayError, RayTaskError
 
 from gaplab.schemas.sensitivity import Checked, Sensitivity
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.sensitivity import Effort
-from gaplab.services.core.sensitivity import check as check_tunables
+from gaplab.services.findings.sensitivity import Effort
+from gaplab.services.findings.sensitivity import check as check_tunables
 from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.running import sensitivity
 from gaplab.services.running.execution import STALE_AFTER_S

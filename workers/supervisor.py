@@ -14,9 +14,9 @@ from secrets import token_hex
 from threading import Event
 from time import monotonic, sleep
 
-from gaplab.services.bench.taking import open_again
+from gaplab.services.experiments.lease_ends import Silences
+from gaplab.services.measuring.taking import open_again
 from gaplab.services.running import execution, supervisors
-from gaplab.services.running.leases import Silences
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.database_errors import StoreChanged, StoreUnavailable
 from gaplab.services.store.session import Store

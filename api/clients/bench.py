@@ -11,8 +11,7 @@ from gaplab.api.clients.driving import Driving, TakenRequest
 from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.mcap_traces import mcap_to_csv
 from gaplab.api.clients.records import Records
-from gaplab.schemas.corrections import BranchRead, Consequences
-from gaplab.schemas.measurements import AnswerRead, AttachmentRead, DoubtsRead, RequestRead
+from gaplab.schemas.measurements import AnswerRead, AttachmentRead, BranchRead, Consequences, DoubtsRead, RequestRead
 from gaplab.schemas.records import Page
 from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.traces import TracesRead

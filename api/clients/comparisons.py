@@ -3,9 +3,8 @@
 from typing import TYPE_CHECKING
 
 from gaplab.api.clients.frames import frame
-from gaplab.schemas.comparison_columns import COLUMNS, TEXTS, row
-from gaplab.schemas.comparisons import Comparison
-from gaplab.services.core.csv_tables import csv_text
+from gaplab.schemas.comparisons import COLUMNS, TEXTS, Comparison, row
+from gaplab.services.csv_tables import csv_text
 from gaplab.services.findings.tables import comparison, latex
 
 if TYPE_CHECKING:

@@ -4,10 +4,8 @@ from collections.abc import Iterable
 
 from gaplab.api.clients.connection import Connection, Of, segment
 from gaplab.api.clients.records import Records
-from gaplab.schemas.editing import DeletionRead
-from gaplab.schemas.notifications import WebhookRead
+from gaplab.schemas.keeping import DeletionRead, Order, ViewRead, WebhookRead
 from gaplab.schemas.records import StudyRead
-from gaplab.schemas.views import Order, ViewRead
 
 
 class Keeping:

@@ -8,7 +8,7 @@ from typing import Any
 
 from gaplab.api.clients.errors import library
 from gaplab.schemas.traces import TRACE_COLUMNS
-from gaplab.services.core.csv_tables import csv_text
+from gaplab.services.csv_tables import csv_text
 
 POSES = {
     "geometry_msgs/msg/PoseStamped",

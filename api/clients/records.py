@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gaplab.api.clients.connection import CONFIRMED, Connection, Of, segment
-from gaplab.schemas.editing import Edit
+from gaplab.schemas.keeping import Edit
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import AttemptRead, ExperimentRead, Page, RepetitionRead, StudyRead

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from gaplab.api.clients.connection import Connection, Of, segment
-from gaplab.schemas.reports import VerdictRead
+from gaplab.schemas.comparisons import VerdictRead
 
 
 class Reports:

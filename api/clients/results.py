@@ -8,11 +8,9 @@ from pydantic import BaseModel
 from gaplab.api.clients.comparisons import Comparisons
 from gaplab.api.clients.connection import Connection, Of, Parameter, id_of, segment
 from gaplab.schemas.comparisons import Comparison
-from gaplab.schemas.curves import Curve
 from gaplab.schemas.differences import SpecDiff
-from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.records import Page
-from gaplab.schemas.results import SimulatorRead
+from gaplab.schemas.results import Curve, MisfitRead, SimulatorRead
 
 Several: TypeAlias = Of | Sequence[Of]
 

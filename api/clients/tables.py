@@ -8,9 +8,9 @@ from gaplab.api.clients.connection import Connection, Of, id_of, segment
 from gaplab.api.clients.errors import library
 from gaplab.api.clients.frames import frame
 from gaplab.api.clients.results import PAGE, Results
-from gaplab.schemas.curves import CurvePoint
 from gaplab.schemas.records import ExperimentRead, Page, SampleRead, SensorsRead, SimulatorRead
 from gaplab.schemas.replays import Prediction, Predictions
+from gaplab.schemas.results import CurvePoint
 
 if TYPE_CHECKING:
     import pandas

@@ -16,10 +16,9 @@ from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import echo, print_result
 from gaplab.api.commands.questions import confirmed
 from gaplab.api.commands.request_words import print_safety, request_table, request_words, stored_words
-from gaplab.schemas.corrections import Consequences
-from gaplab.schemas.measurements import RequestRead
+from gaplab.schemas.measurements import Consequences, RequestRead
 from gaplab.schemas.traces import TracesRead
-from gaplab.services.core.csv_tables import finite
+from gaplab.services.csv_tables import finite
 
 RequestId = Annotated[str, typer.Argument(metavar="REQUEST", help="a request, as `gaplab requests` lists it")]
 AnswerId = Annotated[str, typer.Argument(metavar="MEASUREMENT", help="a measurement, as `gaplab requests ID` lists it")]

@@ -13,7 +13,7 @@ from gaplab.api.clients.screen import console
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import RESULTS, AsJson, Ids, Url, app, connect
 from gaplab.api.commands.json_output import echo, print_json
-from gaplab.schemas.curves import Fitness
+from gaplab.schemas.results import Fitness
 from gaplab.services.findings.tables import comparison
 
 

@@ -9,8 +9,8 @@ from gaplab.api.commands.app import KEEPING, RESULTS, AsJson, Id, Url, app, conn
 from gaplab.api.commands.json_output import print_result
 from gaplab.api.commands.questions import demand_yes
 from gaplab.api.commands.tables import table
+from gaplab.schemas.keeping import Order, ViewRead
 from gaplab.schemas.records import StudyRead
-from gaplab.schemas.views import Order, ViewRead
 
 ViewName = Annotated[str, typer.Argument(metavar="NAME", help="name of the view")]
 

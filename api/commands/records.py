@@ -11,11 +11,11 @@ from gaplab.api.commands import tables
 from gaplab.api.commands.app import LIFE, RESULTS, SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import echo, print_json, print_result
-from gaplab.schemas.editing import Edit
-from gaplab.schemas.misfit import TunableVerdict
+from gaplab.schemas.keeping import Edit
 from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.provenance import ProvenanceUse
 from gaplab.schemas.records import StudyRead
+from gaplab.schemas.results import TunableVerdict
 from gaplab.services.findings.tables import tuned
 
 

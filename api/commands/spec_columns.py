@@ -11,10 +11,10 @@ from gaplab.schemas.mistakes import pointer_to, sentence
 from gaplab.schemas.spec import ExperimentSpec, StudySpec, kind_of
 from gaplab.services.archives.reading import archived_specs
 from gaplab.services.core.errors import InvalidArchive, InvalidSpec
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins import folders
 from gaplab.services.specs.differences import SpecColumn
 from gaplab.services.specs.resolution import resolve
+from gaplab.services.specs.stored_specs import spec_of
 
 _BROKEN_SPECS = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 

@@ -10,7 +10,7 @@ from rich.markup import escape
 from gaplab.api.commands.app import OTHERS, AsJson, app
 from gaplab.api.commands.json_output import echo, print_result
 from gaplab.api.commands.tables import minute, table
-from gaplab.schemas.access import Role, TokenRead
+from gaplab.schemas.keeping import Role, TokenRead
 from gaplab.services.settings import Settings
 
 if TYPE_CHECKING:

@@ -20,10 +20,10 @@ from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.findings.wording import interval
 
 if TYPE_CHECKING:
-    from gaplab.services.core.robot_files import RobotFile
-    from gaplab.services.core.robots.base import Robot
-    from gaplab.services.core.world import World
     from gaplab.services.robots.writing import WrittenFile
+    from gaplab.services.world.robot_files import RobotFile
+    from gaplab.services.world.robots.base import Robot
+    from gaplab.services.world.world import World
 
 FURTHER = ("slope", "max_torque", "kp", "motor_gain", "delay", "mass", "joint_damping", "friction")
 """Labels of tunables that models often lack."""
@@ -46,9 +46,9 @@ def simulator(
 
     A .xml without --from is an MJCF of the simulator for MuJoCo alone, which has one friction and no restitution.
     """
-    from gaplab.services.core import robot_library
-    from gaplab.services.core.stored_specs import spec_of
     from gaplab.services.plugins import folders
+    from gaplab.services.specs.stored_specs import spec_of
+    from gaplab.services.world import robot_library
 
     folders.load()
     with connect(url) as client:
@@ -108,8 +108,8 @@ def _written(
 
 
 def _robot_file(spec: ResolvedSpec, robot: "Robot") -> "RobotFile":
-    from gaplab.services.core.robot_files import RobotFile
-    from gaplab.services.core.robot_library import robot_file
+    from gaplab.services.world.robot_files import RobotFile
+    from gaplab.services.world.robot_library import robot_file
 
     driver, task = spec.controller or robot.usual_controller, spec.task or robot.usual_task
     if driver is None or task is None or not robot.world.bodies:

@@ -16,13 +16,13 @@ from gaplab.api.http.access import ASKING, READING
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import Streams
 from gaplab.api.http.violations import wrong_parameters
-from gaplab.schemas.access import Role
 from gaplab.schemas.base import Frozen
+from gaplab.schemas.keeping import Role
 from gaplab.services.access import Caller, demand
 from gaplab.services.core.errors import InvalidSpec, NotFound
-from gaplab.services.core.nesting import refuse_too_deep
 from gaplab.services.experiments.idempotency import Once
 from gaplab.services.experiments.limits import Admission
+from gaplab.services.nesting import refuse_too_deep
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.settings import Limits
 from gaplab.services.store.database_errors import StoreUnavailable

@@ -18,8 +18,8 @@ from gaplab.api.http.security_headers import page
 from gaplab.api.http.violations import MOST_ERRORS, explain, finite, without_consequences
 from gaplab.schemas.mistakes import Problem, SpecError
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation
-from gaplab.services.core.nesting import MOST_LEVELS
 from gaplab.services.experiments.limits import CostUnconfirmed
+from gaplab.services.nesting import MOST_LEVELS
 from gaplab.services.specs.blame import is_external, raised
 from gaplab.services.store.texts import brief
 

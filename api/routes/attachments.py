@@ -9,7 +9,7 @@ from gaplab.api.http.attachments import saved_as
 from gaplab.api.http.dependencies import Id, LimitsDep, Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.measurements import AttachmentRead
-from gaplab.services.bench import attachments
+from gaplab.services.measuring import attachments
 
 router = APIRouter(prefix="/attachments", tags=["bench"])
 

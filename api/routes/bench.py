@@ -35,9 +35,9 @@ from gaplab.schemas.measurements import (
 from gaplab.schemas.records import Page
 from gaplab.schemas.traces import TracesRead, TracesSpec
 from gaplab.services import events
-from gaplab.services.bench import answering, doubts, motions, taking
-from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.events import WantedEvents
+from gaplab.services.measuring import answering, doubts, motion_files, taking
+from gaplab.services.measuring.taking import RequestFilter
 from gaplab.services.replay import traces
 from gaplab.services.replay.traces import measured_by_traces
 from gaplab.services.store.session import Store
@@ -142,7 +142,7 @@ def read_motion(id: Id, query: Annotated[MotionQuery, Query()], store: StoreDep)
     A controller that observes the robot while it acts, or of a robot without actuators, has none: 409.
     """
     media_type, ending = _MOTIONS[query.format]
-    return attachment(motions.request_motion(store, id, query.format), media_type, f"motion-{id}.{ending}")
+    return attachment(motion_files.request_motion(store, id, query.format), media_type, f"motion-{id}.{ending}")
 
 
 @router.post("/{id}/take", summary="Take a request", responses=documented(404, 409, 413, 415, 422))

@@ -10,12 +10,11 @@ from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.routes.curves import FITNESS, Ids
-from gaplab.schemas.comparison_columns import COLUMNS, row
-from gaplab.schemas.comparisons import Comparison
-from gaplab.schemas.curves import Fitness
+from gaplab.schemas.comparisons import COLUMNS, Comparison, row
 from gaplab.schemas.differences import SpecDiff
-from gaplab.services.core.csv_tables import csv_text
+from gaplab.schemas.results import Fitness
 from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.csv_tables import csv_text
 from gaplab.services.experiments.reading import read_differences
 from gaplab.services.findings.tables import comparison, latex
 from gaplab.services.results.comparisons import Margin, compare, warnings_of

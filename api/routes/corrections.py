@@ -7,8 +7,8 @@ from pydantic import Field
 
 from gaplab.api.http.dependencies import AdmissionDep, Id, Parameters, StoreDep, once_answered
 from gaplab.api.http.problems import documented
-from gaplab.schemas.corrections import BranchRead, ConflictSpec, Consequences, CorrectionSpec, VoidSpec
-from gaplab.services.bench import branches, corrections
+from gaplab.schemas.measurements import BranchRead, ConflictSpec, Consequences, CorrectionSpec, VoidSpec
+from gaplab.services.measuring import corrections, rewriting
 
 router = APIRouter(tags=["bench"])
 
@@ -56,4 +56,4 @@ def decide_measurement(
 @router.get("/experiments/{id}/branches", summary="List the closed branches", responses=documented(404))
 def list_branches(id: Id, store: StoreDep) -> tuple[BranchRead, ...]:
     """List the steps that corrections closed; they count nowhere."""
-    return branches.list_branches(store, id)
+    return rewriting.list_branches(store, id)

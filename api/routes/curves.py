@@ -8,7 +8,7 @@ from pydantic import Field
 from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import Id, Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
-from gaplab.schemas.curves import Curve, Fitness
+from gaplab.schemas.results import Curve, Fitness
 from gaplab.services.results import curves
 
 router = APIRouter(tags=["curves"])

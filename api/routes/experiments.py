@@ -10,7 +10,6 @@ from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Id, Paging, Parameters, StoreDep, created
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.routes.studies import Confirming, RevealingQuery
-from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import (
     AttemptRead,
@@ -21,6 +20,7 @@ from gaplab.schemas.records import (
     SampleRead,
     SimulatorRead,
 )
+from gaplab.schemas.results import MisfitRead
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import reading, submission
 from gaplab.services.experiments.views import with_sensors

@@ -9,10 +9,9 @@ from pydantic import Field
 from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import FigureQuery, answer, responses
 from gaplab.api.routes.curves import Ids
-from gaplab.schemas.curves import Fitness
 from gaplab.schemas.figures import FigureRead
+from gaplab.schemas.results import Fitness
 from gaplab.services.core.errors import NotFound
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments import reading
 from gaplab.services.figures.kinds.curves import Band, curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
@@ -22,10 +21,10 @@ from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import TITLE, titled
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.results import curves
-from gaplab.services.results.coordinates import setting_coordinates, simulator_coordinates
-from gaplab.services.results.curve_costs import cost_axis
-from gaplab.services.results.tuned_simulators import tuned_simulators
+from gaplab.services.results.curves import cost_axis
+from gaplab.services.results.tuned_simulators import setting_coordinates, simulator_coordinates, tuned_simulators
 from gaplab.services.specs.resolution import is_direct, takes_samples
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.session import Store
 
 router = APIRouter(prefix="/figures", tags=["figures"])

@@ -6,9 +6,7 @@ from fastapi import APIRouter, Body, Depends
 
 from gaplab.api.http.dependencies import CallerDep, Id, StoreDep, of_app
 from gaplab.api.http.problems import documented
-from gaplab.schemas.access import Role
-from gaplab.schemas.editing import DeletionRead, NotesRead
-from gaplab.schemas.notifications import WebhookRead, WebhookSpec
+from gaplab.schemas.keeping import DeletionRead, NotesRead, Role, WebhookRead, WebhookSpec
 from gaplab.schemas.records import StudyRead
 from gaplab.services.experiments import archiving, deletion, notes
 from gaplab.services.experiments.deletion import Deleter

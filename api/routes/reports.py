@@ -12,7 +12,7 @@ from gaplab.api.http.figures import in_turn
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.http.security_headers import page
 from gaplab.api.routes.comparisons import MarginQuery
-from gaplab.schemas.reports import VerdictRead
+from gaplab.schemas.comparisons import VerdictRead
 from gaplab.services.experiments import reading
 from gaplab.services.reports.content import verdict_on
 from gaplab.services.reports.document import report_on

@@ -19,12 +19,11 @@ from gaplab.api.http.dependencies import (
     of_app,
 )
 from gaplab.api.http.problems import documented
-from gaplab.schemas.editing import Edit
 from gaplab.schemas.estimates import EstimateRead
+from gaplab.schemas.keeping import Edit, Order
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Page, StudyRead
 from gaplab.schemas.spec import AnySpec, ExperimentSpec, SpecRead, StudySpec
-from gaplab.schemas.views import Order
 from gaplab.services.experiments import editing, estimates, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 

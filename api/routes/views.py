@@ -6,7 +6,7 @@ from fastapi import APIRouter, Body
 
 from gaplab.api.http.dependencies import StoreDep
 from gaplab.api.http.problems import documented
-from gaplab.schemas.views import ViewName, ViewRead, ViewSpec
+from gaplab.schemas.keeping import ViewName, ViewRead, ViewSpec
 from gaplab.services.experiments import saved_views
 
 router = APIRouter(prefix="/views", tags=["views"])

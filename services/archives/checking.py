@@ -25,7 +25,7 @@ from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.traces import Hash, TraceRead
 from gaplab.services.archives.columns import EXPERIMENT, Row, columns_of
 from gaplab.services.core.errors import InvalidArchive, InvalidSpec
-from gaplab.services.core.nesting import refuse_too_deep
+from gaplab.services.nesting import refuse_too_deep
 from gaplab.services.store.queries.archives import Unreadable
 from gaplab.services.store.tables import Column, Kind
 

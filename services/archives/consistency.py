@@ -5,29 +5,29 @@ from typing import TypeAlias
 
 from pydantic import ValidationError
 
-from gaplab.schemas.editing import Edit
+from gaplab.schemas.keeping import Edit
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
 from gaplab.schemas.spec import Schedule
 from gaplab.services.archives.columns import REPETITION, Row
 from gaplab.services.archives.resting import owner_of
-from gaplab.services.core import robot_library
 from gaplab.services.core.errors import InvalidArchive, InvalidSpec, Violation
-from gaplab.services.core.measured_values import genome_violations, readings_violations
-from gaplab.services.core.robot_files import read_robot_file
-from gaplab.services.core.robot_library import IMPORTED, label_of
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.tunables import tunables
-from gaplab.services.core.tunables.labels import plain_name
+from gaplab.services.specs.measured import genome_violations, readings_violations
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries import attachments, attempts, logs
 from gaplab.services.store.queries.experiments import members, repetitions_of
 from gaplab.services.store.session import Session
 from gaplab.services.store.texts import pack_tags, unpack_tags
+from gaplab.services.world import robot_library
+from gaplab.services.world.robot_files import read_robot_file
+from gaplab.services.world.robot_library import IMPORTED, label_of
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.tunables import tunables
+from gaplab.services.world.tunables.labels import plain_name
 
 MOST_EXPERIMENTS = 1_000
 

@@ -33,13 +33,13 @@ from gaplab.services.archives.consistency import (
 from gaplab.services.archives.opening import open_archive
 from gaplab.services.archives.resting import is_over, resting
 from gaplab.services.core.errors import Conflict, InvalidArchive
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import settle
 from gaplab.services.experiments.submission import admit
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts, hardware_of
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives

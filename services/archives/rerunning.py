@@ -19,11 +19,9 @@ from gaplab.arithmetic import code_for_avx512, has
 from gaplab.schemas.archives import Outcome, RepetitionRerun, RerunRead
 from gaplab.schemas.provenance import Provenance
 from gaplab.services.archives.reading import CheckedArchive, checked_archive
-from gaplab.services.core import robot_library
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.ports import Reality
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.types import Measured, Probed, Step, Transferred
 from gaplab.services.engines import engines
 from gaplab.services.plugins import folders
@@ -32,9 +30,11 @@ from gaplab.services.running import provenance
 from gaplab.services.running.versions import provenance as provenance_here
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.shortening import shortest
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import experiments, logs
 from gaplab.services.store.session import Session
+from gaplab.services.world import robot_library
 
 
 @dataclass(frozen=True)

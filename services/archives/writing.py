@@ -13,9 +13,9 @@ from zipfile import ZipFile
 from gaplab.services.archives.columns import EXPORTED, Row, at_rest, columns_of
 from gaplab.services.archives.opening import DATABASE
 from gaplab.services.archives.resting import resting
-from gaplab.services.core.stored_specs import without_truth
 from gaplab.services.experiments import hiding
 from gaplab.services.results.files import entry_of
+from gaplab.services.specs.stored_specs import without_truth
 from gaplab.services.store.queries import archives, experiments
 from gaplab.services.store.session import Session, Store, new_database
 from gaplab.services.store.sqlite_file import url_of

@@ -24,7 +24,7 @@ from gaplab.services.contract import (
 from gaplab.services.contract.promises import RATING, is_described
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.plugins import loading
-from gaplab.services.plugins.ignored import NO_CLASS, why_no_plugin
+from gaplab.services.plugins.faults import NO_CLASS, why_no_plugin
 from gaplab.services.specs.registries import REGISTRIES
 
 Check = Callable[[type[Any]], None]

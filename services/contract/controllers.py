@@ -6,11 +6,11 @@ import numpy as np
 
 from gaplab.services.contract.promises import check_known, check_targets, numbers
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.controllers.base import Controller
-from gaplab.services.core.motions import Loop
-from gaplab.services.core.observations import GROUPS
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Joint, PDMotor, World
+from gaplab.services.world.controllers.base import Controller
+from gaplab.services.world.motions import Loop
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.sensing import GROUPS
+from gaplab.services.world.world import Body, Box, Joint, PDMotor, World
 
 Plugin = type[Controller]
 

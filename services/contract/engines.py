@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.world import Material, World
 from gaplab.services.engines.base import Engine
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.world import Material, World
 
 Plugin = type[Engine]
 

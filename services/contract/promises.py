@@ -9,13 +9,13 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, frozen
-from gaplab.services.core.controllers.base import Controller
-from gaplab.services.core.motions import Loop, Motion, Trajectory
-from gaplab.services.core.observations import names
-from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.space import Space
-from gaplab.services.core.tasks.base import Task
-from gaplab.services.core.world import World
+from gaplab.services.world.controllers.base import Controller
+from gaplab.services.world.motions import Loop, Motion, Trajectory
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.sensing import names
+from gaplab.services.world.tasks.base import Task
+from gaplab.services.world.world import World
 
 P = TypeVar("P")
 Rates: TypeAlias = Robot | Task

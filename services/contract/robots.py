@@ -6,9 +6,9 @@ import numpy as np
 
 from gaplab.services.contract import promises
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Genomes, frozen
-from gaplab.services.core.motions import Loop
-from gaplab.services.core.robots.base import Robot
 from gaplab.services.engines import engines
+from gaplab.services.world.motions import Loop
+from gaplab.services.world.robots.base import Robot
 
 Plugin = type[Robot]
 

@@ -7,10 +7,10 @@ from math import isclose
 from typing import Any
 
 from gaplab.services.contract.controllers import arm
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.tunables.base import Tunable
-from gaplab.services.core.world import World
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.tunables.base import Tunable
+from gaplab.services.world.world import World
 
 Plugin = type[Tunable]
 DETAILS = {"field", "unit", "lower", "upper", "least", "greatest"}

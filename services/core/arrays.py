@@ -1,4 +1,4 @@
-"""Array types by shape; every number in the core is a float64."""
+"""Array types by shape, and differences of readings on a circle; every number in the core is a float64."""
 
 from math import isfinite
 from typing import TypeAlias
@@ -47,3 +47,24 @@ NO_READINGS: Readings = frozen([])
 def no_readings() -> Readings:
     """Return the readings of a robot without sensors, for fields of frozen values."""
     return NO_READINGS
+
+
+def nearest(readings: FloatArray, to: FloatArray, periods: FloatArray) -> FloatArray:
+    """Return readings shifted by whole periods next to others, so that their difference is that on a circle.
+
+    Args:
+        readings: `(..., q)`, or outcomes `(..., 1 + q)`, whose fitness stays.
+        to: the others, of a shape that broadcasts to it.
+        periods: `(q,)`: period of each reading; 0 if it has none.
+    """
+    turning = np.flatnonzero(periods)
+    if not turning.size:
+        return readings
+    places, size = turning + readings.shape[-1] - len(periods), periods[turning]
+    turns = np.rint((readings[..., places] - to[..., places]) / size)
+    turns[np.isnan(turns)] = 0.0
+    if not turns.any():
+        return readings
+    shifted = readings.copy()
+    shifted[..., places] -= turns * size
+    return shifted

@@ -18,7 +18,6 @@ from gaplab.services.core.arrays import FloatArray, Genome, no_readings
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.history import History, probe_of
 from gaplab.services.core.linear_models import fitted
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Forecast, Reality, Sense, Simulate
@@ -33,6 +32,7 @@ from gaplab.services.core.types import (
     Belief,
     Budget,
     Cost,
+    History,
     Measured,
     Probed,
     Sample,
@@ -42,6 +42,7 @@ from gaplab.services.core.types import (
     Transferred,
     Tuned,
     learnable,
+    probe_of,
 )
 
 

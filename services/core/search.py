@@ -11,10 +11,9 @@ import numpy as np
 from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers, Following, nothing
-from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters
+from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters, nearest
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer, Population
-from gaplab.services.core.sensors import nearest
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Score, Strategy
 from gaplab.services.core.types import Belief

@@ -10,12 +10,11 @@ import numpy as np
 
 from gaplab.services.core import repeats
 from gaplab.services.core.answers import Answers, Following, nothing
-from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genomes, Outcomes, Parameters, frozen, known
+from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genomes, Outcomes, Parameters, frozen, known, nearest
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.search import Question
-from gaplab.services.core.sensors import nearest
 from gaplab.services.core.space import Space
 from gaplab.services.core.types import Sample, Simulator
 

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Loop, Motion, Trajectory, open_loop
-from gaplab.services.core.world import World
 from gaplab.services.engines.base import Engine
+from gaplab.services.world.motions import Loop, Motion, Trajectory, open_loop
+from gaplab.services.world.world import World
 
 
 class Analytic(Engine):

@@ -12,10 +12,10 @@ from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRead
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import EngineUnavailable
-from gaplab.services.core.kinematics import observes_base
-from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.core.registry import Plugin
-from gaplab.services.core.world import ORIGIN, UNTURNED, Body, Capsule, Cylinder, Hull, Joint, PDMotor, Shape, World
+from gaplab.services.world.kinematics import observes_base
+from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory
+from gaplab.services.world.world import ORIGIN, UNTURNED, Body, Capsule, Cylinder, Hull, Joint, PDMotor, Shape, World
 
 Uses: TypeAlias = Callable[[World], bool]
 

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.kinematics import chain, clearances_m, observed_poses
-from gaplab.services.core.motions import Loop, Motion, Recording, Tilt, Trajectory
-from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
 from gaplab.services.engines.stepping import SteppedScene, WarmScenes, plausible, recording, watch
+from gaplab.services.world.kinematics import chain, clearances_m, observed_poses
+from gaplab.services.world.motions import Loop, Motion, Recording, Tilt, Trajectory
+from gaplab.services.world.sensing import gravity_m_s2
+from gaplab.services.world.world import World
 
 CHECKED_S = 0.1
 """Interval of the checks: what shakes faster moves no robot."""

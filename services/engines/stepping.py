@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.controllers.parts import middles
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
-from gaplab.services.core.observations import Bearing, observations
-from gaplab.services.core.world import PDMotor, World
+from gaplab.services.world.controllers.parts import middles
+from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory
+from gaplab.services.world.sensing import Bearing, observations
+from gaplab.services.world.world import PDMotor, World
 
 Commands: TypeAlias = list[tuple[int, float]]
 """Actuators, and their new targets."""

@@ -5,10 +5,10 @@ from difflib import get_close_matches
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Violation
-from gaplab.services.core.robot_library import label_of
 from gaplab.services.experiments.limits import Admission, CostUnconfirmed
 from gaplab.services.store.queries.requests import bench_key, spellings
 from gaplab.services.store.session import Session
+from gaplab.services.world.robot_library import label_of
 
 CLOSE = 0.8
 """Similarity of two names, from 0 to 1, from which one may be the other; names with other digits are others."""

@@ -17,15 +17,15 @@ from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
 from gaplab.services.core.errors import NotFound
-from gaplab.services.core.sensitivity import VERSION, Effort, alike, warning
-from gaplab.services.core.stored_specs import checked, subject
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move
 from gaplab.services.experiments.stored_robots import resolved_here
+from gaplab.services.findings.sensitivity import VERSION, Effort, alike, warning
 from gaplab.services.plugins.external import external_plugins, named_in
 from gaplab.services.specs.resolution import resolve_sensitivity
 from gaplab.services.specs.robots import unit
+from gaplab.services.specs.stored_specs import checked, subject
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ExperimentRow, SensitivityRow
 from gaplab.services.store.queries.events import note

@@ -8,13 +8,13 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.errors import Violation
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import Admission, CostUnconfirmed, check_extent
 from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import is_direct, resolve, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries import costs
 from gaplab.services.store.session import Session, Store
 

@@ -14,11 +14,11 @@ from gaplab.schemas.records import (
     StudyRead,
 )
 from gaplab.schemas.spec import SpecRead
-from gaplab.services.core.stored_specs import without_truth
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view, view_experiments, view_repetition
 from gaplab.services.specs.differences import SpecColumn, differences
 from gaplab.services.specs.shortening import shortest
+from gaplab.services.specs.stored_specs import without_truth
 from gaplab.services.store.cursor import next_cursor
 from gaplab.services.store.queries import attempts, results
 from gaplab.services.store.queries.experiments import get_experiment, members, repetitions_of

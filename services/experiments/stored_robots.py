@@ -10,16 +10,16 @@ from gaplab.schemas.robots import RobotRead
 from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.spec import SharedSettings
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, unknown_name
-from gaplab.services.core.robot_files import RobotFile, read_robot_file, stored_robot_file
-from gaplab.services.core.robot_library import IMPORTED
-from gaplab.services.core.robots import robots
-from gaplab.services.core.sample_tables import read_samples
 from gaplab.services.specs.defaults import default_engine
 from gaplab.services.specs.robots import Driven, ref_of_file, robot_of, robot_of_file
+from gaplab.services.specs.sample_tables import read_samples
 from gaplab.services.store.models import RobotRow
 from gaplab.services.store.queries import robots as rows
 from gaplab.services.store.session import Session, Store, snapshot, transaction
 from gaplab.services.store.texts import storable
+from gaplab.services.world.robot_files import RobotFile, read_robot_file, stored_robot_file
+from gaplab.services.world.robot_library import IMPORTED
+from gaplab.services.world.robots import robots
 
 R = TypeVar("R")
 S = TypeVar("S", bound=SharedSettings)

@@ -8,7 +8,6 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, Progress, RepetitionRead, StudyRead
-from gaplab.services.core.stored_specs import checked, discrepancy_of, without_truth
 from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.fitness import best_of, fitness_of
@@ -17,6 +16,7 @@ from gaplab.services.experiments.progress import Span, caveat_of, caveat_of_seve
 from gaplab.services.plugins.external import tells_unavailable
 from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.robots import sensors
+from gaplab.services.specs.stored_specs import checked, discrepancy_of, without_truth
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import attempts
 from gaplab.services.store.queries.experiments import Members

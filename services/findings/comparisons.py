@@ -18,8 +18,10 @@ from typing import Any, TypeVar
 import numpy as np
 import scipy
 
-from gaplab.schemas.comparison_columns import PAIRED, TESTS, UNPAIRED
 from gaplab.schemas.comparisons import (
+    PAIRED,
+    TESTS,
+    UNPAIRED,
     Comparison,
     Equivalence,
     EquivalenceVerdict,

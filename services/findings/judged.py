@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.results import Curve, CurvePoint
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.figures.words import distinct_names
 from gaplab.services.findings.trends import CurveEnd, curve_end

@@ -14,15 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gaplab.schemas.misfit import Distribution, MisfitPoint, TunableDistribution
+from gaplab.schemas.results import Distribution, MisfitPoint, TunableDistribution
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.linear_models import CREDIBLE, SURPRISING
-from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.space import Space
 from gaplab.services.core.types import Fit
 from gaplab.services.findings import wording
+from gaplab.services.world.sensing import Sensors
 
 AT_BOUND = 0.01
 """Largest distance from a bound, as a share of the distance between the bounds, that counts as at the bound."""

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from gaplab.schemas.comparisons import Comparison, EquivalenceVerdict
+from gaplab.schemas.comparisons import Comparison, EquivalenceVerdict, Trend, TrendRead
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead
-from gaplab.schemas.reports import Trend, TrendRead
 from gaplab.services.figures.words import evaluations, number_of
 from gaplab.services.findings.judged import Judged
 from gaplab.services.findings.statistics import SIGNIFICANT

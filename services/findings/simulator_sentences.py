@@ -4,12 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gaplab.schemas.curves import from_before
-from gaplab.schemas.misfit import Identification, MisfitPoint, TunableDistribution
+from gaplab.schemas.results import Identification, MisfitPoint, TunableDistribution, from_before
 from gaplab.services.core.linear_models import SURPRISING
-from gaplab.services.core.sensors import Sensors
 from gaplab.services.findings.misfit import OFTEN, Doubt, SensorError, Tuning, sensor_errors, surprise
 from gaplab.services.findings.wording import many, number, share, spread
+from gaplab.services.world.sensing import Sensors
 
 LACKING = (
     "Often missing in a model: a slope of the ground, a weak or slow motor, mass, latency; or a tunable is at its bound"

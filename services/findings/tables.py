@@ -4,10 +4,9 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from gaplab.schemas.comparison_columns import NAMES, UNPAIRED, shown_tests
-from gaplab.schemas.comparisons import Comparison, Groups
+from gaplab.schemas.comparisons import NAMES, UNPAIRED, Comparison, Groups, shown_tests
 from gaplab.schemas.differences import SpecDiff
-from gaplab.schemas.misfit import MisfitPoint
+from gaplab.schemas.results import MisfitPoint
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.figures.words import spoken
 from gaplab.services.findings.wording import MISSING, number, share

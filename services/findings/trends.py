@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaplab.schemas.reports import Trend
+from gaplab.schemas.comparisons import Trend
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import curve_point
 

@@ -3,10 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 
-from gaplab.schemas.comparisons import Comparison
-from gaplab.schemas.curves import Curve
+from gaplab.schemas.comparisons import Comparison, Trend, TrendRead, VerdictRead
 from gaplab.schemas.records import ExperimentRead, common_count
-from gaplab.schemas.reports import Trend, TrendRead, VerdictRead
+from gaplab.schemas.results import Curve
 from gaplab.services.figures.words import evaluations
 from gaplab.services.findings import sentences
 from gaplab.services.findings.judged import Judged, judged_curves

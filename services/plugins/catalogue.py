@@ -5,19 +5,19 @@ from dataclasses import asdict
 
 from gaplab.schemas.plugin import BudgetRead, Catalogue, PluginRead
 from gaplab.schemas.spec import StudySpec
-from gaplab.services.core.controllers import controllers
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.robot_library import IMPORTED
-from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.tasks import tasks
-from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.plugins.loading import here
 from gaplab.services.specs.defaults import default_engine
 from gaplab.services.specs.presets import PRESETS
+from gaplab.services.world.controllers import controllers
+from gaplab.services.world.robot_library import IMPORTED
+from gaplab.services.world.robots import robots
+from gaplab.services.world.tasks import tasks
+from gaplab.services.world.tunables import tunables
 
 
 def catalogue(stored: Sequence[PluginRead] = ()) -> Catalogue:

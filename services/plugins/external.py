@@ -5,11 +5,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.engines import engines
 from gaplab.services.plugins.loading import here
 from gaplab.services.specs.registries import REGISTRIES
 from gaplab.services.specs.robots import Driven, installed_robot
+from gaplab.services.world.tunables.labels import plain_name
 
 _FIRST = re.compile(rf"((?:{'|'.join(REGISTRIES)}) .{{1,100}}?) \(unavailable: ", re.DOTALL)
 """The first plug-in of a text that `text_of` wrote."""

@@ -21,8 +21,7 @@ from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.registry import EXTERNAL, Plugin, Registry, Unusable, quoted
 from gaplab.services.plugins import contents
 from gaplab.services.plugins.contents import Contents
-from gaplab.services.plugins.faults import fault_of, of_file, remedied
-from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.plugins.faults import fault_of, ignored_files, of_file, remedied
 from gaplab.services.specs.registries import REGISTRIES
 
 

@@ -7,11 +7,11 @@ from time import monotonic
 import numpy as np
 
 from gaplab.schemas.replays import Prediction, Predictions
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.replay.sent_specs import SentSpec, received, sent
 from gaplab.services.specs.assembly import refuse_missing, simulation_of
 from gaplab.services.specs.robots import robot_of, unit
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.queries.replays import TunedSample
 from gaplab.services.store.session import Store

@@ -7,10 +7,6 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import ControllerKind, Replay, RobotShapes
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
-from gaplab.services.core.robot_files import stored_robot_file
-from gaplab.services.core.robot_library import label_of
-from gaplab.services.core.robots import robots
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments import stored_robots
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.replay.process import Key, RolloutProcess
@@ -21,9 +17,13 @@ from gaplab.services.specs.assembly import refuse_missing
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.rollouts import is_computed
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.session import Session, Store
+from gaplab.services.world.robot_files import stored_robot_file
+from gaplab.services.world.robot_library import label_of
+from gaplab.services.world.robots import robots
 
 _MEASURED_AS = {ControllerKind.SAMPLE: MeasurementKind.SAMPLE, ControllerKind.TRANSFER: MeasurementKind.PROBE}
 

@@ -5,16 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gaplab.schemas.replays import ControllerKind, Framing, Interval, Replay, ReplayReadings, ReplayWorld
-from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
-from gaplab.services.core.motions import Recording
-from gaplab.services.core.robots.base import Robot, Sensors
-from gaplab.services.core.sensors import nearest
-from gaplab.services.core.world import World
+from gaplab.services.core.arrays import FloatArray, nearest
 from gaplab.services.replay.sent_specs import SentSpec, received
 from gaplab.services.replay.shapes import extent_of, feet_of, framing_of, labels, observed_of, shapes_of
 from gaplab.services.specs.assembly import reality_of, simulation_of
 from gaplab.services.specs.robots import robot_of
+from gaplab.services.world.kinematics import TOUCHING_M, body_poses, clearances_m
+from gaplab.services.world.motions import Recording
+from gaplab.services.world.robots.base import Robot, Sensors
+from gaplab.services.world.world import World
 
 FRAMES_PER_S = 50
 LONGEST_S = 20.0

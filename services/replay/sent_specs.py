@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core import robot_library
 from gaplab.services.plugins.external import named_files
+from gaplab.services.world import robot_library
 
 
 class SentSpec(NamedTuple):

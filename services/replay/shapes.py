@@ -8,9 +8,9 @@ import scipy
 
 from gaplab.schemas.replays import Framing, Orientation, Position, RobotShapes, Shape, ShapeKind, ShapeRole
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m, rotated
-from gaplab.services.core.world import Box, Capsule, Cylinder, Hull, Part, Vector, World
-from gaplab.services.core.world import Shape as Solid
+from gaplab.services.world.kinematics import TOUCHING_M, body_poses, clearances_m, rotated
+from gaplab.services.world.world import Box, Capsule, Cylinder, Hull, Part, Vector, World
+from gaplab.services.world.world import Shape as Solid
 
 Face = tuple[int, ...]
 """Places of its corners, anticlockwise as seen from outside."""

@@ -10,20 +10,20 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.traces import AlignedTrace, TracesRead, TracesSpec
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
-from gaplab.services.core.kinematics import observes_base
-from gaplab.services.core.motions import Trajectory
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.core.traces import Alignment, TooShort, Trace, align, placed, read_trace, unlikely
-from gaplab.services.core.world import World
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.sent_specs import SentSpec, received, sent
 from gaplab.services.specs.assembly import simulation_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import attachments, replays, requests
 from gaplab.services.store.session import Session, Store
+from gaplab.services.world.kinematics import observes_base
+from gaplab.services.world.motions import Trajectory
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.traces import Alignment, TooShort, Trace, align, placed, read_trace, unlikely
+from gaplab.services.world.world import World
 
 FRAMES_PER_S = 50
 """Frames of the expected motion."""

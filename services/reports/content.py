@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 
-from gaplab.schemas.comparisons import Comparison
-from gaplab.schemas.curves import Curve, Fitness
+from gaplab.schemas.comparisons import Comparison, VerdictRead
 from gaplab.schemas.differences import SpecDiff
-from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import ExperimentRead, SampleRead, SimulatorRead, StudyRead, common_count
-from gaplab.schemas.reports import VerdictRead
+from gaplab.schemas.results import Curve, Fitness, MisfitRead
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.errors import NotFound
 from gaplab.services.experiments import checks

@@ -3,10 +3,8 @@
 from collections.abc import Sequence
 
 from gaplab.schemas.comparisons import Comparison
-from gaplab.schemas.curves import from_before
 from gaplab.schemas.records import StudyRead
-from gaplab.services.core.robot_library import label_of
-from gaplab.services.core.stored_specs import spec_of
+from gaplab.schemas.results import from_before
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number, number_of, spoken, titled
@@ -18,8 +16,10 @@ from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Paragr
 from gaplab.services.reports.content import Facts, Outcome, facts_of
 from gaplab.services.reports.reproduction import reproduction
 from gaplab.services.results.comparisons import Margin
-from gaplab.services.results.coordinates import simulator_coordinates
+from gaplab.services.results.tuned_simulators import simulator_coordinates
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.session import Store
+from gaplab.services.world.robot_library import label_of
 
 
 def report_on(store: Store, subject: StudyRead, margin: Margin | None = None) -> Report:

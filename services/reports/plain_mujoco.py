@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.world import World
 from gaplab.services.engines.mujoco.plain import LOST, mjcf_of, plain_positions
 from gaplab.services.replay.sent_specs import SentSpec, received
 from gaplab.services.specs.assembly import simulation_of
 from gaplab.services.specs.robots import robot_of
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.world import World
 
 
 def tuned_mjcf(sent_spec: SentSpec, parameters: Sequence[float], headline: str) -> str:

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 
 from gaplab.schemas.provenance import Provenance
-from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.figures.words import number_of, spoken, with_unit
 from gaplab.services.findings import tables as findings
 from gaplab.services.findings.judged import Judged
@@ -13,6 +12,7 @@ from gaplab.services.reports.blocks import Grid
 from gaplab.services.reports.content import Facts, Outcome
 from gaplab.services.specs.differences import SpecColumn, all_settings
 from gaplab.services.store.queries.costs import Work
+from gaplab.services.world.tunables.labels import unit_of
 
 MOST_SHOWN = 60
 """Most measurements in a report."""

@@ -14,15 +14,11 @@ import numpy as np
 from gaplab.schemas.records import ExperimentRead, SampleRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.traces import TRACE_COLUMNS
-from gaplab.services.bench import motions
-from gaplab.services.core import robot_library
 from gaplab.services.core.arrays import frozen, known
-from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.errors import Conflict, GaplabError
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.core.tunables.labels import unit_of
+from gaplab.services.csv_tables import csv_text
 from gaplab.services.experiments.reading import read, read_experiment
+from gaplab.services.measuring import motion_files
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.sent_specs import sent
 from gaplab.services.replay.traces import expected_motion
@@ -34,14 +30,18 @@ from gaplab.services.reports.reproduction import spec_text, submitted
 from gaplab.services.reports.tables import MOST_SHOWN
 from gaplab.services.results.files import entry_of
 from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Store
+from gaplab.services.world import robot_library
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.tunables.labels import unit_of
 
 Readings: TypeAlias = dict[tuple[Any, ...], Sequence[Any]]
 """Tables of readings of all repeats, by genome and values."""
 
-MOTIONS: dict[motions.MotionFormat, str] = {"csv": "motion.csv", "json": "motion.json", "ros2": "motion.ros2.yaml"}
+MOTIONS: dict[motion_files.MotionFormat, str] = {"csv": "motion.csv", "json": "motion.json", "ros2": "motion.ros2.yaml"}
 
 README = """What experiment {id} ({name}) found, by gaplab {version}.
 
@@ -170,8 +170,8 @@ def _files(home: _Home, readings: Readings) -> Iterator[tuple[str, str]]:
         yield "controller.json", _json(best.model_dump(mode="json") | {"unit": home.robot.unit})
         yield "samples.json", _json([sample.model_dump(mode="json") for sample in home.outcome.measured])
         genome = frozen(best.genome)
-        for form in motions.forms_of(home.robot, genome):
-            yield MOTIONS[form], motions.written(home.spec, genome, form)
+        for form in motion_files.forms_of(home.robot, genome):
+            yield MOTIONS[form], motion_files.written(home.spec, genome, form)
     if home.outcome.simulators:
         yield "simulator.json", _json(_simulator(home))
 

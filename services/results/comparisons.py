@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from gaplab.schemas.comparisons import Comparison
-from gaplab.schemas.curves import Fitness
 from gaplab.schemas.records import common_count
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.results import Fitness
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.core.robot_library import label_of
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.fitness import fitness_of
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments
@@ -20,10 +18,12 @@ from gaplab.services.findings.comparisons import Compared, compare_all
 from gaplab.services.results.curves import values_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.specs.robots import unit
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments
 from gaplab.services.store.queries.requests import bench_key
 from gaplab.services.store.session import Session, Store
+from gaplab.services.world.robot_library import label_of
 
 MOST_WITH_INTERVALS = 20
 """Most experiments whose comparison has intervals unless it is asked for without them."""

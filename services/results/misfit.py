@@ -8,25 +8,25 @@ from typing import Any
 
 import numpy as np
 
-from gaplab.schemas.misfit import MisfitPoint, MisfitRead
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.results import MisfitPoint, MisfitRead
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.csv_tables import csv_text
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.repeats import pooled_variance
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
+from gaplab.services.csv_tables import csv_text
 from gaplab.services.findings import simulator_sentences as sentences
 from gaplab.services.findings.identification import Means, verdicts
 from gaplab.services.findings.misfit import Tuning, doubt, misfit_point
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import installed_robot, unit
+from gaplab.services.specs.stored_specs import discrepancy_of, spec_of
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator, MeasuredIterations
 from gaplab.services.store.session import Store
+from gaplab.services.world.robots.base import Robot
 
 DISTRIBUTIONS = ("error", "expected_error", "held_out_error", "gap")
 NUMBERS = ("n", "mean", "sd", "least", "greatest", "at_lower", "at_upper", "spread", "interval", "posterior")

@@ -5,24 +5,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gaplab.schemas.figures import ToyIteration, ToySample, ToyTransfer
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.toy import ToyIteration, ToySample, ToyTransfer
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
-from gaplab.services.core.robot_library import label_of
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.experiments import hiding
 from gaplab.services.figures.words import titled
 from gaplab.services.specs.assembly import reality_of, simulation_of
 from gaplab.services.specs.measured import samples_of
 from gaplab.services.specs.resolution import is_direct
 from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.stored_specs import discrepancy_of, spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays, results
 from gaplab.services.store.queries.replays import MeasuredController
 from gaplab.services.store.session import Session, Store
+from gaplab.services.world.robot_library import label_of
+from gaplab.services.world.robots.base import Robot
 
 GENES = 201
 MOST_ROWS = 100_000

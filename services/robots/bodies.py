@@ -11,7 +11,9 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import (
+from gaplab.services.robots.options import ImportOptions, Notes
+from gaplab.services.robots.reading import Source, body_name, mujoco_library
+from gaplab.services.world.world import (
     Body,
     Box,
     Capsule,
@@ -25,8 +27,6 @@ from gaplab.services.core.world import (
     Sphere,
     Vector,
 )
-from gaplab.services.robots.options import ImportOptions, Notes
-from gaplab.services.robots.reading import Source, body_name, mujoco_library
 
 EXACT = 1e-5
 """Share of a hull's size within which it is exact: more vertices would not be seen."""

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import UNTURNED, Body, Inertia, World
 from gaplab.services.robots.bodies import Bodies, rotation_of
 from gaplab.services.robots.reading import body_name
+from gaplab.services.world.world import UNTURNED, Body, Inertia, World
 
 Place = tuple[str, str, str]
 """`bodies`, `joints` or `world`; name of the body or the joint; name of the value, like `motor.kp`."""

@@ -8,14 +8,14 @@ from numpy.random import default_rng
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import FloatArray, frozen, known
-from gaplab.services.core.controllers import controllers
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.tasks import tasks
-from gaplab.services.core.world import World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.mujoco.plain import plain_positions
+from gaplab.services.world.controllers import controllers
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.tasks import tasks
+from gaplab.services.world.world import World
 
 ROLLOUTS = 5
 COMPARED_S = frozen(np.arange(1, 11) / 10)

@@ -16,14 +16,14 @@ from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import RobotSource
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
-from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot_file
-from gaplab.services.core.world import Body, Joint, Material, Surfaces, World
 from gaplab.services.robots.bodies import FREE, Bodies, joint_name
 from gaplab.services.robots.motors import with_motors, with_swings
 from gaplab.services.robots.options import ImportOptions, Notes
 from gaplab.services.robots.poses import base_pose, start_angles, with_starts
 from gaplab.services.robots.reading import Source, body_name, mujoco_library, read_source
 from gaplab.services.robots.xml import decoded
+from gaplab.services.world.robot_files import LONGEST_NAME, RobotFile, read_robot_file
+from gaplab.services.world.world import Body, Joint, Material, Surfaces, World
 
 HUGE_M = 10.0
 """Length in a robot from which its file may mean millimetres."""

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Joint, Motor, PDMotor
 from gaplab.services.robots.bodies import FREE, joint_name, joint_number
 from gaplab.services.robots.options import ImportOptions, Notes, listed
 from gaplab.services.robots.reading import Source, mujoco_library
+from gaplab.services.world.world import Joint, Motor, PDMotor
 
 REACH_RAD, REACH_M = 0.35, 0.02
 """Error at which a motor whose gain is computed has its largest torque: a share of a usual step of a leg."""

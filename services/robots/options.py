@@ -12,8 +12,8 @@ from pydantic import Field, field_validator
 from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.robot_files import LONGEST_LINE
-from gaplab.services.core.world import MOST_VERTICES
+from gaplab.services.world.robot_files import LONGEST_LINE
+from gaplab.services.world.world import MOST_VERTICES
 
 Positive = Annotated[float, Field(gt=0)]
 

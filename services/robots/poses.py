@@ -9,10 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Body, Box, Capsule, Cylinder, Hull, Joint, Part, Quaternion
 from gaplab.services.robots.bodies import FREE, Bodies, joint_name, joint_number, quaternion, rotation_of
 from gaplab.services.robots.options import ImportOptions, Notes, listed
 from gaplab.services.robots.reading import Source, mujoco_library
+from gaplab.services.world.world import Body, Box, Capsule, Cylinder, Hull, Joint, Part, Quaternion
 
 ROUNDED = 1e-4
 """Distance from a limit that the rounding of an angle in a file or an option explains, rad or m."""

@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeAlias, TypeVar, cast
 
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.robot_files import LONGEST_NAME, RobotFile, read_robot_file
-from gaplab.services.core.world import World
 from gaplab.services.engines.mujoco.plain import LOST, mjcf_of
 from gaplab.services.robots.bodies import Bodies
 from gaplab.services.robots.changes import Change, Place, changes, inertials
@@ -18,6 +16,8 @@ from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions, Notes
 from gaplab.services.robots.reading import read_source
 from gaplab.services.robots.xml import decoded
+from gaplab.services.world.robot_files import LONGEST_NAME, RobotFile, read_robot_file
+from gaplab.services.world.world import World
 
 T = TypeVar("T")
 

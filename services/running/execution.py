@@ -7,6 +7,7 @@ All functions raise StoreUnavailable while the database cannot be used; each may
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy.exc import IntegrityError
@@ -16,14 +17,14 @@ from gaplab.schemas.lifecycle import ASKED, Ending, State
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.types import Step
+from gaplab.services.experiments.lease_ends import Change, end_repetitions, pause
 from gaplab.services.experiments.states import settle
+from gaplab.services.measuring.waiting import wait
 from gaplab.services.running import provenance
+from gaplab.services.running.leases import MAX_LOSSES, Leases
 from gaplab.services.running.leases import STALE_AFTER_S as STALE_AFTER_S
-from gaplab.services.running.leases import Change
-from gaplab.services.running.repetition_leases import RepetitionLeases, pause
 from gaplab.services.running.turns import FREE_HARDWARE, ahead, next_repetitions
 from gaplab.services.running.versions import provenance as present_provenance
-from gaplab.services.running.waiting import wait
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Checkpoint as Checkpoint
 from gaplab.services.store.lease import Claim as Claim
@@ -37,6 +38,46 @@ from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store, transaction
 from gaplab.services.store.statements import storable
+
+
+class RepetitionLeases(Leases[Claim]):
+    """Leases of repetitions. When one ends, its attempt and its experiment are updated."""
+
+    table = RepetitionRow
+
+    def taken(self) -> Mapping[str, Any]:
+        """Return the columns that a claim sets: it holds the hardware, and measures nothing yet."""
+        experiment = ExperimentRow
+        hardware = select(experiment.hardware).where(experiment.id == RepetitionRow.experiment_id).scalar_subquery()
+        return {"measuring_at": None, "hardware": hardware}
+
+    def lose(self, session: Session, which: ColumnElement[bool], reason: str) -> list[Any]:
+        """Queue lost work again as the base does, but do not blame a plug-in for a measurement that was cut off.
+
+        If measurements are cut off repeatedly, the experiment is paused, because a person must look.
+        """
+        row = self.table
+        values = {"losses": row.losses + 1, "owner": None, "error": reason}
+        change = Change(State.QUEUED, Ending.LOST, reason, values)
+        cut_off = self.end(session, which & row.measuring_at.is_not(None), change)
+        often = select(row.experiment_id, row.losses).where(row.id.in_(cut_off), row.losses >= MAX_LOSSES)
+        for experiment, losses in session.execute(often).all():
+            pause(session, experiment, f"a measurement was cut off {losses} times; the last time {reason}")
+        return cut_off + super().lose(session, which, reason)
+
+    def drives(self) -> ColumnElement[bool]:
+        """Return the SQL condition: the repetition holds hardware, which its worker may still drive for a moment."""
+        return self.table.hardware.is_not(None)
+
+    def free_lost(self, session: Session, stale: ColumnElement[bool]) -> None:
+        """Free the hardware of ended leases whose supervisor never reported that its worker has stopped."""
+        row = self.table
+        session.execute(update(row).where(stale, row.state != State.RUNNING, self.drives()).values(hardware=None))
+
+    def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[int]:
+        """End leases as `end_repetitions` does."""
+        return end_repetitions(session, which, change)
+
 
 _LEASES = RepetitionLeases()
 

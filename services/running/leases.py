@@ -7,16 +7,15 @@ answer, and drops the work. Work that was lost is queued again, and fails after 
 All use cases raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from datetime import datetime, timedelta
-from time import monotonic
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import timedelta
 from typing import Any, ClassVar, Generic, TypeVar
 
 from sqlalchemy import ColumnElement, false, func, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import Ending, State
+from gaplab.services.experiments.lease_ends import Change, Silences
 from gaplab.services.experiments.states import move
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.lease import Lease
@@ -24,59 +23,12 @@ from gaplab.services.store.models import LeasedRow
 from gaplab.services.store.session import Store
 from gaplab.services.store.statements import storable
 
-K = TypeVar("K", bound=Hashable)
-
-
-class Silences(Generic[K]):
-    """The heartbeats that one supervisor has seen, and since when each has stayed the same.
-
-    A time in the database says too little about hardware: if somebody sets the database's clock, every lease seems to
-    have expired, and a second holder would move a robot that the first still moves. So a supervisor waits until a
-    heartbeat has not changed for a whole lease of its own monotonic clock.
-    """
-
-    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
-        self._clock = clock
-        self._since: dict[tuple[K, datetime], float] = {}
-
-    def forget(self) -> None:
-        """Begin anew, as after a time in which nobody could give a sign of life."""
-        self._since = {}
-
-    def longer_than_leases(self, held: Sequence[tuple[K, datetime, float]]) -> list[tuple[K, datetime]]:
-        """Return the ids and heartbeats of what was not heard of for a whole lease.
-
-        Args:
-            held: id, time of the last heartbeat and seconds of the lease of each; others are forgotten.
-        """
-        present = self._clock()
-        self._since = {(id_, beat): self._since.get((id_, beat), present) for id_, beat, _ in held}
-        return [(id_, beat) for id_, beat, lease_s in held if present - self._since[id_, beat] > lease_s]
-
-
 STALE_AFTER_S = 30.0
 
 MAX_LOSSES = 5
 """Losses in a row, without progress, after which work is FAILED: it probably kills its workers."""
 
 L = TypeVar("L", bound=Lease)
-
-
-@dataclass(frozen=True)
-class Change:
-    """The change of a row when its lease ends.
-
-    Attributes:
-        to: next state of the row.
-        ending: kind of the end, for the list of attempts.
-        reason: reason of the end, for the list of attempts.
-        values: further columns to set.
-    """
-
-    to: State
-    ending: Ending
-    reason: str | None = None
-    values: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Leases(Generic[L]):

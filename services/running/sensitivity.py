@@ -11,8 +11,9 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.sensitivity import Checked, Sensitivity
 from gaplab.services.experiments import checks
+from gaplab.services.experiments.lease_ends import Change
 from gaplab.services.plugins.external import text_of
-from gaplab.services.running.leases import Change, Leases
+from gaplab.services.running.leases import Leases
 from gaplab.services.running.provenance import NONE, unusable
 from gaplab.services.store.lease import CheckClaim as CheckClaim
 from gaplab.services.store.models import ExperimentRow, SensitivityRow

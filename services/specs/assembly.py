@@ -14,20 +14,20 @@ from gaplab.services.core.errors import GaplabError, gather
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.ports import Reality, Sense, Simulate, physical_reality
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.sensitivity import Subject
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.tunables.base import Tunable
-from gaplab.services.core.tunables.labels import tunable_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.types import Budget, Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.findings.sensitivity import Subject
 from gaplab.services.specs.measured import samples_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.rollouts import hardware_of
 from gaplab.services.specs.simulation import Simulation, forecast_of
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.tunables.base import Tunable
+from gaplab.services.world.tunables.labels import tunable_of
 
 WARM_ENGINES = 4
 """Most engines that a process keeps; each keeps worlds, of 34 MB each in Bullet. A repetition has two at most."""

@@ -7,12 +7,12 @@ from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.resolved import ResolvedReality, ResolvedTunable
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings
 from gaplab.services.core.registry import Registry
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.tunables.base import Tunable
-from gaplab.services.core.tunables.labels import label_of, proper, tunable_of
-from gaplab.services.core.world import World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.tunables.base import Tunable
+from gaplab.services.world.tunables.labels import label_of, proper, tunable_of
+from gaplab.services.world.world import World
 
 
 def default_engine(robot: Robot | type[Robot]) -> str:
@@ -77,6 +77,16 @@ def completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:
     """Return the reference with every option, as specs name it."""
     _, options = registry.check(ref)
     return PluginRef(name=ref.name, options=options.model_dump(mode="json", by_alias=True))
+
+
+def with_proper_labels(ref: PluginRef, named: Iterable[str]) -> PluginRef:
+    """Return a complete reference with the tunables that its options name by their proper labels."""
+    labels = {name: proper(name) for name in named}
+    options = {
+        name: [labels.get(each, each) for each in value] if isinstance(value, list) else value
+        for name, value in ref.options.items()
+    }
+    return PluginRef(name=ref.name, options=options)
 
 
 def simulated_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine: type[Engine]) -> ResolvedReality:

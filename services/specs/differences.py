@@ -7,7 +7,7 @@ from typing import Any
 from gaplab.schemas.differences import DiffColumn, SettingRead, SpecDiff, Values
 from gaplab.schemas.mistakes import pointer_to
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.specs.stored_specs import spec_of
 
 NO_SETTINGS = {"name", "priority", "max_parallel"}
 """Fields of a spec that change no number."""

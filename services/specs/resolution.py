@@ -8,18 +8,14 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedBudget, ResolvedSpec
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
-from gaplab.services.core.controllers import controllers
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Registry
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
-from gaplab.services.core.tasks import tasks
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.core.tuning import seen_of
@@ -34,6 +30,7 @@ from gaplab.services.specs.defaults import (
     shared_fields,
     simulated_reality,
     with_bounds,
+    with_proper_labels,
     with_usual_tunables,
 )
 from gaplab.services.specs.measured import bench_violations
@@ -47,6 +44,10 @@ from gaplab.services.specs.violations import (
     tunable_violations,
     tuning_violations,
 )
+from gaplab.services.world.controllers import controllers
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.tasks import tasks
 
 NEED_NO_OTHERS: tuple[Registry[Any], ...] = (
     robots,
@@ -87,12 +88,14 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         *budget_violations(budget, strategy, len(spec.tunables), (controllers, simulators), tuner, divisor),
     ]:
         raise InvalidSpec(violations)
+    plugins = {each.kind: (ref := getattr(spec, each.kind)) and completed(each, ref) for each in NEED_NO_OTHERS}
+    plugins["strategy"] = with_proper_labels(plugins["strategy"], strategy.named_tunables)
     return ResolvedSpec.filled_from(
         spec,
+        **plugins,
         name=spec.name or _label(strategy, preset),
         iterations=iterations,
         repetitions=spec.repetitions or preset.repetitions,
-        **{each.kind: (ref := getattr(spec, each.kind)) and completed(each, ref) for each in NEED_NO_OTHERS},
         controller_optimizer=completed(optimizers, spec.controller_optimizer or spec.optimizer),
         engine=completed(engines, simulated),
         tunables=tuple(with_bounds(ref, robot) for ref in spec.tunables),

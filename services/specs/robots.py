@@ -9,13 +9,13 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.results import SensorsRead
 from gaplab.schemas.sensitivity import Checked
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.core import robot_library
-from gaplab.services.core.controllers import controllers
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, gather
-from gaplab.services.core.robot_files import RobotFile
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.tasks import tasks
+from gaplab.services.world import robot_library
+from gaplab.services.world.controllers import controllers
+from gaplab.services.world.robot_files import RobotFile
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.tasks import tasks
 
 
 @dataclass(frozen=True)

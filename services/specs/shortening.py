@@ -10,8 +10,8 @@ from typing import Any
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, SpecRead, StudySpec
 from gaplab.services.core.errors import GaplabError
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.specs.resolution import is_direct, resolve, resolve_experiment, takes_samples
+from gaplab.services.specs.stored_specs import spec_of
 
 Spec = dict[str, Any]
 Stored = Mapping[str, Any]

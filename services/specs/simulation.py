@@ -11,13 +11,13 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.safety import Safety
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
-from gaplab.services.core.observations import QUIET, disturbed
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.safety import MOST_SIMULATORS, Extremes, extremes, recording_times, safety
-from gaplab.services.core.tunables.base import Tunable
-from gaplab.services.core.world import World
 from gaplab.services.engines.base import Engine
+from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.safety import MOST_SIMULATORS, Extremes, extremes, recording_times, safety
+from gaplab.services.world.sensing import QUIET, disturbed
+from gaplab.services.world.tunables.base import Tunable
+from gaplab.services.world.world import World
 
 WORLDS_KEPT = 4096
 

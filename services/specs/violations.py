@@ -11,15 +11,15 @@ from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.optimizers.base import Optimizer
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies.base import Strategy
-from gaplab.services.core.tunables.base import Tunable
-from gaplab.services.core.tunables.labels import label_of, proper, tunable_of
 from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.defaults import bounds_of, honoured, runs
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.tunables.base import Tunable
+from gaplab.services.world.tunables.labels import label_of, proper, tunable_of
 
 
 def tunable_violations(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> Iterator[Violation]:

@@ -10,21 +10,21 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.samples import CellError, SamplesRead
 from gaplab.schemas.traces import TracesSpec
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.csv_tables import read_csv
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.core.robot_files import read_robot_file
-from gaplab.services.core.robot_library import IMPORTED
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.sample_tables import checked, collected
-from gaplab.services.core.sample_tables import read_samples as read_table
-from gaplab.services.core.traces import Trace, read_trace
+from gaplab.services.csv_tables import read_csv
 from gaplab.services.plugins import folders
 from gaplab.services.replay.traces import evaluated, expected_in, refuse_other_bodies
 from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.defaults import default_engine
 from gaplab.services.specs.robots import robot_of_file
+from gaplab.services.specs.sample_tables import checked, collected
+from gaplab.services.specs.sample_tables import read_samples as read_table
 from gaplab.services.specs.simulation import Simulation
+from gaplab.services.world.robot_files import read_robot_file
+from gaplab.services.world.robot_library import IMPORTED
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.traces import Trace, read_trace
 
 
 def read_samples(

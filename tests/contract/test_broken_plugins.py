@@ -10,16 +10,16 @@ import pytest
 from gaplab.services.contract.checks import CHECKS, check_file, results
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
-from gaplab.services.core.motions import Motion
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.robots.toy_function import ToyFunction
-from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.strategies.base import Strategy
-from gaplab.services.core.strategies.random import Random
-from gaplab.services.core.tasks.base import Task
+from gaplab.services.core.strategies.paper import Random
 from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.specs.registries import REGISTRIES
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.robots.toy_function import ToyFunction
+from gaplab.services.world.sensing import Sensors
+from gaplab.services.world.tasks.base import Task
 
 
 def reasons(kind: str, plugin: type[Any]) -> str:

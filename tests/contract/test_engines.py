@@ -11,13 +11,16 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.motions import Motion, Trajectory, open_loop
-from gaplab.services.core.observations import disturbed
-from gaplab.services.core.robot_library import IMPORTED
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.tunables import tunables
-from gaplab.services.core.world import (
+from gaplab.services.engines import engines, stepped
+from gaplab.services.engines.base import USES, Engine
+from gaplab.services.engines.stepping import WARM_SCENES
+from gaplab.services.world.motions import Motion, Trajectory, open_loop
+from gaplab.services.world.robot_library import IMPORTED
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.base import Robot
+from gaplab.services.world.sensing import disturbed
+from gaplab.services.world.tunables import tunables
+from gaplab.services.world.world import (
     Body,
     Box,
     Capsule,
@@ -32,9 +35,6 @@ from gaplab.services.core.world import (
     Vector,
     World,
 )
-from gaplab.services.engines import engines, stepped
-from gaplab.services.engines.base import USES, Engine
-from gaplab.services.engines.stepping import WARM_SCENES
 
 
 class Pair(NamedTuple):
@@ -213,7 +213,7 @@ def test_engines_in_one_process_do_not_disturb_each_other(pair: Pair) -> None:
 
 
 SCRIPT = """
-from gaplab.services.core.robots import robots
+from gaplab.services.world.robots import robots
 from gaplab.services.engines import engines
 engine, robot = engines[{engine!r}](), robots[{robot!r}]()
 trajectory = engine.rollout(robot.world, robot.motion(robot.known))

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import about
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.world import (
+from gaplab.services.engines.base import Engine
+from gaplab.services.world.kinematics import about
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.world import (
     Body,
     Box,
     Capsule,
@@ -26,7 +27,6 @@ from gaplab.services.core.world import (
     Vector,
     World,
 )
-from gaplab.services.engines.base import Engine
 from tests.contract.textbook import X, Y, Z, engine
 
 __all__ = ["engine"]

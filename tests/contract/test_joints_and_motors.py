@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gaplab.services.core.kinematics import about, product
-from gaplab.services.core.world import (
+from gaplab.services.engines.base import Engine
+from gaplab.services.world.kinematics import about, product
+from gaplab.services.world.world import (
     UNTURNED,
     Body,
     Box,
@@ -21,7 +22,6 @@ from gaplab.services.core.world import (
     Sphere,
     World,
 )
-from gaplab.services.engines.base import Engine
 from tests.contract.textbook import (
     FRAME,
     LOAD,

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.kinematics import about, rotated
-from gaplab.services.core.motions import NO_MEMORY, Act, Loop, Motion
-from gaplab.services.core.observations import GROUPS, names
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Joint, PDMotor, Sphere, World
 from gaplab.services.engines.base import Engine
+from gaplab.services.world.kinematics import about, rotated
+from gaplab.services.world.motions import NO_MEMORY, Act, Loop, Motion
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.sensing import GROUPS, names
+from gaplab.services.world.world import Body, Box, Joint, PDMotor, Sphere, World
 from tests.contract.textbook import STEP_S, G, X, Y, Z, block, engine, honoured, rig, times
 
 __all__ = ["engine"]

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.world import Body, Box, Joint, Material, Motor, Sphere, World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.world import Body, Box, Joint, Material, Motor, Sphere, World
 
 G = 9.81
 STEP_S = 1 / 100

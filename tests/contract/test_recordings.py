@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.core.kinematics import body_poses, clearances_m
-from gaplab.services.core.motions import open_loop
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.world.kinematics import body_poses, clearances_m
+from gaplab.services.world.motions import open_loop
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.quadruped import Quadruped
 
 INSTALLED = [name for name, engine in engines.items() if engine.available()]
 EMBODIED = [name for name in INSTALLED if engines[name].runs(Quadruped().world)]

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from gaplab.services.core.robots import robots
+from gaplab.services.world.robots import robots
 
 
 @pytest.mark.parametrize("name", sorted(robots))

@@ -7,9 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import about, clearances_m, inverse, product
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.world import (
+from gaplab.services.engines.base import Engine
+from gaplab.services.world.kinematics import about, clearances_m, inverse, product
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.world import (
     UNTURNED,
     Body,
     Box,
@@ -24,7 +25,6 @@ from gaplab.services.core.world import (
     Sphere,
     World,
 )
-from gaplab.services.engines.base import Engine
 from tests.contract.textbook import STEP_S, G, X, Y, block, engine, held, honoured, positions, times
 
 __all__ = ["engine"]

@@ -1,6 +1,6 @@
 """What gaplab's own tunables promise; test_contract.py asks what every tunable does."""
 
-from gaplab.services.core.tunables import tunables
+from gaplab.services.world.tunables import tunables
 
 
 def test_the_papers_three_coefficients_are_there() -> None:

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.tunables.labels import tunable_of
 from gaplab.services.engines import engines
 from gaplab.services.specs.assembly import edits_of
 from gaplab.services.specs.defaults import honoured
 from gaplab.services.specs.simulation import Simulation
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.tunables.labels import tunable_of
 
 EDITS = {
     "mass(trunk)": 1.3,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gaplab.services.core import robot_library
-from gaplab.services.core.robots.robot_file import Imported
+from gaplab.services.world import robot_library
+from gaplab.services.world.robots.robot_file import Imported
 from tests.e2e.browser import axe, fits, screenshot
 from tests.e2e.test_page_replay import FLAT, eventually, time_of
 

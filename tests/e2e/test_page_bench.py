@@ -11,10 +11,10 @@ from playwright.sync_api import Error, expect
 
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
-from gaplab.services.bench import answering, attachments, taking
-from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
+from gaplab.services.measuring import answering, attachments, taking
+from gaplab.services.measuring.taking import RequestFilter
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import submit_one

@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator
 
 from gaplab.api.app import create_app
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.findings.sensitivity import Effort, check
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import subject
 from gaplab.services.store.session import Store

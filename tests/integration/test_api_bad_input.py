@@ -21,7 +21,7 @@ JSON = {"content-type": "application/json"}
 SLIPPERY = """
 from pathlib import Path
 
-from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.world.robots.toy_function import ToyFunction
 
 
 class Slippery(ToyFunction):

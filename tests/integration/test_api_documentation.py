@@ -16,9 +16,9 @@ from gaplab.api.app import create_app
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec
-from gaplab.services.bench import answering, taking
-from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.experiments.limits import FREELY
+from gaplab.services.measuring import answering, taking
+from gaplab.services.measuring.taking import RequestFilter
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, listed, run, submit_one, toy

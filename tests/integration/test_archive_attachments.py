@@ -13,11 +13,11 @@ from sqlalchemy import select
 from gaplab.api.app import create_app
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export, opening
-from gaplab.services.bench import attachments
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.experiments.deletion import Deleter, delete
 from gaplab.services.experiments.reading import read_experiment
 from gaplab.services.experiments.submission import submit
+from gaplab.services.measuring import attachments
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.session import Store

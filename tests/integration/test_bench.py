@@ -13,30 +13,37 @@ from fastapi.testclient import TestClient
 from sqlalchemy import func, select, update
 
 from gaplab.api.app import create_app
-from gaplab.schemas.corrections import ConflictSpec, CorrectionSpec, VoidSpec
 from gaplab.schemas.lifecycle import State, Verb
-from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, ReleaseSpec, TakeSpec
+from gaplab.schemas.measurements import (
+    ConflictSpec,
+    CorrectionSpec,
+    HolderSpec,
+    MeasurementSpec,
+    ReleaseSpec,
+    TakeSpec,
+    VoidSpec,
+)
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives import export
 from gaplab.services.archives.rerunning import Part, verify
-from gaplab.services.bench import answering, attachments, corrections, doubts, taking
-from gaplab.services.bench.branches import list_branches
-from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.deletion import Deleter, delete
 from gaplab.services.experiments.idempotency import KeyReused
+from gaplab.services.experiments.lease_ends import Silences
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.reading import list_samples, read, read_experiment
 from gaplab.services.experiments.states import settle
+from gaplab.services.measuring import answering, attachments, corrections, doubts, taking
+from gaplab.services.measuring.rewriting import list_branches
+from gaplab.services.measuring.taking import RequestFilter
 from gaplab.services.reports.content import facts_of, verdict_on
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
-from gaplab.services.running.leases import Silences
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.lease import Pulse

@@ -4,16 +4,15 @@ from typing import Any
 
 import pytest
 
-from gaplab.schemas.corrections import ConflictSpec
-from gaplab.schemas.measurements import MeasurementSpec, ReleaseSpec, TakeSpec
+from gaplab.schemas.measurements import ConflictSpec, MeasurementSpec, ReleaseSpec, TakeSpec
 from gaplab.schemas.traces import TracesRead, TracesSpec
-from gaplab.services.bench import answering, corrections, taking
 from gaplab.services.core.errors import LimitReached
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.limits import FREELY
+from gaplab.services.measuring import answering, corrections, taking
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.sent_specs import sent as sent_spec
 from gaplab.services.replay.traces import evaluate_traces, said_by_files
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.session import Store
 from gaplab.services.waiting_line import WaitingLine
 from tests.experiments import submit_one
@@ -25,7 +24,7 @@ ROBOT = '''
 import numpy as np
 
 from gaplab.plugins import Sensors, frozen
-from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.world.robots.toy_function import ToyFunction
 
 
 class Sensing(ToyFunction):

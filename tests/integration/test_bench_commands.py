@@ -14,8 +14,8 @@ from gaplab import Client
 from gaplab.api.clients.progress import RecordProgress, Snapshot, log
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.measurements import TakeSpec
-from gaplab.services.bench import taking
 from gaplab.services.experiments.limits import FREELY
+from gaplab.services.measuring import taking
 from gaplab.services.store.models import EventRow
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab

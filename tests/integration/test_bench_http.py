@@ -16,15 +16,15 @@ from gaplab import Client, InvalidSamples, ServiceError, ServiceUnreachable
 from gaplab.api.clients import driving
 from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.takes import TakeLost
-from gaplab.schemas.access import Role
+from gaplab.schemas.keeping import Role
 from gaplab.schemas.measurements import RequestRead, TakeSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services import access
-from gaplab.services.bench import taking
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.experiments.limits import FREELY
+from gaplab.services.measuring import taking
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
+from gaplab.services.world.robots.quadruped import Quadruped
 from tests.experiments import toy
 from tests.integration.test_bench import compute, fall_silent, truth
 from tests.integration.test_bench_safety import ask
@@ -307,10 +307,10 @@ def test_a_motion_leaves_in_three_formats(client: Client, store: Store) -> None:
     import numpy as np
 
     from gaplab.schemas.records import MeasurementKind
-    from gaplab.services.core.robots.quadruped import Quadruped
     from gaplab.services.core.types import Simulator, Transferred, Tuned
     from gaplab.services.running import execution
     from gaplab.services.store.lease import Requested
+    from gaplab.services.world.robots.quadruped import Quadruped
 
     known = Quadruped().known
     (claim,) = execution.claim(store, "here", 1)
@@ -613,8 +613,8 @@ def traces_of(genome: Any, folder: Path) -> Iterator[Path]:
     import numpy as np
 
     from gaplab.services.core.arrays import frozen
-    from gaplab.services.core.robots.quadruped import Quadruped
     from gaplab.services.engines.pybullet.engine import PyBullet
+    from gaplab.services.world.robots.quadruped import Quadruped
 
     robot, times = Quadruped(), frozen(np.arange(301) * 0.01)
     poses = PyBullet().record(robot.world, robot.motion(np.array(genome)), times).poses

@@ -9,10 +9,10 @@ import pytest
 import yaml
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.bench import motions
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.csv_tables import csv_text, read_csv
 from gaplab.services.core.errors import Conflict
+from gaplab.services.csv_tables import csv_text, read_csv
+from gaplab.services.measuring import motion_files
 from gaplab.services.specs.robots import Driven, robot_of
 
 ROBOT = '''
@@ -59,9 +59,9 @@ class Mixed(Robot):
 UNITS = ["rad", "m", "rad", "m", "rad/s", "m/s", "N·m", "N"]
 
 
-def written(robot: str, form: motions.MotionFormat) -> str:
+def written(robot: str, form: motion_files.MotionFormat) -> str:
     spec: Any = Driven(PluginRef(name=robot))
-    return motions.written(spec, robot_of(spec).known, form)
+    return motion_files.written(spec, robot_of(spec).known, form)
 
 
 def test_each_target_has_the_unit_of_what_its_motor_follows(put: Any) -> None:
@@ -96,7 +96,7 @@ def test_texts_in_csv_are_read_as_they_were_written() -> None:
 def test_a_trajectory_begins_at_rest_and_jumps_nowhere() -> None:
     spec: Any = Driven(PluginRef(name="quadruped"), controller=PluginRef(name="sine"))
     robot = robot_of(spec)
-    text = motions.written(spec, robot.known, "ros2")
+    text = motion_files.written(spec, robot.known, "ros2")
     points = yaml.safe_load(text)["points"]
     times = [each["time_from_start"]["sec"] + each["time_from_start"]["nanosec"] / 1e9 for each in points]
     targets = np.array([each["positions"] for each in points])
@@ -111,8 +111,8 @@ def test_a_trajectory_begins_at_rest_and_jumps_nowhere() -> None:
 
 
 @pytest.mark.parametrize("form", ["csv", "json", "ros2"])
-def test_a_robot_without_actuators_has_no_motion(form: motions.MotionFormat) -> None:
-    assert motions.forms_of(robot_of(Driven(PluginRef(name="toy_function"))), frozen([0.3])) == ()
+def test_a_robot_without_actuators_has_no_motion(form: motion_files.MotionFormat) -> None:
+    assert motion_files.forms_of(robot_of(Driven(PluginRef(name="toy_function"))), frozen([0.3])) == ()
 
     with pytest.raises(Conflict, match="toy_function has no actuators, so its controller has no motion"):
         written("toy_function", form)

@@ -5,17 +5,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.schemas.corrections import VoidSpec
 from gaplab.schemas.lifecycle import Verb
-from gaplab.schemas.measurements import AnswerState, MeasurementSpec
+from gaplab.schemas.measurements import AnswerState, MeasurementSpec, VoidSpec
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.archives import export
-from gaplab.services.bench import answering, corrections, taking
-from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Probed, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
+from gaplab.services.measuring import answering, corrections, taking
+from gaplab.services.measuring.taking import RequestFilter
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Claim, Requested
 from gaplab.services.store.queries.logs import logs

@@ -16,7 +16,7 @@ from gaplab.api.clients.errors import ServiceUnreachable
 from gaplab.api.commands import demo
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.findings.sensitivity import Effort, check
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import subject
 from gaplab.services.store.lease import Failure

@@ -21,18 +21,18 @@ import gaplab
 from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable
 from gaplab.api.app import create_app
 from gaplab.api.clients import results, tables
-from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind, EventRead
+from gaplab.schemas.keeping import Role
 from gaplab.services import access
-from gaplab.services.core import robot_library
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.robots.robot_file import Imported
 from gaplab.services.core.types import Measured
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
+from gaplab.services.world import robot_library
+from gaplab.services.world.robots.robot_file import Imported
 from tests.experiments import run, some_log
 
 SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}

@@ -152,7 +152,7 @@ def test_the_command_prints_each_format(ids: list[str], gaplab: Gaplab) -> None:
 
 
 SLIPPERY = """
-from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.world.robots.toy_function import ToyFunction
 
 
 class Slippery(ToyFunction):

@@ -15,13 +15,13 @@ from typing import Any
 import pytest
 from fastapi import FastAPI
 
-from gaplab.schemas.access import Role
+from gaplab.schemas.keeping import Role
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
 from gaplab.services import access
-from gaplab.services.bench import answering, taking
 from gaplab.services.experiments import lifecycle
 from gaplab.services.experiments.limits import FREELY
+from gaplab.services.measuring import answering, taking
 from gaplab.services.store.models import RequestRow
 from gaplab.services.store.queries.requests import withdraw
 from gaplab.services.store.session import Store

@@ -24,10 +24,11 @@ from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.types import Measured, Outcome, Probed, Sample, Tuned
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
-from gaplab.services.experiments import checks, lifecycle, reading, submission
-from gaplab.services.running import execution, repetition_leases, sensitivity
+from gaplab.services.experiments import checks, lease_ends, lifecycle, reading, submission
+from gaplab.services.experiments.lease_ends import Silences
+from gaplab.services.running import execution, sensitivity
 from gaplab.services.running.execution import Failure
-from gaplab.services.running.leases import MAX_LOSSES, Silences
+from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.clock import moment
@@ -380,7 +381,7 @@ def test_a_heartbeat_that_comes_while_others_are_given_up_keeps_its_lease(
 
     with store.transaction() as session:
         session.execute(update(row).values(heartbeat_at=moment(session) - timedelta(seconds=60)))
-    monkeypatch.setattr(repetition_leases, "lock", beaten)
+    monkeypatch.setattr(lease_ends, "lock", beaten)
 
     assert execution.requeue_lost(store, stale_after_s=30.0) == 0
     assert execution.heartbeat(store, [held]) == (held,)

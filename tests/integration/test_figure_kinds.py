@@ -18,9 +18,8 @@ from gaplab.services.figures.marks import Diagonal, FigureDefinition, Label, Lev
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.results import curves
-from gaplab.services.results.coordinates import setting_coordinates
-from gaplab.services.results.curve_costs import cost_axis
-from gaplab.services.results.tuned_simulators import tuned_simulators
+from gaplab.services.results.curves import cost_axis
+from gaplab.services.results.tuned_simulators import setting_coordinates, tuned_simulators
 from gaplab.services.running import execution
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store

@@ -14,10 +14,9 @@ from fastapi.testclient import TestClient
 from httpx2 import Response
 
 from gaplab.api.app import create_app
-from gaplab.schemas.access import Role
+from gaplab.schemas.keeping import Role, ViewSpec
 from gaplab.schemas.robots import EXAMPLE
 from gaplab.schemas.spec import StudySpec
-from gaplab.schemas.views import ViewSpec
 from gaplab.services.access import create_token
 from gaplab.services.archives.opening import DATABASE
 from gaplab.services.core.loop import repetition

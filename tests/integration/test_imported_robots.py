@@ -5,9 +5,9 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.motions import Motion
 from gaplab.services.engines import engines
 from gaplab.services.specs.assembly import engine_of
+from gaplab.services.world.motions import Motion
 from tests.real_robots import STANCES, for_each, imported
 
 pytest.importorskip("mujoco")

@@ -7,9 +7,9 @@ from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.running.execution import claim
 from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from tests.experiments import run, submit_one, toy

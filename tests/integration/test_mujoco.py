@@ -12,9 +12,6 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion, open_loop
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Joint, Material, Motor, Sphere, World
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco import worlds as models_module
 from gaplab.services.engines.mujoco.callback import callbacks, layout
@@ -22,6 +19,9 @@ from gaplab.services.engines.mujoco.model import named
 from gaplab.services.engines.mujoco.pool import in_force
 from gaplab.services.engines.mujoco.scene import ROWS
 from gaplab.services.engines.mujoco.worlds import Models
+from gaplab.services.world.motions import Motion, open_loop
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import Body, Box, Joint, Material, Motor, Sphere, World
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("mujoco.introspect.structs")
@@ -233,7 +233,7 @@ def test_a_robot_of_large_models_keeps_few_of_them(engine: MuJoCo, monkeypatch: 
 @pytest.mark.release
 def test_warnings_are_neither_printed_nor_written_to_a_file(tmp_path: Path) -> None:
     script = (
-        "from dataclasses import replace; from gaplab.services.core.robots.quadruped import Quadruped;"
+        "from dataclasses import replace; from gaplab.services.world.robots.quadruped import Quadruped;"
         "from gaplab.services.engines.mujoco import MuJoCo; import os; robot = Quadruped();"
         f"engine = MuJoCo(); os.chdir({str(tmp_path)!r});"
         "engine.rollout(replace(robot.world, gravity_m_s2=-1e300), robot.motion(robot.known))"

@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.inertias import inverse_inertias
-from gaplab.services.core.motions import Loop, Motion
-from gaplab.services.core.world import (
+from gaplab.services.engines.mujoco import MuJoCo
+from gaplab.services.engines.mujoco import scene as of_scenes
+from gaplab.services.engines.mujoco import worlds as of_worlds
+from gaplab.services.engines.mujoco.model import Structure, _inverse_inertias
+from gaplab.services.engines.mujoco.model import compiled as compiled_once
+from gaplab.services.engines.mujoco.worlds import Models
+from gaplab.services.world.inertias import inverse_inertias
+from gaplab.services.world.motions import Loop, Motion
+from gaplab.services.world.world import (
     Body,
     Box,
     Capsule,
@@ -25,12 +31,6 @@ from gaplab.services.core.world import (
     Sphere,
     World,
 )
-from gaplab.services.engines.mujoco import MuJoCo
-from gaplab.services.engines.mujoco import scene as of_scenes
-from gaplab.services.engines.mujoco import worlds as of_worlds
-from gaplab.services.engines.mujoco.model import Structure, _inverse_inertias
-from gaplab.services.engines.mujoco.model import compiled as compiled_once
-from gaplab.services.engines.mujoco.worlds import Models
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("numba")

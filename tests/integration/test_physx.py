@@ -10,13 +10,13 @@ import pytest
 
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion, open_loop
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Joint, Material, Motor, Sphere, Vector, World
 from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.physx.scene import PhysXScene
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.world.motions import Motion, open_loop
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import Body, Box, Joint, Material, Motor, Sphere, Vector, World
 
 if not PhysX.available():
     pytest.skip(PhysX.install, allow_module_level=True)
@@ -63,7 +63,7 @@ def turned(engine: PhysX, world: World, target: float, steps: int) -> PhysXScene
 def test_a_rollout_says_nothing_and_warns_of_nothing() -> None:
     script = """
 from dataclasses import replace
-from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.world.robots.quadruped import Quadruped
 from gaplab.services.engines.physx import PhysX
 robot = Quadruped()
 for gravity in (9.81, 1e9):

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.world import (
+from gaplab.services.engines.physx import PhysX
+from gaplab.services.engines.physx.robot import MOST_SURFACES
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.world import (
     Body,
     Box,
     Capsule,
@@ -24,8 +26,6 @@ from gaplab.services.core.world import (
     Sphere,
     World,
 )
-from gaplab.services.engines.physx import PhysX
-from gaplab.services.engines.physx.robot import MOST_SURFACES
 from tests.contract.textbook import LOAD, STEP_S, G, X, Y, Z, angles, changing, held, rig, times
 
 if not PhysX.available():

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Body, Box, Joint, Material, Sphere, World
 from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.physx.scene import PhysXScene
+from gaplab.services.world.world import Body, Box, Joint, Material, Sphere, World
 
 if not PhysX.available():
     pytest.skip(PhysX.install, allow_module_level=True)

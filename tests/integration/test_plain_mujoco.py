@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.motions import Motion, open_loop
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Material, PDMotor, World
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco.plain import mjcf_of, plain_positions
+from gaplab.services.world.motions import Motion, open_loop
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import Body, Box, Material, PDMotor, World
 from tests.real_robots import imported
 
 ROBOT = Quadruped()

@@ -14,7 +14,6 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.sensitivity import SensitivitySpec
 from gaplab.services import events
 from gaplab.services.core.registry import EXTERNAL
-from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import checks, reading
@@ -23,6 +22,7 @@ from gaplab.services.running import execution, provenance, sensitivity, versions
 from gaplab.services.settings import Settings
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
+from gaplab.services.world.robots import robots
 from gaplab.workers import nodes
 from gaplab.workers.cluster import cluster
 from gaplab.workers.errors import ClusterUnusable
@@ -39,14 +39,14 @@ CHANGING = """
 
 import os
 
-from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.world.robots.toy_function import ToyFunction
 
 if os.environ.get("CHANGES_GAPLAB"):
     true_fitness = ToyFunction.fitness
     ToyFunction.fitness = lambda self, seen: 2 * true_fitness(self, seen)
 """
 GAIT = """
-from gaplab.services.core.controllers.square_pulses import SquarePulses
+from gaplab.services.world.controllers.pulses import SquarePulses
 
 
 class Gait(SquarePulses):
@@ -54,7 +54,7 @@ class Gait(SquarePulses):
 """
 WALKER = """
 from gaplab.plugins import PluginRef
-from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.world.robots.quadruped import Quadruped
 
 
 class Walker(Quadruped):
@@ -62,7 +62,7 @@ class Walker(Quadruped):
     usual_controller = PluginRef(name="gait")
 """
 SLIPPERY = """
-from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.world.robots.toy_function import ToyFunction
 
 
 class Slippery(ToyFunction):

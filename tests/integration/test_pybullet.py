@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.controllers.cpg import Cpg
-from gaplab.services.core.kinematics import about, body_poses
-from gaplab.services.core.motions import Motion, open_loop
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Hull, Inertia, Joint, Material, Motor, Part, PDMotor, Sphere, World
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.scene import StickSlip
 from gaplab.services.specs.defaults import default_engine
+from gaplab.services.world.controllers.oscillators import Cpg
+from gaplab.services.world.kinematics import about, body_poses
+from gaplab.services.world.motions import Motion, open_loop
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import Body, Box, Hull, Inertia, Joint, Material, Motor, Part, PDMotor, Sphere, World
 
 pytest.importorskip("pybullet")
 

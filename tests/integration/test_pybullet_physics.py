@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gaplab.services.core.world import Body, Box, Joint, Material, Sphere, World
 from gaplab.services.engines.pybullet.scene import PyBulletScene, StickSlip
+from gaplab.services.world.world import Body, Box, Joint, Material, Sphere, World
 
 pybullet: ModuleType = pytest.importorskip("pybullet")
 

@@ -21,7 +21,6 @@ from gaplab.schemas.replays import Replay
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
 from gaplab.services.engines import engines
 from gaplab.services.engines.pybullet.engine import PyBullet
@@ -34,6 +33,7 @@ from gaplab.services.store.lease import Requested
 from gaplab.services.store.models import RequestRow
 from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.session import Store
+from gaplab.services.world.robots.quadruped import Quadruped
 from tests.experiments import run, submit_one, toy
 from tests.fakes import install
 from tests.waiting import LONGEST_S, wait_until
@@ -320,7 +320,7 @@ def test_what_was_computed_once_is_remembered(sqlite_store: Store) -> None:
 
 
 WALKER = """
-from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.world.robots.quadruped import Quadruped
 
 
 class Walker(Quadruped):

@@ -13,17 +13,17 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import Replay, RobotShapes
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.bench import motions
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.robots import robots
 from gaplab.services.core.types import Simulator, Transferred, Tuned
-from gaplab.services.core.world import PDMotor
+from gaplab.services.measuring import motion_files
 from gaplab.services.plugins import loading
 from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Requested
 from gaplab.services.store.session import Store
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.robots import robots
+from gaplab.services.world.world import PDMotor
 from tests.drawn_robot import FILES, strode
 from tests.experiments import submit_one
 
@@ -99,18 +99,18 @@ def test_a_controller_in_a_loop_has_no_motion_to_take_to_the_bench(sqlite_store:
     assert {answer.status_code for answer in refused.values()} == {409}
     assert "observes the robot while it acts" in refused["csv"].json()["detail"]
     assert (shown.status_code, shown.json()["reality"]) == (200, None)
-    assert motions.forms_of(robots["strider"](), genome) == ()
+    assert motion_files.forms_of(robots["strider"](), genome) == ()
 
 
 def test_velocities_are_not_written_as_the_positions_of_a_trajectory() -> None:
     robot = robots.create(PluginRef(name="quadruped"))
-    assert motions.forms_of(robot, robot.known) == ("csv", "json", "ros2")
+    assert motion_files.forms_of(robot, robot.known) == ("csv", "json", "ros2")
     assert isinstance(robot.motion(robot.known), Motion)
 
     first, *others = robot.world.joints
     robot.world = replace(robot.world, joints=(replace(first, motor=PDMotor("velocity", 1.0)), *others))
 
-    assert motions.forms_of(robot, robot.known) == ("csv", "json")
+    assert motion_files.forms_of(robot, robot.known) == ("csv", "json")
 
 
 def test_each_robot_with_a_body_has_shapes_as_it_stands_at_the_start(api: TestClient) -> None:

@@ -13,14 +13,14 @@ import pytest
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.robot_files import read_robot_file
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
-from gaplab.services.core.world import Material
 from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
+from gaplab.services.world.robot_files import read_robot_file
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import Material
 from tests.commands import Gaplab
 from tests.experiments import run, submit_one
 from tests.robot_texts import MJCF
@@ -113,7 +113,7 @@ def test_a_misspelt_controller_or_task_is_told_at_the_import(
 def test_a_controller_of_the_plug_ins_folder_is_known_to_an_import(
     gaplab: Gaplab, tmp_path: Path, put: Callable[..., Path]
 ) -> None:
-    put(mine="from gaplab.services.core.controllers.sine import Sine\nclass Mine(Sine):\n    name = 'mine'\n")
+    put(mine="from gaplab.services.world.controllers.oscillators import Sine\nclass Mine(Sine):\n    name = 'mine'\n")
     (tmp_path / "m.xml").write_text(MJCF.format(""))
 
     said = gaplab("robot", "import", str(tmp_path / "m.xml"), "-o", str(tmp_path / "m.json"), "-s", "controller=mine")

@@ -10,8 +10,8 @@ from gaplab.schemas.sensitivity import Sensitivity, SensitivitySpec, Verdict
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.sensitivity import Effort, check
 from gaplab.services.experiments import checks, reading, submission
+from gaplab.services.findings.sensitivity import Effort, check
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import subject

@@ -12,12 +12,12 @@ from gaplab.api.commands.cli import app
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.spec import StudySpec
 from gaplab.services import logs
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines import engines
 from gaplab.services.experiments import submission
 from gaplab.services.plugins import loading
 from gaplab.services.specs.defaults import default_engine
 from gaplab.services.store.session import Store
+from gaplab.services.world.robots.quadruped import Quadruped
 from tests.commands import Gaplab
 
 SMALL = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke"}

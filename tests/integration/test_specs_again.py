@@ -34,7 +34,7 @@ from tests.numbers.kept_numbers import FOLDER
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 QUITTER = """
-from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.world.robots.toy_function import ToyFunction
 
 
 class Quitter(ToyFunction):
@@ -47,7 +47,7 @@ DIES = """
 import os
 import signal
 
-from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.world.robots.toy_function import ToyFunction
 
 
 class Dies(ToyFunction):
@@ -60,7 +60,7 @@ LINGERING = """
 from multiprocessing import parent_process
 from threading import Event, Thread
 
-from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.world.robots.toy_function import ToyFunction
 
 if parent_process():
     Thread(target=Event().wait).start()

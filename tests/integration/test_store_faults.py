@@ -16,7 +16,7 @@ from ray.exceptions import RayTaskError, WorkerCrashedError
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.findings.sensitivity import Effort, check
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.store.database_errors import StoreUnavailable

@@ -14,13 +14,8 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import export
 from gaplab.services.archives.rerunning import verify
-from gaplab.services.core import robot_library, world_checks
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.robot_files import RobotFile, read_robot_file
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.robots.robot_file import Imported
-from gaplab.services.core.world import Inertia
 from gaplab.services.experiments import stored_robots, submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting
@@ -28,6 +23,11 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, RobotRow
 from gaplab.services.store.session import Store
+from gaplab.services.world import robot_library, world_checks
+from gaplab.services.world.robot_files import RobotFile, read_robot_file
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.robots.robot_file import Imported
+from gaplab.services.world.world import Inertia
 from tests.archiving import exported, imported
 from tests.experiments import listed, run, submit_one
 

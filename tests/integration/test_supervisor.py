@@ -21,11 +21,11 @@ from sqlalchemy import select
 
 from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.schemas.measurements import TakeSpec
-from gaplab.services.bench import taking
 from gaplab.services.experiments import reading
+from gaplab.services.experiments.lease_ends import Silences
 from gaplab.services.experiments.limits import FREELY
+from gaplab.services.measuring import taking
 from gaplab.services.running import execution
-from gaplab.services.running.leases import Silences
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.database_errors import StoreChanged
 from gaplab.services.store.models import SupervisorRow

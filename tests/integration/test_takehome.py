@@ -16,15 +16,15 @@ from sqlalchemy import update
 
 import gaplab
 from gaplab import Client, ServiceError
-from gaplab.services.bench import attachments
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.engines.mujoco.engine import MuJoCo
+from gaplab.services.measuring import attachments
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.running import execution
 from gaplab.services.store.models import AnswerRow
 from gaplab.services.store.session import Store
+from gaplab.services.world.robots.quadruped import Quadruped
 from tests.experiments import run, submit_one, toy
 from tests.integration.test_bench import compute, measure, pending
 from tests.integration.test_bench_safety import ask

@@ -22,11 +22,11 @@ from gaplab.schemas.sensitivity import SensitivitySpec, Verdict
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.sensitivity import Effort, check
 from gaplab.services.core.types import Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, reading
+from gaplab.services.findings.sensitivity import Effort, check
 from gaplab.services.running import sensitivity
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.specs.resolution import resolve_experiment

@@ -9,14 +9,13 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.answers import BLOCK, Answers, pack, unpack
-from gaplab.services.core.history import History
 from gaplab.services.core.loop import next_step, repetition
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
 from gaplab.services.core.search import maximise
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.types import Budget
+from gaplab.services.core.types import Budget, History
 from tests.fakes import Recorder, flat, paraboloid, small_setting
 from tests.parameters import few
 

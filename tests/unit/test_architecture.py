@@ -17,42 +17,52 @@ ON_DEMAND = {"pandas"}  # heavy, and optional: the API imports it inside functio
 WEB = {"fastapi", "starlette", "pydantic", "anyio", "prometheus_client"}
 
 ROOMS = {
-    "core": ((), {"numpy", "scipy", "pydantic", "cma"}),
-    "engines": (("core",), {"numpy", "pydantic"}),
-    "robots": (("core", "engines"), {"numpy", "scipy", "pydantic", "lxml"}),
-    "store": (("core",), {"sqlalchemy", "psycopg"}),
+    "core": ((), {"numpy", "scipy", "pydantic"}),
+    "world": (("core", "csv_tables"), {"numpy", "scipy", "pydantic"}),
+    "engines": (("core", "world"), {"numpy", "pydantic"}),
+    "robots": (("core", "world", "engines"), {"numpy", "scipy", "pydantic", "lxml"}),
     "figures": ((), {"matplotlib"}),
-    "findings": (("core", "figures"), {"numpy", "scipy"}),
-    "specs": (("core", "engines"), {"numpy"}),
-    "plugins": (("core", "engines", "specs"), {"pydantic"}),
-    "contract": (("core", "engines", "specs", "plugins"), {"numpy"}),
+    "findings": (("core", "world", "figures"), {"numpy", "scipy"}),
+    "specs": (("core", "world", "engines", "findings", "csv_tables"), {"numpy"}),
+    "store": (("core", "world", "specs"), {"sqlalchemy", "psycopg"}),
+    "plugins": (("core", "world", "engines", "specs"), {"pydantic"}),
+    "contract": (("core", "world", "engines", "specs", "plugins"), {"numpy"}),
     "experiments": (
-        ("core", "engines", "store", "specs", "plugins", "settings"),
+        ("core", "world", "engines", "findings", "store", "specs", "plugins", "settings"),
         {"sqlalchemy", "lark", "markdown_it"},
     ),
-    "running": (("core", "engines", "store", "specs", "plugins", "experiments"), {"sqlalchemy"}),
-    "bench": (("core", "store", "findings", "specs", "experiments", "running", "settings"), {"sqlalchemy"}),
-    "results": (("core", "store", "figures", "findings", "specs", "experiments"), {"numpy"}),
+    "measuring": (
+        ("core", "world", "findings", "store", "specs", "experiments", "settings", "csv_tables"),
+        {"sqlalchemy"},
+    ),
+    "running": (("core", "engines", "store", "plugins", "experiments", "measuring"), {"sqlalchemy"}),
+    "results": (
+        ("core", "world", "figures", "findings", "store", "specs", "experiments", "csv_tables"),
+        {"numpy"},
+    ),
     "replay": (
-        ("core", "store", "specs", "plugins", "experiments", "waiting_line"),
+        ("core", "world", "store", "specs", "plugins", "experiments", "waiting_line"),
         {"numpy", "scipy"},
     ),
     "notifications": (("core", "store", "experiments", "settings"), {"sqlalchemy", "httpx2"}),
     "archives": (
-        ("core", "engines", "store", "specs", "plugins", "experiments", "running", "results", "settings"),
+        (
+            *("core", "world", "engines", "store", "specs", "plugins", "experiments", "running", "results"),
+            *("settings", "nesting"),
+        ),
         {"numpy", "pydantic"},
     ),
     "reports": (
         (
-            *("core", "engines", "store", "figures", "findings", "specs", "experiments", "running", "bench"),
-            *("results", "replay"),
+            *("core", "world", "engines", "figures", "findings", "store", "specs", "experiments", "measuring"),
+            *("running", "results", "replay", "csv_tables"),
         ),
         {"numpy", "jinja2"},
     ),
 }
 """Rooms of services, each below those that may import it: what of services each may import, and what of others."""
 
-TOOLS = {"settings", "waiting_line"}
+TOOLS = {"settings", "waiting_line", "csv_tables", "nesting"}
 """Modules of services, besides rooms, that rooms may import."""
 
 MIGRATES = {"archives": ("migrations",)}
@@ -78,7 +88,7 @@ ARROWS = {
     "api/app.py": (("services", "api.http", "api.routes"), {"fastapi"}),
     "api/process": (("services", "migrations", "api.app", "api.clients", "api.process"), {"fastapi", "uvicorn", "h11"}),
     "api/clients": (
-        ("schemas", "services.settings", "services.core.csv_tables", "services.findings.tables", "api.clients"),
+        ("schemas", "services.settings", "services.csv_tables", "services.findings.tables", "api.clients"),
         ON_DEMAND | {"httpx2", "pydantic", "rich"},
     ),
     "api/commands": (
@@ -87,7 +97,12 @@ ARROWS = {
     ),
     "api": (("services", "api.process"), set()),
     "src": (
-        ("schemas", *map("services.{}".format, ("core", "engines", "plugins", "specs", "replay")), "api", "samples"),
+        (
+            "schemas",
+            *map("services.{}".format, ("core", "world", "engines", "plugins", "specs", "replay", "csv_tables")),
+            "api",
+            "samples",
+        ),
         set(),
     ),
     "migrations": (
@@ -216,10 +231,10 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     TopologicalSorter(graph).prepare()  # raises CycleError with the circle
 
 
-def test_the_core_has_no_clock_no_chance_of_its_own_and_no_side_effects() -> None:
-    core = [path for path in MODULES if path.as_posix().startswith("services/core/")]
+def test_core_and_world_have_no_clock_no_chance_of_their_own_and_no_side_effects() -> None:
+    pure = [path for path in MODULES if path.as_posix().startswith(("services/core/", "services/world/"))]
 
-    assert {str(path): wrong for path in core if (wrong := tops_of(path) & IMPURE)} == {}
+    assert {str(path): wrong for path in pure if (wrong := tops_of(path) & IMPURE)} == {}
 
 
 CREATES = """
@@ -228,7 +243,7 @@ import sys
 import numpy.ma  # which NumPy imports when it is first used
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.robots import robots
+from gaplab.services.world.robots import robots
 from gaplab.services.specs.registries import REGISTRIES
 from gaplab.services.store.session import Store
 
@@ -246,7 +261,7 @@ except InvalidSpec:
 """
 
 
-def test_to_create_a_plug_in_of_the_core_opens_imports_and_asks_nothing() -> None:
+def test_to_create_a_plug_in_opens_imports_and_asks_nothing() -> None:
     done = subprocess.run([sys.executable, "-c", CREATES], capture_output=True, text=True, cwd=ROOT, check=False)
 
     count, _, touched = done.stdout.strip().partition(" ")

@@ -9,7 +9,7 @@ from gaplab.services.core.answers import Answers
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.base import TuningTask
-from gaplab.services.core.tuners.climbers import Climbers, ClimbersOptions
+from gaplab.services.core.tuners.search import Climbers, ClimbersOptions
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Sample, Simulator
 from tests.fakes import TRUTH, Recorder, paraboloid

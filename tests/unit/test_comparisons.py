@@ -10,8 +10,17 @@ from hypothesis import strategies as st
 from numpy.random import default_rng
 from scipy import stats
 
-from gaplab.schemas.comparison_columns import COLUMNS, PAIRED, TESTS, TEXTS, row, shown_tests
-from gaplab.schemas.comparisons import EquivalenceVerdict, Estimate, Found
+from gaplab.schemas.comparisons import (
+    COLUMNS,
+    PAIRED,
+    TESTS,
+    TEXTS,
+    EquivalenceVerdict,
+    Estimate,
+    Found,
+    row,
+    shown_tests,
+)
 from gaplab.services.findings.comparisons import (
     Compared,
     compare_all,

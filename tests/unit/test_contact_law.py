@@ -5,8 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import PDLaw
 from gaplab.services.engines.mujoco.law import (
     PD,
     Servo,
@@ -19,6 +17,8 @@ from gaplab.services.engines.mujoco.law import (
     stop,
     touch,
 )
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import PDLaw
 
 WORLD = Quadruped().world
 STEP_S = WORLD.time_step_s

@@ -8,17 +8,17 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract import controllers as contract
-from gaplab.services.core.controllers import controllers
-from gaplab.services.core.controllers.mlp import Mlp
-from gaplab.services.core.controllers.parts import Limbs, middles, weighted
-from gaplab.services.core.controllers.plastic import Plastic
-from gaplab.services.core.controllers.sine import Sine
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.kinematics import about, inverse, product, rotated
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines import engines
 from gaplab.services.specs.robots import Driven, robot_of
+from gaplab.services.world.controllers import controllers
+from gaplab.services.world.controllers.mlp import Mlp
+from gaplab.services.world.controllers.oscillators import Sine
+from gaplab.services.world.controllers.parts import Limbs, middles, weighted
+from gaplab.services.world.controllers.plastic import Plastic
+from gaplab.services.world.kinematics import about, inverse, product, rotated
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.robots.quadruped import Quadruped
 
 OBSERVE_S = np.array([0.5, 3.0])
 WORLD = Quadruped().world

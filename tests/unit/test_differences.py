@@ -6,9 +6,9 @@ import pytest
 
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.stored_specs import without_truth
 from gaplab.services.specs.differences import SpecColumn, differences
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.specs.stored_specs import without_truth
 
 
 def spec(**changes: Any) -> dict[str, Any]:

@@ -8,8 +8,8 @@ import pytest
 
 from gaplab import DriverMotion
 from gaplab.api.clients import drivers
-from gaplab.services.core.motions import open_loop
-from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.world.motions import open_loop
+from gaplab.services.world.robots.quadruped import Quadruped
 
 FILE = Path(__file__).parents[2] / "examples" / "mylab.py"
 

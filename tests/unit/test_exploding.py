@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.world import Body, Box, Joint, Sphere, World
 from gaplab.services.engines.stepped import checked_s, explodes
+from gaplab.services.world.sensing import gravity_m_s2
+from gaplab.services.world.world import Body, Box, Joint, Sphere, World
 
 HOPPER = World(
     bodies=(Body("base", 1.0, Box((0.2, 0.1, 0.1))), Body("leg", 0.1, Sphere(0.02), (0.0, 0.0, -0.28))),

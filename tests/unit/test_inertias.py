@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gaplab.services.core.inertias import inertia_of, inverse_inertias
-from gaplab.services.core.kinematics import about, rotated
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import (
+from gaplab.services.world.inertias import inertia_of, inverse_inertias
+from gaplab.services.world.kinematics import about, rotated
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import (
     Body,
     Box,
     Capsule,

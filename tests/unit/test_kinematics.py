@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from gaplab.services.core.kinematics import about, body_poses, clearances_m, product, rotated
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Joint, Motor, Sphere, World
 from gaplab.services.replay.shapes import labels, shapes_of
+from gaplab.services.world.kinematics import about, body_poses, clearances_m, product, rotated
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import Body, Box, Joint, Motor, Sphere, World
 
 QUARTER = np.pi / 2
 MOTOR = Motor(0.1, 1.0)

@@ -10,7 +10,6 @@ import pytest
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.history import History
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.cma_es import CmaEs
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
@@ -18,7 +17,7 @@ from gaplab.services.core.scoring import weights_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Diverse, DiverseOptions
 from gaplab.services.core.tuners.search import SearchOptions, SearchTuner
-from gaplab.services.core.types import Belief, Measured, Sample, Selected, Simulator, Transferred, Tuned
+from gaplab.services.core.types import Belief, History, Measured, Sample, Selected, Simulator, Transferred, Tuned
 from gaplab.services.plugins.external import named_in
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment

@@ -8,13 +8,22 @@ import pytest
 
 from gaplab.services.core.discrepancies.fitness import AbsoluteFitness
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.history import History, recorded_fitness
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import DiverseOptions, Strategy
-from gaplab.services.core.strategies.informative import Informative
-from gaplab.services.core.strategies.random import Random
-from gaplab.services.core.types import Belief, Budget, Measured, Probed, Sample, Selected, Transferred, Tuned
+from gaplab.services.core.strategies.paper import Informative, Random
+from gaplab.services.core.types import (
+    Belief,
+    Budget,
+    History,
+    Measured,
+    Probed,
+    Sample,
+    Selected,
+    Transferred,
+    Tuned,
+    recorded_fitness,
+)
 from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
 from tests.parameters import few
 

@@ -12,7 +12,7 @@ from mcap_ros2.writer import Writer as RosWriter
 
 from gaplab import ExtraMissing
 from gaplab.api.clients.mcap_traces import mcap_to_csv
-from gaplab.services.core.traces import read_trace
+from gaplab.services.world.traces import read_trace
 
 POSE = """std_msgs/Header header
 geometry_msgs/Pose pose

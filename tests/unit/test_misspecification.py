@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.schemas.misfit import Identification
+from gaplab.schemas.results import Identification
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import NO_READINGS, frozen
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.discrepancies.readings import Readings
 from gaplab.services.core.linear_models import SURPRISING, fit_of, widened
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.gauss_newton import GaussNewton
@@ -22,6 +21,7 @@ from gaplab.services.core.types import Fit, Sample, Simulator
 from gaplab.services.findings.identification import Means, verdicts
 from gaplab.services.findings.misfit import Tuning, doubt, misfit_point
 from gaplab.services.findings.simulator_sentences import unreproduced
+from gaplab.services.world.sensing import Sensors
 
 SPACE = Space.box([0.0, 10.0], [1.0, 30.0])
 SENSORS = Sensors(("roll", "height"), ("rad", "m"), frozen([0.02, 0.005]), frozen([0.5, 1.0, 1.5]))

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.motions import Loop, Trajectory, open_loop
-from gaplab.services.core.observations import disturbed
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.robots.toy_function import ToyFunction
-from gaplab.services.core.world import Noise
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.specs.assembly import edits_of
 from gaplab.services.specs.robots import Driven, robot_of
 from gaplab.services.specs.simulation import Simulation
+from gaplab.services.world.motions import Loop, Trajectory, open_loop
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.robots.toy_function import ToyFunction
+from gaplab.services.world.sensing import disturbed
+from gaplab.services.world.world import Noise
 
 ROBOT = Quadruped()
 MOTION = open_loop(ROBOT.motion(ROBOT.known))

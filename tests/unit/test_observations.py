@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.services.core.kinematics import Clearances, about, body_poses, clearances_m, observed_poses, product
-from gaplab.services.core.observations import GROUPS, Bearing, feet, gravity_m_s2, names, noises, observations
-from gaplab.services.core.world import (
+from gaplab.services.world.kinematics import Clearances, about, body_poses, clearances_m, observed_poses, product
+from gaplab.services.world.sensing import GROUPS, Bearing, feet, gravity_m_s2, names, noises, observations
+from gaplab.services.world.world import (
     Body,
     Box,
     Capsule,

@@ -10,10 +10,10 @@ from deno import find_deno_bin
 
 from gaplab.schemas.lifecycle import PERMITTED, State
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
+from gaplab.services.world.robots import robots
+from gaplab.services.world.tunables import tunables
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "api" / "dashboard"

@@ -8,7 +8,7 @@ import pytest
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.strategies.random import Random
+from gaplab.services.core.strategies.paper import Random
 from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts
 from tests.experiments import toy
@@ -35,7 +35,7 @@ class Hopper(Robot):
 '''
 
 PAIR = '''
-from gaplab.services.core.controllers.square_pulses import SquarePulses
+from gaplab.services.world.controllers.pulses import SquarePulses
 
 
 class Pair(SquarePulses):

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
 from gaplab.services.plugins.faults import fault_of
@@ -17,6 +16,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.defaults import completed
 from gaplab.services.specs.registries import REGISTRIES
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.specs.stored_specs import spec_of
 from tests.experiments import toy
 from tests.fakes import CAREFUL
 

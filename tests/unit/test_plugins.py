@@ -14,10 +14,10 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.strategies.base import Strategy
-from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.engines.base import Engine
 from gaplab.services.plugins import contents, loading
 from gaplab.services.specs.registries import REGISTRIES
+from gaplab.services.world.tunables.base import Tunable
 from tests.fakes import CAREFUL
 
 ROOT = Path(__file__).parents[2]

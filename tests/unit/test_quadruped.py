@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.controllers import square_pulses
-from gaplab.services.core.motions import Motion, Trajectory, open_loop
-from gaplab.services.core.robots import quadruped
-from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.world.controllers import pulses
+from gaplab.services.world.motions import Motion, Trajectory, open_loop
+from gaplab.services.world.robots import quadruped
+from gaplab.services.world.robots.quadruped import Quadruped
 
 ROBOT = Quadruped()
 
@@ -53,7 +53,7 @@ def test_a_pulse_starts_at_its_phase_and_lasts_for_its_width(
 ) -> None:
     genome = np.full(24, 0.5)
     genome[2 * actuator], genome[2 * actuator + 1] = phase, width
-    share = square_pulses.NARROWEST + (square_pulses.WIDEST - square_pulses.NARROWEST) * width
+    share = pulses.NARROWEST + (pulses.WIDEST - pulses.NARROWEST) * width
     since = (when - phase) % 1.0
     if min(since, abs(since - share), 1.0 - since) < 1e-6:
         return  # on an edge, where rounding decides
@@ -85,7 +85,7 @@ def plainly(genome: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArr
     """Return times and targets of a motion by the formula, without regard to speed."""
     phases, widths = (
         genome[0::2],
-        square_pulses.NARROWEST + (square_pulses.WIDEST - square_pulses.NARROWEST) * genome[1::2],
+        pulses.NARROWEST + (pulses.WIDEST - pulses.NARROWEST) * genome[1::2],
     )
     edges = np.mod(np.concatenate([phases, phases + widths]), 1.0)
     cycles = np.arange(np.ceil(duration_s / quadruped.PERIOD_S))

@@ -8,10 +8,10 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract.controllers import arm
-from gaplab.services.core.controllers import controllers
-from gaplab.services.core.motions import Trajectory
-from gaplab.services.core.tasks import tasks
 from gaplab.services.engines import engines
+from gaplab.services.world.controllers import controllers
+from gaplab.services.world.motions import Trajectory
+from gaplab.services.world.tasks import tasks
 
 
 def reach(**options: Any) -> Any:

@@ -7,22 +7,21 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.bench.checking import check_values
 from gaplab.services.core.answers import Answers, pack
-from gaplab.services.core.arrays import frozen
+from gaplab.services.core.arrays import frozen, nearest
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.readings import Readings, ReadingsOptions
 from gaplab.services.core.errors import InvalidSpec, PluginBroken
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.robots.base import Sensors
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.sensors import nearest
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Measured, Probed, Sample
+from gaplab.services.measuring.answering import check_values
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.measured import needs_readings, outcome_of
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.robots import sensors
+from gaplab.services.world.robots.base import Sensors
+from gaplab.services.world.robots.quadruped import Quadruped
 
 SENSORS = Sensors(("roll", "x"), ("rad", "m"), frozen([0.1, 2.0]), frozen([1.0, 2.0, 3.0]))
 

@@ -11,12 +11,12 @@ from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.repeats import mean, pooled_variance, standard_error, variance_of_mean, weights
-from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies.base import DiverseOptions
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Belief, Measured, Probed, Sample, Simulator
 from gaplab.services.specs.measured import outcome_of
+from gaplab.services.world.robots import robots
 from tests.experiments import same
 from tests.fakes import TRUTH, paraboloid, small_setting
 

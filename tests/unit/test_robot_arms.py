@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.controllers import controllers
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.robot_files import RobotFile
-from gaplab.services.core.tasks import tasks
-from gaplab.services.core.world import Motor, PDMotor
 from gaplab.services.engines import engines
 from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
+from gaplab.services.world.controllers import controllers
+from gaplab.services.world.robot_files import RobotFile
+from gaplab.services.world.tasks import tasks
+from gaplab.services.world.world import Motor, PDMotor
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -11,9 +11,9 @@ import pytest
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import RobotSource
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.robot_files import MOST_BYTES, RobotFile, read_robot_file
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import (
+from gaplab.services.world.robot_files import MOST_BYTES, RobotFile, read_robot_file
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import (
     Body,
     Box,
     Capsule,

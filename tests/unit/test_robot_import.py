@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.robot_files import read_robot_file
-from gaplab.services.core.world import Box, Capsule, Hull, Joint, Motor, PDMotor, World, pd_law, pd_torque
 from gaplab.services.robots.bodies import simplify
 from gaplab.services.robots.importing import ImportedFile, import_robot
 from gaplab.services.robots.options import ImportOptions
+from gaplab.services.world.robot_files import read_robot_file
+from gaplab.services.world.world import Box, Capsule, Hull, Joint, Motor, PDMotor, World, pd_law, pd_torque
 from tests import real_robots
 from tests.real_robots import FILES, for_each
 from tests.robot_texts import MJCF

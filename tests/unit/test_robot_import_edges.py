@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.robot_files import LONGEST_LINE
 from gaplab.services.robots.importing import ImportedFile, import_robot
 from gaplab.services.robots.options import ImportOptions, Notes
+from gaplab.services.world.robot_files import LONGEST_LINE
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from gaplab.services.core.kinematics import about
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Capsule, Cylinder, Hull, Inertia, Joint, Part, Sphere, World
 from gaplab.services.replay.shapes import (
     MOST_FEET,
     extent_of,
@@ -21,6 +18,9 @@ from gaplab.services.replay.shapes import (
     observed_of,
     shapes_of,
 )
+from gaplab.services.world.kinematics import about
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.world import Body, Box, Capsule, Cylinder, Hull, Inertia, Joint, Part, Sphere, World
 
 EVEN = Inertia((0.01, 0.01, 0.01))
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)

@@ -11,16 +11,16 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.motions import Trajectory
-from gaplab.services.core.robot_files import RobotFile, read_robot_file
-from gaplab.services.core.tunables.labels import tunable_of
-from gaplab.services.core.world import Body, Inertia, Joint, World
 from gaplab.services.engines.base import Engine
 from gaplab.services.robots.changes import changes
 from gaplab.services.robots.comparing import check_rollouts
 from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.writing import Tuning, WrittenFile, write_json, write_xml
+from gaplab.services.world.motions import Trajectory
+from gaplab.services.world.robot_files import RobotFile, read_robot_file
+from gaplab.services.world.tunables.labels import tunable_of
+from gaplab.services.world.world import Body, Inertia, Joint, World
 from tests.robot_texts import MJCF
 from tests.unit.test_robot_import import FILES, path_of
 

@@ -8,11 +8,11 @@ import pytest
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.kinematics import about, product
-from gaplab.services.core.motions import Motion, Trajectory
-from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.robots import Driven, robot_of, sensors, unit
+from gaplab.services.world.kinematics import about, product
+from gaplab.services.world.motions import Motion, Trajectory
+from gaplab.services.world.robots.quadruped import Quadruped
 
 QUADRUPED = PluginRef(name="quadruped")
 

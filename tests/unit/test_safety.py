@@ -10,14 +10,14 @@ import pytest
 from gaplab.schemas.safety import LimitsSpec, Safety
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.motions import Motion, Recording, Trajectory
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.safety import Extremes, expected, extremes, recording_times, safety
-from gaplab.services.core.world import World
 from gaplab.services.engines import engines
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.simulation import SafetyForecast
+from gaplab.services.world.motions import Motion, Recording, Trajectory
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.safety import Extremes, expected, extremes, recording_times, safety
+from gaplab.services.world.world import World
 from tests.experiments import toy
 
 ROBOT = Quadruped()

@@ -11,17 +11,17 @@ import pytest
 
 import gaplab
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core import sample_tables
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.robot_files import RobotFile
-from gaplab.services.core.robots.quadruped import Quadruped, QuadrupedOptions
-from gaplab.services.core.robots.toy_function import ToyFunction
-from gaplab.services.core.sample_tables import read_samples
 from gaplab.services.core.types import Outcome, Selected, Transferred, Tuned
+from gaplab.services.specs import sample_tables
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.sample_tables import read_samples
+from gaplab.services.world.robot_files import RobotFile
+from gaplab.services.world.robots.quadruped import Quadruped, QuadrupedOptions
+from gaplab.services.world.robots.toy_function import ToyFunction
 from tests.experiments import toy
 
 TOY = ToyFunction()
@@ -185,7 +185,7 @@ def test_the_client_reads_a_file_for_a_spec(tmp_path: Path) -> None:
 
 
 def test_the_client_knows_robot_files_and_plug_ins(tmp_path: Path, put: Callable[..., Path]) -> None:
-    toy_module = "gaplab.services.core.robots.toy_function"
+    toy_module = "gaplab.services.world.robots.toy_function"
     put(mine=f"from {toy_module} import ToyFunction\nclass Mine(ToyFunction):\n    name = 'mine'\n")
     (tmp_path / "runs.csv").write_text("gene_0,value\n0.25,0.41\n")
     quadruped, file = Quadruped(), tmp_path / "bot.json"

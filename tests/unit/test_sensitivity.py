@@ -7,7 +7,8 @@ import pytest
 
 from gaplab.schemas.sensitivity import Verdict
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.sensitivity import (
+from gaplab.services.core.space import Space
+from gaplab.services.findings.sensitivity import (
     Effort,
     Subject,
     alike,
@@ -19,7 +20,6 @@ from gaplab.services.core.sensitivity import (
     verdict,
     warning,
 )
-from gaplab.services.core.space import Space
 from tests.fakes import Recorder, paraboloid
 
 EFFORT = Effort(points=17, evaluations=40)

@@ -12,13 +12,13 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.robots.base import Sensors
-from gaplab.services.core.robots.toy_function import ToyFunction
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.specs.assembly import WARM_ENGINES, MeasuredReality, edits_of, engine_of, setting, simulated
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.specs.simulation import Simulation
+from gaplab.services.world.robots.base import Sensors
+from gaplab.services.world.robots.toy_function import ToyFunction
 from tests.experiments import toy
 from tests.fakes import install
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gaplab.services.core.world import Material, World
 from gaplab.services.engines.stepping import DEEPEST_M, FARTHEST_M, WARM_SCENES, WarmScenes, consecutive, plausible
+from gaplab.services.world.world import Material, World
 
 
 class Scene:

@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 from gaplab.schemas.traces import TRACE_COLUMNS
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.motions import open_loop
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.traces import MOST_ERRORS, TooShort, Trace, align, placed, read_trace, unlikely
 from gaplab.services.engines.mujoco.engine import MuJoCo
 from gaplab.services.replay.traces import refuse_other_bodies
+from gaplab.services.world.motions import open_loop
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.traces import MOST_ERRORS, TooShort, Trace, align, placed, read_trace, unlikely
 
 ROBOT = Quadruped()
 MOTION = open_loop(ROBOT.motion(ROBOT.known))

@@ -11,21 +11,21 @@ from gaplab.schemas.sensitivity import SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.contract.controllers import arm
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.inertias import inertia_of
-from gaplab.services.core.kinematics import body_poses, clearances_m
-from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.robots.robot_file import usual_tunables
 from gaplab.services.core.space import Space
-from gaplab.services.core.strategies.noise_envelope import NoiseEnvelope, NoiseEnvelopeOptions
-from gaplab.services.core.tunables.base import Tunable, matching
-from gaplab.services.core.tunables.labels import label_of, proper, separated, tunable_of, unit_of
-from gaplab.services.core.world import Box, Inertia, Material, Noise, PDMotor, Sphere
+from gaplab.services.core.strategies.untuned import NoiseEnvelope, NoiseEnvelopeOptions, separated
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.plugins.external import named_in
 from gaplab.services.specs import resolution
 from gaplab.services.specs.assembly import edits_of
 from gaplab.services.specs.resolution import resolve, resolve_experiment, resolve_sensitivity
 from gaplab.services.specs.simulation import Simulation
+from gaplab.services.world.inertias import inertia_of
+from gaplab.services.world.kinematics import body_poses, clearances_m
+from gaplab.services.world.robots.quadruped import Quadruped
+from gaplab.services.world.robots.robot_file import usual_tunables
+from gaplab.services.world.tunables.base import Tunable, matching
+from gaplab.services.world.tunables.labels import label_of, proper, tunable_of, unit_of
+from gaplab.services.world.world import Box, Inertia, Material, Noise, PDMotor, Sphere
 
 WORLD = Quadruped().world
 
@@ -399,8 +399,8 @@ def test_base_aspects_of_the_envelope_are_named_by_label() -> None:
         strategy={"name": "noise_envelope", "options": {"base": "mass(of=trunk), slope"}},
         tunables=["mass(trunk)", "slope", "noise"],
     )
-    assert spec.strategy.options["base"] == ["mass(of=trunk)", "slope"]
-    strategy = NoiseEnvelope(NoiseEnvelopeOptions(base=("mass(of=trunk)", "slope"), epsilon=0.1, simulators=200))
+    assert spec.strategy.options["base"] == ["mass(trunk)", "slope"]
+    strategy = NoiseEnvelope(NoiseEnvelopeOptions(base=("mass(trunk)", "slope"), epsilon=0.1, simulators=200))
 
     space = Space.box([0.7, -0.1, 0.0], [1.3, 0.1, 0.1])
     drawn = strategy.draw(space, [ref.name for ref in spec.tunables], np.random.default_rng(0))

@@ -82,7 +82,7 @@ class Strategy(Plugin):
 
     @property
     def named_tunables(self) -> tuple[str, ...]:
-        """Return the tunables that its options name; a spec that does not tune them is refused."""
+        """Return the tunables that lists of its options name, by label; a spec that does not tune them is refused."""
         return ()
 
     def selection_simulators(self, tunables: int, *, learned: bool) -> int:  # noqa: ARG002 - for those that need it

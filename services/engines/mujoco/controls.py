@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Loop, Motion
-from gaplab.services.core.observations import observations
-from gaplab.services.core.world import World
 from gaplab.services.engines.mujoco.model import Structure
 from gaplab.services.engines.mujoco.pool import Continued, Pool
 from gaplab.services.engines.mujoco.worlds import Delays, Prepared, States
 from gaplab.services.engines.stepping import Acting, check_targets, consecutive, tick_steps
+from gaplab.services.world.motions import Loop, Motion
+from gaplab.services.world.sensing import observations
+from gaplab.services.world.world import World
 
 Steps = NDArray[np.int_]
 

@@ -10,11 +10,11 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
-from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS, USUALLY_IN_PLACE, Engine
 from gaplab.services.engines.mujoco.scene import MuJoCoScene
 from gaplab.services.engines.stepping import WarmScenes, consecutive, recording
+from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory
+from gaplab.services.world.world import World
 
 
 class MuJoCoOptions(Frozen):

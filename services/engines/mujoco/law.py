@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import DAMPING as VISCOSITY
-from gaplab.services.core.world import FEED, STIFFNESS, PDLaw, World
-from gaplab.services.core.world import STRONGEST as STRONGEST_NM
+from gaplab.services.world.world import DAMPING as VISCOSITY
+from gaplab.services.world.world import FEED, STIFFNESS, PDLaw, World
+from gaplab.services.world.world import STRONGEST as STRONGEST_NM
 
 STEP, FALL, SWEEPS, DOFS, AHEAD, SERVOS, MOTORS, DAMPERS, FIRST = range(9)
 """Indices into the settings: time step, speed that gravity adds in it, solver iterations, number of degrees of freedom,

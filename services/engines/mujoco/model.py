@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.inertias import inertia_of
-from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.world import (
+from gaplab.services.engines.mujoco.law import EACH_DAMPER, EACH_MOTOR, FALL, FIRST, PD, Servo, settings
+from gaplab.services.world.inertias import inertia_of
+from gaplab.services.world.sensing import gravity_m_s2
+from gaplab.services.world.world import (
     UNTURNED,
     Body,
     Box,
@@ -33,7 +34,6 @@ from gaplab.services.core.world import (
     World,
     pd_law,
 )
-from gaplab.services.engines.mujoco.law import EACH_DAMPER, EACH_MOTOR, FALL, FIRST, PD, Servo, settings
 
 GROUND = "the ground"
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.core.motions import Motion
-from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.world import Joint, Motor, PDMotor, World
 from gaplab.services.engines.mujoco.engine import MuJoCo
 from gaplab.services.engines.mujoco.logs import unlogged
 from gaplab.services.engines.mujoco.model import GROUND, ROTOR, add_geom, inertial, named, outwards, scalar_first
+from gaplab.services.world.motions import Motion
+from gaplab.services.world.sensing import gravity_m_s2
+from gaplab.services.world.world import Joint, Motor, PDMotor, World
 
 LOST = ("material.static_friction", "material.restitution", "motor.delay_s", "noise.")
 """How names of values begin that the file has no place for."""

@@ -7,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import observed_poses, observes_base
-from gaplab.services.core.motions import Loop, Motion
-from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.world import World
 from gaplab.services.engines.mujoco.controls import Controls, Looping
 from gaplab.services.engines.mujoco.law import drive_torques
 from gaplab.services.engines.mujoco.pool import Pool
 from gaplab.services.engines.mujoco.worlds import TIME, Models, Prepared, States
 from gaplab.services.engines.stepped import checked_s, explodes
 from gaplab.services.engines.stepping import plausible
+from gaplab.services.world.kinematics import observed_poses, observes_base
+from gaplab.services.world.motions import Loop, Motion
+from gaplab.services.world.sensing import gravity_m_s2
+from gaplab.services.world.world import World
 
 ROWS = 64
 """Rollouts per thread in one call of MuJoCo; more would only take memory, 0.1 MB each for the quadruped."""

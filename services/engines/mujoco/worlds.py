@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.controllers.parts import middles
-from gaplab.services.core.kinematics import tilted_pose
-from gaplab.services.core.motions import LEVEL, Loop, Motion
-from gaplab.services.core.observations import Bearing
-from gaplab.services.core.world import World
 from gaplab.services.engines.mujoco.model import compiled, start, write
 from gaplab.services.engines.stepping import consecutive, delays
+from gaplab.services.world.controllers.parts import middles
+from gaplab.services.world.kinematics import tilted_pose
+from gaplab.services.world.motions import LEVEL, Loop, Motion
+from gaplab.services.world.sensing import Bearing
+from gaplab.services.world.world import World
 
 KEPT, KEPT_BYTES = 64, 256 * 2**20
 """Largest number and size of the models that are kept for the next call; one of the quadruped takes 0.1 MB."""

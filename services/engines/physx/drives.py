@@ -7,8 +7,8 @@ end of the step, if the joint moved alone under the load of the step before.
 
 from typing import NamedTuple
 
-from gaplab.services.core.world import Joint, Motor, PDMotor
 from gaplab.services.engines.physx.robot import UNLIMITED, Handle
+from gaplab.services.world.world import Joint, Motor, PDMotor
 
 RIGIDITY = 1e4
 """Weight of a servo's target speed relative to the current speed of the joint: see `_servo`."""

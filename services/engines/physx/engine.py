@@ -6,12 +6,12 @@ from types import ModuleType
 from warnings import catch_warnings, simplefilter
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.motions import Tilt
-from gaplab.services.core.world import World
 from gaplab.services.engines.base import USUALLY_IN_PLACE
 from gaplab.services.engines.physx.robot import MOST_SURFACES
 from gaplab.services.engines.physx.scene import PhysXScene, surface_names
 from gaplab.services.engines.stepped import SteppedEngine
+from gaplab.services.world.motions import Tilt
+from gaplab.services.world.world import World
 
 
 class PhysX(SteppedEngine[PhysXScene]):

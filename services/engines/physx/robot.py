@@ -8,9 +8,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.inertias import inertia_of
-from gaplab.services.core.kinematics import product
-from gaplab.services.core.world import (
+from gaplab.services.world.inertias import inertia_of
+from gaplab.services.world.kinematics import product
+from gaplab.services.world.world import (
     UNTURNED,
     Body,
     Box,

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.inertias import inertia_of, inverse_inertias
-from gaplab.services.core.kinematics import inverse, rotated, tilted_pose
-from gaplab.services.core.motions import LEVEL, Tilt
-from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.world import Material, Motor, Quaternion, Vector, World
 from gaplab.services.engines.physx.drives import JointDrive, resists
 from gaplab.services.engines.physx.robot import Handle, build_robot, ground_groups, pose_of, set_masses, set_offsets
+from gaplab.services.world.inertias import inertia_of, inverse_inertias
+from gaplab.services.world.kinematics import inverse, rotated, tilted_pose
+from gaplab.services.world.motions import LEVEL, Tilt
+from gaplab.services.world.sensing import gravity_m_s2
+from gaplab.services.world.world import Material, Motor, Quaternion, Vector, World
 
 BOUNCE_THRESHOLD_M_S = 0.2
 """Impacts slower than this do not bounce, as in Bullet. PhysX's default, 2 m/s, is faster than walking feet."""

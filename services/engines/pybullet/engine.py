@@ -4,12 +4,12 @@ from collections.abc import Callable
 from importlib import import_module
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.motions import Tilt
-from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS, USUALLY_IN_PLACE
 from gaplab.services.engines.pybullet.robot import MOST_LINKS, links_of
 from gaplab.services.engines.pybullet.scene import PyBulletScene, StickSlip
 from gaplab.services.engines.stepped import SteppedEngine
+from gaplab.services.world.motions import Tilt
+from gaplab.services.world.world import World
 
 
 class PyBullet(SteppedEngine[PyBulletScene]):

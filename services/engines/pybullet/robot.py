@@ -12,9 +12,9 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.inertias import inertia_of, inverse_inertias
-from gaplab.services.core.kinematics import inverse, product, rotated
-from gaplab.services.core.world import (
+from gaplab.services.world.inertias import inertia_of, inverse_inertias
+from gaplab.services.world.kinematics import inverse, product, rotated
+from gaplab.services.world.world import (
     ORIGIN,
     UNTURNED,
     Body,

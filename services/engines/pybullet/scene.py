@@ -12,11 +12,11 @@ from weakref import finalize
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.kinematics import inverse, rotated, tilted_pose
-from gaplab.services.core.motions import LEVEL, Tilt
-from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.world import UNTURNED, Material, Motor, Quaternion, Vector, World
 from gaplab.services.engines.pybullet.robot import BASE, Torques, build_robot, inertial_frame, set_masses
+from gaplab.services.world.kinematics import inverse, rotated, tilted_pose
+from gaplab.services.world.motions import LEVEL, Tilt
+from gaplab.services.world.sensing import gravity_m_s2
+from gaplab.services.world.world import UNTURNED, Material, Motor, Quaternion, Vector, World
 
 FAR_AWAY = (0.0, 0.0, 1e4)
 """Position of the base, m, in which nothing touches the ground."""

@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from sqlalchemy import ColumnElement, and_, case, not_, or_, select
 
 from gaplab.schemas.lifecycle import OPEN, State
-from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.experiments.query import fields
 from gaplab.services.experiments.query.fields import Condition, Field, field_of
 from gaplab.services.experiments.query.parsing import Every, Not, Some, Term, Tree, Value, Words, inside, parse, refusal
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.results import best_of_all, points_of_all
 from gaplab.services.store.texts import storable
+from gaplab.services.world.robot_library import IMPORTED
 
 Fields = Mapping[str, Field]
 

@@ -1,6 +1,6 @@
 """The best of several direct searches, beside strategies, which record the largest fitness of several controllers."""
 
-from gaplab.schemas.curves import Curve
+from gaplab.schemas.results import Curve
 from gaplab.services.figures.marks import Line
 from gaplab.services.figures.style import INK, Style
 

@@ -6,9 +6,9 @@ from typing import Any
 from sqlalchemy import ForeignKey, Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from gaplab.services.core.robot_files import MOST_BYTES
 from gaplab.services.store.clock import now
 from gaplab.services.store.models.base import Base
+from gaplab.services.world.robot_files import MOST_BYTES
 
 
 class ProvenanceRow(Base):

@@ -13,7 +13,7 @@ from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.repeats import standard_error
-from gaplab.services.core.stored_specs import discrepancy_of
+from gaplab.services.specs.stored_specs import discrepancy_of
 from gaplab.services.store.cursor import decode, encode, key_of
 from gaplab.services.store.models import LOG, ExperimentRow, RepetitionRow, StepKind, StepRow
 from gaplab.services.store.queries.experiments import MEASURED, in_log, of_experiments, same_log, steps_of

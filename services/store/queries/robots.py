@@ -8,10 +8,10 @@ from sqlalchemy import event, func, select, update
 from sqlalchemy.orm import QueryContext, Session
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core import robot_library
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import RobotRow, SensitivityRow
 from gaplab.services.store.statements import insert_new
+from gaplab.services.world import robot_library
 
 
 def learn(session: Session, specs: Iterable[Mapping[str, Any]]) -> None:

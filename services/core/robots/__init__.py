@@ -1,6 +1,0 @@
-"""Robots: one file in this folder is one robot."""
-
-from gaplab.services.core.registry import Registry
-from gaplab.services.core.robots.base import Robot
-
-robots: Registry[Robot] = Registry("robot", __name__, Robot)

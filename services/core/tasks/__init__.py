@@ -1,6 +1,0 @@
-"""Tasks: one file in this folder is one task."""
-
-from gaplab.services.core.registry import Registry
-from gaplab.services.core.tasks.base import Task
-
-tasks: Registry[Task] = Registry("task", __name__, Task)

@@ -1,0 +1,81 @@
+"""A task of arms: to hold a tool at a place."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen, Real
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.world.motions import Trajectory
+from gaplab.services.world.sensing import Sensors
+from gaplab.services.world.tasks.base import Task
+
+RATED_EVERY_S = 0.05
+"""Interval between the distances whose mean is the fitness."""
+
+SENSED_EVERY_S = 0.25
+"""Interval between readings of the sensors."""
+
+PLACE_NOISE_M = 0.005
+"""Noise of the sensors: that of a camera, gaplab's default."""
+
+Metres = Annotated[Real, Field(ge=-100, le=100)]
+
+
+class ReachOptions(Frozen):
+    """Options of `reach`."""
+
+    x_m: Metres = Field(default=0.3, description="target, along x from the origin of the world")
+    y_m: Metres = Field(default=0.2, description="target, along y")
+    z_m: Metres = Field(default=0.5, description="target, above the ground")
+    settling_s: Annotated[Real, Field(ge=0, le=600)] = Field(
+        default=1.0, description="seconds before the counted time, in which the robot may approach the target"
+    )
+    counted_s: Annotated[Real, Field(gt=0, le=600)] = Field(
+        default=1.0, description="counted seconds; the cost of a rollout grows with it"
+    )
+    measure: Literal["distance", "reduction"] = Field(
+        default="distance",
+        description="`distance`: minus the mean distance; `reduction`: the distance at the start minus the mean",
+    )
+
+
+class Reach(Task):
+    """Minus the mean distance of the observed body from a target place, over the counted time.
+
+    Name the body in the robot, as its observed one, such as the last link of an arm. Distances are those of its frame.
+    The sensors are the place of the body.
+    """
+
+    name = "reach"
+    unit = "m"
+    Options = ReachOptions
+    options: ReachOptions
+
+    def __init__(self, options: Frozen | None = None) -> None:
+        super().__init__(options)
+        given = self.options
+        self._target = frozen([given.x_m, given.y_m, given.z_m])
+        intervals = max(1, round(given.counted_s / RATED_EVERY_S))
+        counted = given.settling_s + np.linspace(0.0, given.counted_s, intervals + 1)
+        self.observe_s = frozen(np.unique([0.0, *counted]))
+        self._first = len(self.observe_s) - len(counted)
+        end_s = given.settling_s + given.counted_s
+        self.sensors = Sensors(
+            names=("x", "y", "z"),
+            units=("m",) * 3,
+            noises=frozen([PLACE_NOISE_M] * 3),
+            times_s=frozen(np.arange(1, np.floor(end_s / SENSED_EVERY_S + 1e-9) + 1) * SENSED_EVERY_S),
+        )
+
+    def fitness(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(...)`: minus the mean distance; for `reduction`, plus the distance at the start."""
+        away = trajectory.positions_m - self._target
+        distances = np.sqrt((away * away).sum(axis=-1))
+        mean = distances[..., self._first :].mean(axis=-1)
+        return np.asarray(distances[..., 0] - mean if self.options.measure == "reduction" else -mean)
+
+    def sense(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(..., r, 3)`: the place of the observed body."""
+        return np.asarray(trajectory.positions_m)
