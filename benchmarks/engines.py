@@ -54,14 +54,9 @@ def genomes(count: int = GENOMES) -> Genomes:
     return drawn
 
 
-def simulation(engine: Engine) -> Simulation:
-    """Return the quadruped with the paper's three tunables in an engine."""
-    return Simulation(ROBOT, engine, [tunables[name]() for name in TUNED])
-
-
 def through_simulate(engine: Engine, count: int = GENOMES, *, batch: bool = False) -> Work:
     """Return work: rollouts through `Simulate`, one genome a call, as the paper's evolution does, or all in one."""
-    simulate, drawn = simulation(engine), genomes(count)
+    simulate, drawn = Simulation(ROBOT, engine, [tunables[name]() for name in TUNED]), genomes(count)
     return lambda: sum(simulate(each, SWITCHING).size for each in ([drawn] if batch else drawn[:, None]))
 
 

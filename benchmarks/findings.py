@@ -5,25 +5,57 @@
 
 from argparse import ArgumentParser
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.archives import import_file, private_store
+from gaplab import migrations
+from gaplab.api.commands.tables import curves
+from gaplab.schemas.archives import ImportRead
+from gaplab.services.archives import import_archive
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.results.comparisons import compare
-from gaplab.services.results.curves import curves
-from gaplab.services.results.tuned_simulators import TunedSimulators, tuned_simulators
+from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator
 from gaplab.services.store.session import Store
+
+
+@contextmanager
+def private_store() -> Iterator[Store]:
+    """Yield an empty database at the latest revision, which is deleted afterwards."""
+    with TemporaryDirectory(prefix="gaplab-archives-") as folder:
+        url = f"sqlite:///{Path(folder) / 'gaplab.db'}"
+        migrations.upgrade(url)
+        store = Store(url)
+        try:
+            yield store
+        finally:
+            store.dispose()
+
+
+def import_file(store: Store, path: Path) -> ImportRead:
+    """Import an archive, and return the ids of its study and its experiments.
+
+    Raises:
+        SystemExit: the file cannot be read, or is not an archive.
+    """
+    try:
+        with path.open("rb") as file:
+            return import_archive(store, file)
+    except (OSError, InvalidArchive) as error:
+        raise SystemExit(f"{path}: {error}") from error
+
 
 WIDTH_IN = 7.2
 
@@ -104,15 +136,10 @@ def tuned_table(store: Store, labels: dict[str, str]) -> Table:
         tuned = tuned_simulators(store, id_)
         for samples in tuned.errors:
             best = [each for each in tuned.simulators if each.iteration == samples]
+            errors = np.array([each.error for each in best if each.error is not None])
             tunables = "  ".join(map(_spread, np.array([each.parameters for each in best]).T))
-            table.add_row(label, str(samples), str(len(best)), tunables, _spread(_errors(tuned, samples)))
+            table.add_row(label, str(samples), str(len(best)), tunables, _spread(errors))
     return table
-
-
-def _errors(tuned: TunedSimulators, iteration: int) -> FloatArray:
-    """Return the errors per sample of an iteration, of repetitions with samples and without failed physics."""
-    pairs = [(total, tuned.samples[iteration][number]) for number, total in tuned.errors[iteration].items()]
-    return np.array([tuned.error.per_sample(total / count) for total, count in pairs if total is not None and count])
 
 
 def distance_table(store: Store, labels: dict[str, str]) -> Table:

@@ -83,7 +83,7 @@ EVERYTHING = FigureDefinition(
                     "simulator", (0, 1, None, 3, 4), (0, 1, None, 1, 0.5), style_of(0), hover=("a", "b", "", "c", "d")
                 ),
                 Line("simulator", (0, 2, 4), (0.1, 0.2, 0.1), style_of(0), faint=True),
-                Line("steps", (0, 2, 4), (-0.5, 0.2, 0.1), style_of(2), (-1, 0, 0), (0, 0.3, 0.2), steps=True),
+                Line("second", (0, 2, 4), (-0.5, 0.2, 0.1), style_of(2), (-1, 0, 0), (0, 0.3, 0.2)),
                 Level("mean", 0.5, lower=0.4, upper=0.6),
                 Diagonal("equal"),
                 Points("tuned", (1, 2, 3), (0.5, 1, 1.5), style_of(3), shades=(0, 1, 2), shades_label="Iteration"),

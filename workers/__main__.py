@@ -25,8 +25,11 @@ RAY_SETTINGS = {
     "RAY_gcs_rpc_server_reconnect_timeout_s": "20",
     "RAY_health_check_timeout_ms": "5000",
     "RAY_health_check_failure_threshold": "4",
+    "RAY_ROTATION_MAX_BYTES": "1000000",
+    "RAY_ROTATION_BACKUP_COUNT": "1",
 }
-"""Settings of a Ray of our own: idle processes are kept for a minute, and a part that died is given up within half."""
+"""Settings of a Ray of our own: idle processes are kept for a minute, a part that died is given up within half, and of
+each process and stream the last million bytes or two are kept."""
 
 
 def serve(settings: Settings) -> int:

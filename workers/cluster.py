@@ -24,7 +24,7 @@ from ray.exceptions import RayError
 from gaplab.arithmetic import chosen
 from gaplab.services.settings import Settings
 from gaplab.workers.errors import ClusterUnusable, RayGone
-from gaplab.workers.nodes import Versions, check_nodes, limit_files, versions
+from gaplab.workers.nodes import Versions, check_nodes, versions
 
 try:
     import fcntl
@@ -251,7 +251,6 @@ def _start(cores: int | None, folder: Path) -> None:
     if os.environ.get("RAY_AUTH_MODE") == "disabled":  # Ray reads it when it is imported
         msg = "RAY_AUTH_MODE is 'disabled': anyone who reaches a Ray without a token can run any code; unset it"
         raise ClusterUnusable(msg)
-    limit_files()
     without_monitors = partial(parameter.RayParams, no_monitor=True, include_log_monitor="")
     with _replaced(ray_constants, ENABLE_RAY_CLUSTER=False), _replaced(parameter, RayParams=without_monitors):
         try:

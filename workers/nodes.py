@@ -4,7 +4,6 @@ gaplab and its libraries concern all work: a node that has others ends the super
 only the experiments that name it: a process that has another version refuses them, and does the others.
 """
 
-import os
 import platform
 import sys
 from collections.abc import Mapping
@@ -119,17 +118,8 @@ def _last_line(error: Exception) -> str:
     return lines[-1] if lines else type(error).__name__
 
 
-ROTATION = {"RAY_ROTATION_MAX_BYTES": "1000000", "RAY_ROTATION_BACKUP_COUNT": "1"}
-"""Settings of a Ray of our own: for each process and stream it keeps the last million bytes or two."""
-
 LONGEST = 1_000_000
 """Characters of what is printed at once: Ray never cuts a line."""
-
-
-def limit_files() -> None:
-    """Let a Ray that this process starts later limit its files, unless the environment says otherwise."""
-    for name, value in ROTATION.items():
-        os.environ.setdefault(name, value)
 
 
 def limit_prints() -> None:

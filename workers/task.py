@@ -22,9 +22,9 @@ from gaplab.services.specs.blame import describe, raised
 from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, Requested, TimedStep
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.errors import ClusterUnusable
-from gaplab.workers.lending import Pool
 from gaplab.workers.nodes import Versions, check_here
 from gaplab.workers.permits import Handle, PermittedReality, asking
+from gaplab.workers.pool import Pool
 
 BATCH_S = 0.2
 """Shorter steps are delivered in batches; an answer of reality is delivered at once."""

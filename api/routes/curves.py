@@ -5,11 +5,11 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
+from gaplab.api.commands.tables import curves
 from gaplab.api.http.attachments import attachment
 from gaplab.api.http.dependencies import Id, Parameters, StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.results import Curve, Fitness
-from gaplab.services.results import curves
 
 router = APIRouter(tags=["curves"])
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, FastAPI, Query, Request, Response
 from pydantic import Field
 
+from gaplab.api.commands.tables import curves
 from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import FigureQuery, answer, responses
 from gaplab.api.routes.curves import Ids
@@ -20,7 +21,6 @@ from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import TITLE, titled
 from gaplab.services.replay.predictions import predictions
-from gaplab.services.results import curves
 from gaplab.services.results.curves import cost_axis
 from gaplab.services.results.tuned_simulators import setting_coordinates, simulator_coordinates, tuned_simulators
 from gaplab.services.specs.resolution import is_direct, takes_samples
@@ -121,7 +121,7 @@ def draw_coordinates(store: StoreDep, query: Annotated[CoordinatesDrawing, Query
     """
     if len(query.study) == 1 and len(found := reading.read(store, query.study[0]).experiments) == 1:
         alone = ExperimentDrawing(experiment=found[0].id, title=query.title)
-        figure = simulator_coordinates(store, alone.experiment, title=_title(store, alone))
+        figure = simulator_coordinates(tuned_simulators(store, alone.experiment), title=_title(store, alone))
         return answer(_explained(store, alone, figure), query)
     return answer(setting_coordinates(store, query.study, title=_names(store, query)), query)
 

@@ -10,8 +10,7 @@ from gaplab.api.http.figures import FigureQuery, answer, responses
 from gaplab.api.routes.replays import ReplayQuery
 from gaplab.schemas.figures import FigureRead
 from gaplab.schemas.replays import Replay
-from gaplab.services.figures.kinds.gait import gait_figure
-from gaplab.services.figures.kinds.readings import readings_figure
+from gaplab.services.figures.kinds.replays import gait_figure, readings_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.replays import replay

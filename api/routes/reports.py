@@ -14,9 +14,9 @@ from gaplab.api.http.security_headers import page
 from gaplab.api.routes.comparisons import MarginQuery
 from gaplab.schemas.comparisons import VerdictRead
 from gaplab.services.experiments import reading
-from gaplab.services.reports.content import verdict_on
-from gaplab.services.reports.document import report_on
-from gaplab.services.reports.html import render_html
+from gaplab.services.reports.blocks import render_html
+from gaplab.services.reports.content import facts_of, verdict_on
+from gaplab.services.reports.document import report_of
 from gaplab.services.reports.takehome import takehome_zip
 
 router = APIRouter(tags=["reports"])
@@ -48,7 +48,7 @@ def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]
     study, margin = reading.read(store, id), query.chosen()
     if query.format == "json":
         return verdict_on(store, study, margin)
-    report, at = report_on(store, study, margin), datetime.now(UTC)
+    report, at = report_of(facts_of(store, study, margin)), datetime.now(UTC)
     made = f"Made by gaplab {version('gaplab')} on {at:%Y-%m-%d at %H:%M} UTC, from what was stored by then."
     answer = page(in_turn(lambda: render_html(report, made)))
     answer.headers["Content-Disposition"] = f'inline; filename="gaplab-{report.id}-report.html"'

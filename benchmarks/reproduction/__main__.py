@@ -7,7 +7,7 @@ from argparse import ArgumentParser
 from collections.abc import Mapping
 from pathlib import Path
 
-from benchmarks.archives import private_store
+from benchmarks.findings import private_store
 from benchmarks.reproduction.page import CLAIMS_PAGE, ROOT, Page
 from benchmarks.reproduction.results import FIGURE_3
 from benchmarks.reproduction.studies import Study, read_study

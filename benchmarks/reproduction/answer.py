@@ -6,11 +6,10 @@ from functools import partial
 import numpy as np
 
 from benchmarks.reproduction import paper, results
-from benchmarks.reproduction.claims import CLAIMS
-from benchmarks.reproduction.settings import table
+from benchmarks.reproduction.claims import CLAIMS, judge, significant
+from benchmarks.reproduction.results import table
 from benchmarks.reproduction.statistics import Difference
 from benchmarks.reproduction.studies import Study
-from benchmarks.reproduction.verdicts import judge, significant
 from gaplab.services.figures.words import number_of
 from gaplab.services.findings.statistics import finite
 from gaplab.services.findings.wording import MISSING, listed

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.reproduction.claims import significant
 from benchmarks.reproduction.statistics import Difference
 from benchmarks.reproduction.studies import Arm, Study
-from benchmarks.reproduction.verdicts import significant
 from gaplab.schemas.differences import Values
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.figures.words import spoken

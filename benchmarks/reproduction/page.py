@@ -8,14 +8,13 @@ from pathlib import Path
 from re import sub
 from typing import Any
 
-from benchmarks.reproduction import answer, controls, paper, results, settings
-from benchmarks.reproduction.claims import CLAIMS, DATA, Claim
+from benchmarks.reproduction import answer, controls, paper, results
+from benchmarks.reproduction.claims import CLAIMS, DATA, Claim, judge, worded
 from benchmarks.reproduction.controls import Row
-from benchmarks.reproduction.settings import table
+from benchmarks.reproduction.results import table
 from benchmarks.reproduction.studies import Study
-from benchmarks.reproduction.verdicts import judge, worded
+from gaplab.services.findings.judged import FEWEST_REPETITIONS
 from gaplab.services.findings.statistics import SIGNIFICANT
-from gaplab.services.findings.trends import FEWEST_REPETITIONS
 
 ROOT = Path(__file__).parents[2]
 TEXT: dict[str, str] = DATA["text"]
@@ -83,7 +82,7 @@ class Page:
             claims="\n\n".join(map(self._claim, CLAIMS)),
             figure_3="\n\n".join(self._figure_3()),
             statements="\n\n".join(map(self._statements, CLAIMS)),
-            studies=self._table(self.studies, settings.PAPER),
+            studies=self._table(self.studies, results.THE_PAPER),
             arguments=" ".join(
                 [_files(each) for each in self.studies.values()]
                 + [f"--control {_files(each)}" for each in self.controls.values()]
@@ -190,10 +189,10 @@ class Page:
 
     def _table(self, studies: Mapping[str, Study], *first: tuple[str, ...]) -> str:
         rows = [
-            settings.row(study, [f"[{each.stem}]({self._link(each)})" for each in study.archives])
+            results.study_row(study, [f"[{each.stem}]({self._link(each)})" for each in study.archives])
             for study in studies.values()
         ]
-        return table(settings.HEAD, [*first, *rows])
+        return table(results.STUDY_HEAD, [*first, *rows])
 
 
 def _formatted(claim: Claim, text: str) -> str:

@@ -18,8 +18,8 @@ from scipy import stats
 from benchmarks.reproduction.paper import LEAST_RATIO, NEARER_TO_A_THIRD
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.streams import stream
+from gaplab.services.findings.judged import FEWEST_REPETITIONS
 from gaplab.services.findings.statistics import SIGNIFICANT, both, constant, constant_difference, finite
-from gaplab.services.findings.trends import FEWEST_REPETITIONS
 
 RESAMPLES = 20_000
 """Resamples of the ratio of standard deviations; with 2 000, its p near 0.04 varies by 0.006."""

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.archives import import_file
-from benchmarks.findings import Found, found
+from benchmarks.findings import Found, found, import_file
 from benchmarks.reproduction.paper import ITERATIONS, STRATEGIES
+from gaplab.api.commands.tables import curves
 from gaplab.schemas.records import ExperimentRead, MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.results import Curve, Fitness
@@ -17,7 +17,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments import reading
 from gaplab.services.findings.statistics import finite
-from gaplab.services.results.curves import curves, values_of
+from gaplab.services.results.curves import values_of
 from gaplab.services.running import provenance
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries import experiments, results
@@ -88,16 +88,11 @@ class Arm:
 
 
 class Study:
-    """A stored study.
-
-    Args:
-        archives: its files; several if its experiments were computed apart.
-        name: its name.
-        arms: its experiments, in their order.
-        curves: their curves.
-        beside: the same of transferred controllers alone.
+    """A stored study; its archives are several if its experiments were computed apart.
 
     Attributes:
+        curves: of its experiments.
+        beside: the same of transferred controllers alone.
         spec: that of its first experiment, which has the settings that all share.
         reality: the engine of its reality, in words.
         direct: fitness `(r,)` of the direct baseline; empty without it.

@@ -5,11 +5,50 @@ None stands for a missing value: it interrupts a line, and is left out among poi
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 
-from gaplab.services.figures.axes import Axis as Axis
-from gaplab.services.figures.axes import Number as Number
-from gaplab.services.figures.axes import check_numbers
 from gaplab.services.figures.style import INK, Style
+
+Number = float | None
+
+
+def check_numbers(name: str, parts: Sequence[Sequence[Number]], optional: Sequence[Sequence[object]] = ()) -> None:
+    """Refuse numbers that JSON does not have, and parts of different lengths; optional parts may be empty.
+
+    Raises:
+        ValueError: the message has the name and the value or the lengths.
+    """
+    lengths = {len(part) for part in (*parts, *filter(None, optional))}
+    if len(lengths) > 1:
+        raise ValueError(f"the parts of {name!r} have {sorted(lengths)} values; they must have equally many")
+    for value in (each for part in (*parts, *optional) for each in part if isinstance(each, int | float)):
+        if not isfinite(value):
+            raise ValueError(f"{name!r} has the value {value}; a missing value must be None")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a panel.
+
+    Attributes:
+        label: name with the unit; empty for none.
+        limits: the ends of the axis, ascending.
+        whole: put ticks at whole numbers only.
+        log: logarithmic; the limits are above 0.
+        ticks: values and the texts that replace their numbers.
+    """
+
+    label: str
+    limits: tuple[float, float]
+    whole: bool = False
+    log: bool = False
+    ticks: tuple[tuple[float, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        check_numbers(self.label, (self.limits,))
+        if not self.limits[0] < self.limits[1] or (self.log and self.limits[0] <= 0):
+            raise ValueError(f"the limits of an axis must ascend, from above 0 if it is logarithmic, not {self.limits}")
+
 
 Numbers = tuple[Number, ...]
 PLAIN = Style(INK, "solid", "circle")
@@ -24,7 +63,6 @@ class Line:
         hover: a text for each point, for the mouse pointer.
         markers: draw a marker at each point.
         faint: draw a thin line behind the others, like one repetition behind the mean.
-        steps: keep each value until the next point.
     """
 
     name: str
@@ -36,7 +74,6 @@ class Line:
     hover: tuple[str, ...] = ()
     markers: bool = True
     faint: bool = False
-    steps: bool = False
 
     def __post_init__(self) -> None:
         check_numbers(self.name, (self.x, self.y), (self.lower, self.upper, self.hover))
@@ -202,6 +239,7 @@ class FigureDefinition:
         share_x: panels of a column share one horizontal axis, which is labelled beneath the last.
         caption: text that states at least the number of repetitions and the meaning of the bands.
         alt: a description in a sentence or two, for screen readers.
+        table: its numbers as text.
         nothing: text that replaces the marks while there are none.
     """
 

@@ -34,7 +34,6 @@ from gaplab.schemas.comparisons import (
 )
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.findings import sentences
-from gaplab.services.findings.intervals import improvement, summary
 from gaplab.services.findings.statistics import (
     SIGNIFICANT,
     UNDEFINED,
@@ -47,7 +46,9 @@ from gaplab.services.findings.statistics import (
     effect_size,
     finite,
     holm,
+    improvement,
     moved,
+    summary,
     varies,
 )
 from gaplab.services.findings.wording import bracketed, probabilities, signed
@@ -63,8 +64,6 @@ class Compared:
     """One experiment, as it is compared.
 
     Attributes:
-        id: its id.
-        name: its name.
         recorded: recorded fitness `(r, k)` by repetition and number of real-world evaluations; nan is missing.
         level: whether its only column, at 0, counts at every number of real-world evaluations.
         seed: seed of its random streams.
@@ -113,14 +112,10 @@ def compare_all(
     margin: float | None = None,
     intervals: bool = True,
 ) -> tuple[Comparison, ...]:
-    """Compare every pair of experiments; Holm's correction is over all pairs, test by test.
+    """Compare every pair of experiments from a first to a last number of real-world evaluations, in their order.
 
-    Args:
-        experiments: in the order of the result.
-        first: first number of real-world evaluations.
-        last: last number of real-world evaluations.
-        margin: difference in the unit of fitness within which two experiments are equivalent; None: not tested.
-        intervals: with intervals.
+    Holm's correction is over all pairs, test by test. `margin` is the difference in the unit of fitness within which
+    two experiments are equivalent; None: not tested.
     """
     over = Range(first, last)
     values = {one.id: over.values(one) for one in experiments}
@@ -140,10 +135,7 @@ def compare_all(
 def difference_interval(first: FloatArray, second: FloatArray, *, paired: bool) -> tuple[float | None, float | None]:
     """Return the 90 % interval of the difference of the means, by Welch's or the paired t; None if undefined.
 
-    Args:
-        first: `(r,)` by repetition; nan is missing.
-        second: `(s,)` by repetition; nan is missing.
-        paired: whether the values of one repetition belong together.
+    Values `(r,)` and `(s,)` are by repetition; nan is missing. If paired, the values of one repetition belong together.
     """
     result = _one_test(first, second, 0.0, "two-sided", paired=paired)
     if result is None:

@@ -48,8 +48,7 @@ def verdicts(
 
     Args:
         points: misfit of each iteration, from 0.
-        samples: number of samples that each was tuned on, with those from before the experiment; a mean over
-            repetitions.
+        samples: number of samples that each was tuned on, with those from before; a mean over repetitions.
         means: what the experiment has not used.
         doubt: about the model; None without any.
     """
@@ -107,11 +106,7 @@ def _judged(left: float | None) -> Identification:
 def _helps(now: TunableDistribution, then: TunableDistribution | None, samples: float, means: Means) -> Iterator[str]:
     """Yield what would help, what costs least first.
 
-    Args:
-        now: the tunable at the latest iteration.
-        then: the same on at most half of the samples; None if there is no such iteration.
-        samples: number of samples.
-        means: what the experiment has not used.
+    `then` is the tunable on at most half of the samples; None if there is no such iteration.
     """
     left, before = remaining(now), None if then is None else remaining(then)
     if left is None:

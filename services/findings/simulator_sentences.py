@@ -45,11 +45,7 @@ WIDER_BOUNDS = "wider bounds, if they make sense: it often ends at one"
 def remarks(points: Sequence[MisfitPoint], unit: str, error_unit: str | None = None, known: int = 0) -> tuple[str, ...]:
     """Return the latest point that has an error in sentences; none before the first sample.
 
-    Args:
-        points: misfit of each iteration.
-        unit: unit of fitness.
-        error_unit: unit of errors; by default that of fitness.
-        known: number of samples from before the experiment.
+    The unit of errors is by default that of fitness; `known` samples are from before the experiment.
     """
     with_error = [each for each in points if each.error.n]
     if not with_error:
@@ -78,13 +74,9 @@ def from_earlier(tuned_on: int, held_out: int) -> str:
 
 
 def unreproduced(id: str, tunings: Sequence[Tuning], sensors: Sensors | None, unit: str) -> str:
-    """Return that no simulator reproduces the samples, with numbers; "" if one does, or nobody knows.
+    """Return that no simulator reproduces the samples of an experiment, with numbers; "" if one does, or nobody knows.
 
-    Args:
-        id: of the experiment.
-        tunings: the latest tuning of each repetition.
-        sensors: of the robot; None if they are not known.
-        unit: of errors.
+    `tunings` are the latest of each repetition, `sensors` those of the robot, if they are known.
     """
     found = surprise(tunings)
     if found is None or found > SURPRISING:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 
+from gaplab.api.commands.tables import curves as results
 from gaplab.schemas.comparisons import Comparison, VerdictRead
 from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.provenance import ProvenanceRead
@@ -14,8 +15,7 @@ from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.errors import NotFound
 from gaplab.services.experiments import checks
 from gaplab.services.findings.judged import Judged, judged_curves
-from gaplab.services.findings.verdict import judge
-from gaplab.services.results import curves as results
+from gaplab.services.findings.sentences import judge
 from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import TunedSimulators, tuned_simulators
@@ -53,23 +53,18 @@ class Facts:
     """Everything that a report shows, as of about one moment.
 
     Attributes:
-        id: id of the study, or of the experiment that alone is meant.
-        name: its name.
-        notes: its notes; None without any.
+        id: id of the study, or of the experiment that alone is meant; so are name and notes.
         experiments: its experiments; of hidden realities without parameters.
         curves: their curves.
         transferred: the same of transferred controllers alone.
         judged: the curves with their distinct names.
-        verdict: the verdict on the curves.
         at_last: comparisons of all pairs at the common count; empty for one experiment.
         beside: the same of transferred controllers alone, and of the best of these.
         over_all: the same over all counts up to it, one value for each repetition, with the paper's pooled tests; empty
             if there is a single count.
         differing: settings that differ between the experiments; None for one experiment.
         checks: sensitivity checks, each once.
-        misfits: misfit by experiment, without levels.
-        work: work by experiment.
-        provenance: provenance by experiment.
+        misfits: misfit by experiment, without levels; work and provenance are by experiment too.
         leading: simulators of the experiment with the highest mean; None if there are none.
         outcome: what its only experiment has measured and tuned; None if there are several.
     """

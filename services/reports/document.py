@@ -1,10 +1,12 @@
-"""The arrangement of a report: which facts stand in which section."""
+"""The arrangement of a report: which facts stand in which section, and how to compute them again."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from gaplab.schemas.comparisons import Comparison
-from gaplab.schemas.records import StudyRead
 from gaplab.schemas.results import from_before
+from gaplab.schemas.spec import SpecRead
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number, number_of, spoken, titled
@@ -13,22 +15,15 @@ from gaplab.services.findings.sentences import POOLED
 from gaplab.services.findings.simulator_sentences import noise
 from gaplab.services.reports import tables
 from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Paragraph, Report, Section
-from gaplab.services.reports.content import Facts, Outcome, facts_of
-from gaplab.services.reports.reproduction import reproduction
-from gaplab.services.results.comparisons import Margin
+from gaplab.services.reports.content import Facts, Outcome
 from gaplab.services.results.tuned_simulators import simulator_coordinates
+from gaplab.services.specs.shortening import shortest
 from gaplab.services.specs.stored_specs import spec_of
-from gaplab.services.store.session import Store
 from gaplab.services.world.robot_library import label_of
 
 
-def report_on(store: Store, subject: StudyRead, margin: Margin | None = None) -> Report:
-    """Return the report on a study."""
-    return report_of(store, facts_of(store, subject, margin))
-
-
-def report_of(store: Store, facts: Facts) -> Report:
-    """Return the report with these facts."""
+def report_of(facts: Facts) -> Report:
+    """Return the report with these facts on a study."""
     outcome = facts.outcome
     sections = [
         Section("Verdict", _verdict(facts)),
@@ -36,7 +31,7 @@ def report_of(store: Store, facts: Facts) -> Report:
         *([Section("Which differ", _differences(facts))] if len(facts.experiments) > 1 else []),
         *([Section("The best measured controller", _controller(facts, outcome))] if outcome and outcome.best else []),
         *([Section("The tuned simulator", _tuned(facts, outcome))] if outcome and outcome.simulators else []),
-        *([Section("Simulators", _simulators(store, facts))] if facts.leading else []),
+        *([Section("Simulators", _simulators(facts))] if facts.leading else []),
         *([Section("Sensitivity of fitness to the tunables", _sensitivity(facts))] if facts.checks else []),
         *([Section("Measurements", _measurements(facts, outcome))] if outcome and outcome.measured else []),
         Section("Cost", (tables.cost(facts),)),
@@ -136,7 +131,7 @@ def _over_all(facts: Facts) -> tuple[Block, ...]:
     )
 
 
-def _simulators(store: Store, facts: Facts) -> tuple[Block, ...]:
+def _simulators(facts: Facts) -> tuple[Block, ...]:
     assert facts.leading is not None
     leading, tuned = facts.leading
     remarks = tuple(
@@ -151,7 +146,7 @@ def _simulators(store: Store, facts: Facts) -> tuple[Block, ...]:
         *tables.identified(facts),
         *([Bullets(remarks)] if remarks else []),
         Drawing(error),
-        Drawing(simulator_coordinates(store, leading.curve.experiment, title=leading.name)),
+        Drawing(simulator_coordinates(tuned, title=leading.name)),
     )
 
 
@@ -169,3 +164,35 @@ def _settings(facts: Facts) -> tuple[Block, ...]:
 def _provenance(facts: Facts) -> tuple[Block, ...]:
     found = tables.provenance(facts)
     return found or (Paragraph("The versions of what computed it are not stored."),)
+
+
+ONE = "Save the spec below as spec.json and submit it: gaplab submit spec.json --watch"
+EACH = "Save each spec below as a file and submit it: gaplab submit spec.json --watch"
+
+
+def reproduction(facts: Facts) -> Iterator[Block]:
+    """Yield what to do, in sentences, and the spec to submit; that of each experiment if no single spec gives all."""
+    found = submitted(facts)
+    yield Paragraph(ONE if found.spec else EACH)
+    yield Paragraph(
+        "The same spec and seed give the same numbers, to the last bit, with the engines of the provenance above."
+    )
+    yield Paragraph(f"Every number is in the archive that gaplab export {facts.id} writes.")
+    for remark in found.remarks:
+        yield Paragraph(f"{remark[0].upper()}{remark[1:]}.", note=True)
+    if found.spec:
+        yield Code(spec_text(found.spec))
+        return
+    for experiment, one in zip(facts.experiments, facts.judged, strict=True):
+        yield Paragraph(f"{one.name}:")
+        yield Code(spec_text(shortest(experiment.name, [experiment.spec]).spec))
+
+
+def submitted(facts: Facts) -> SpecRead:
+    """Return the spec to submit, without parameters of reality that are hidden yet."""
+    return shortest(facts.name, [experiment.spec for experiment in facts.experiments])
+
+
+def spec_text(spec: dict[str, Any] | None) -> str:
+    """Return a spec as JSON to read."""
+    return json.dumps(spec, indent=2, ensure_ascii=False)

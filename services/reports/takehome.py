@@ -14,29 +14,31 @@ import numpy as np
 from gaplab.schemas.records import ExperimentRead, SampleRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.traces import TRACE_COLUMNS
-from gaplab.services.core.arrays import frozen, known
-from gaplab.services.core.errors import Conflict, GaplabError
+from gaplab.services.core.arrays import FloatArray, frozen, known
+from gaplab.services.core.errors import Conflict, GaplabError, InvalidRobot
 from gaplab.services.csv_tables import csv_text
+from gaplab.services.engines.mujoco.plain import LOST, mjcf_of, plain_positions
 from gaplab.services.experiments.reading import read, read_experiment
 from gaplab.services.measuring import motion_files
 from gaplab.services.replay.process import RolloutProcess
-from gaplab.services.replay.sent_specs import sent
+from gaplab.services.replay.sent_specs import SentSpec, received, sent
 from gaplab.services.replay.traces import expected_motion
+from gaplab.services.reports.blocks import render_html
 from gaplab.services.reports.content import Facts, Outcome, facts_of
-from gaplab.services.reports.document import report_of, said
-from gaplab.services.reports.html import render_html
-from gaplab.services.reports.plain_mujoco import plain_motion, tuned_mjcf
-from gaplab.services.reports.reproduction import spec_text, submitted
+from gaplab.services.reports.document import report_of, said, spec_text, submitted
 from gaplab.services.reports.tables import MOST_SHOWN
 from gaplab.services.results.files import entry_of
+from gaplab.services.specs.assembly import simulation_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Store
 from gaplab.services.world import robot_library
+from gaplab.services.world.motions import Motion
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.tunables.labels import unit_of
+from gaplab.services.world.world import World
 
 Readings: TypeAlias = dict[tuple[Any, ...], Sequence[Any]]
 """Tables of readings of all repeats, by genome and values."""
@@ -97,10 +99,9 @@ def takehome_zip(
         InvalidSpec: its robot is not installed here.
     """
     home, content = _home(store, experiment_id), io.BytesIO()
-    report = report_of(store, home.facts)
     with ZipFile(content, "w") as archive:
         made = f"Made by gaplab {version('gaplab')}."
-        archive.writestr(entry_of("report.html"), draw(lambda: render_html(report, made)))
+        archive.writestr(entry_of("report.html"), draw(lambda: render_html(report_of(home.facts), made)))
         readings, traces = _answered(store, experiment_id)
         for name, text in (*_files(home, readings), *traces, *_expected(home, process)):
             archive.writestr(entry_of(name), text)
@@ -245,3 +246,27 @@ def _simulator(home: _Home) -> dict[str, Any]:
 
 def _json(value: Any) -> str:  # noqa: ANN401 - JSON
     return json.dumps(value, indent=1, ensure_ascii=False) + "\n"
+
+
+def tuned_mjcf(sent_spec: SentSpec, parameters: Sequence[float], headline: str) -> str:
+    """Return a simulator as MJCF, with a line at its start; "" without MuJoCo, or if it refuses it."""
+    _, world = _tuned(sent_spec, parameters)
+    try:
+        return mjcf_of(world, [headline, f"Not in this file: {', '.join(LOST)}"])
+    except InvalidRobot:
+        return ""
+
+
+def plain_motion(
+    sent_spec: SentSpec, parameters: Sequence[float], genome: Sequence[float], times_s: FloatArray
+) -> FloatArray | None:
+    """Return `(t, 3)`: where the body that counts is in MuJoCo alone, m; None of a controller that observes."""
+    robot, world = _tuned(sent_spec, parameters)
+    motion = robot.motion(frozen(genome)).observed_at(times_s)
+    return plain_positions(world, motion) if isinstance(motion, Motion) else None
+
+
+def _tuned(sent_spec: SentSpec, parameters: Sequence[float]) -> tuple[Robot, World]:
+    spec = received(sent_spec)
+    robot = robot_of(spec)
+    return robot, simulation_of(spec, robot).world(frozen(parameters))

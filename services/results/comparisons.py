@@ -31,11 +31,9 @@ MOST_WITH_INTERVALS = 20
 
 @dataclass(frozen=True)
 class Margin:
-    """A difference within which two experiments are equivalent.
+    """A difference, above 0, within which two experiments are equivalent.
 
-    Attributes:
-        value: above 0, in the unit of fitness.
-        of_direct: the value is a share of the direct baseline's mean fitness instead.
+    It is in the unit of fitness, or a share of the direct baseline's mean fitness.
     """
 
     value: float
@@ -62,7 +60,7 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
         from_evaluations: the first number of evaluations; by default the last.
         to_evaluations: the last number of evaluations; by default the last that the experiments share.
         margin: difference within which two experiments are equivalent; None: not tested.
-        intervals: with intervals; by default for up to `MOST_WITH_INTERVALS` experiments.
+        intervals: by default for up to `MOST_WITH_INTERVALS` experiments.
         fitness: whose fitness counts; by default the recorded one, as in the paper.
 
     Raises:

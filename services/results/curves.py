@@ -116,13 +116,9 @@ LEAST_IN_UNIT = 3.0
 
 
 def cost_axis(store: Store, curves: Sequence[Curve], cost: Cost, *, cost_s: float = 0.0) -> CostAxis:
-    """Return the horizontal axis for curves that are drawn against their cost.
+    """Return the horizontal axis for curves that are drawn against the rollouts, or the time, that they took so far.
 
-    Args:
-        store: database with the experiments.
-        curves: curves of the experiments; a level has no place on the axis.
-        cost: the rollouts so far, or the time of simulation and real-world evaluations so far.
-        cost_s: seconds that one real-world evaluation takes.
+    Each real-world evaluation takes `cost_s` seconds. A level has no place on the axis.
     """
     with store.reading() as session:
         costs = results.iteration_costs(session, [curve.experiment for curve in curves if not curve.level])
@@ -136,8 +132,7 @@ def cost_axis(store: Store, curves: Sequence[Curve], cost: Cost, *, cost_s: floa
 def _mean_costs(rows: Iterable[tuple[str, int, int, int, float, bool]]) -> dict[Point, tuple[float, float]]:
     """Return rollouts and seconds so far, as means over the repetitions with a recorded fitness at a point.
 
-    Args:
-        rows: as `iteration_costs` returns them, in the order of the log.
+    The rows are those of `iteration_costs`, in the order of the log.
     """
     so_far: dict[tuple[str, int], tuple[int, float]] = defaultdict(lambda: (0, 0.0))
     found: dict[Point, list[tuple[int, float]]] = defaultdict(list)

@@ -25,13 +25,11 @@ from gaplab.services.world.tunables.labels import unit_of
 
 @dataclass(frozen=True)
 class TunedSimulators:
-    """The best simulators of an experiment.
+    """The best simulators of an experiment: one for each iteration of each repetition.
 
     Attributes:
         unit: unit of fitness.
         error: kind of error that tuning minimised.
-        dimensions: the tunables.
-        simulators: the best of each iteration of each repetition.
         errors: squared errors by iteration and repetition, of iteration 0 only if it was tuned; None if physics failed.
         samples: numbers of samples that the simulators were tuned on, by iteration and repetition.
         truth: the known parameters of reality; None as long as they are hidden, empty if reality has none.
@@ -60,14 +58,17 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
         measured = tunings.measured(session, row)
         hidden = row.id in hiding.hidden(session, [row])
     spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
+    points = list[SimulatorPoint]()
     errors: dict[int, dict[int, float | None]] = defaultdict(dict)
     samples: dict[int, dict[int, int]] = defaultdict(dict)
     for best in simulators:
-        at = best.iteration
-        count = measured.tuned_until(best.repetition, at)
+        repetition, at, total = best.repetition, best.iteration, best.simulator.squared_error
+        count = measured.tuned_until(repetition, at)
+        error = tunings.per_sample(total, count, discrepancy)
+        points.append(SimulatorPoint(repetition, at, tuple(best.simulator.parameters.tolist()), error, best.real))
         if at or count:
-            errors[at][best.repetition] = known(best.simulator.squared_error)
-            samples[at][best.repetition] = count
+            errors[at][repetition] = known(total)
+            samples[at][repetition] = count
     real = spec.reality.engine
     elsewhere = real is None or real.name != spec.engine.name
     return TunedSimulators(
@@ -76,10 +77,7 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
             discrepancy.error_unit(unit(spec)), discrepancy.error, discrepancy.squares, discrepancy.error_text
         ),
         dimensions=_dimensions(spec),
-        simulators=tuple(
-            SimulatorPoint(each.repetition, each.iteration, tuple(each.simulator.parameters.tolist()))
-            for each in simulators
-        ),
+        simulators=tuple(points),
         errors=errors,
         samples=samples,
         truth={} if elsewhere else None if hidden else spec.reality.parameters,
@@ -97,44 +95,28 @@ MOST_SETTINGS = 8
 """Settings with an axis; more would be too narrow to read."""
 
 
-def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") -> FigureDefinition:
-    """Return the best simulator of each iteration and repetition: iteration, tunables, error, fitness in reality.
-
-    Raises:
-        NotFound: the experiment does not exist.
-    """
-    with store.reading() as session:
-        row = experiments.get_experiment(session, experiment_id)
-        found = tunings.best_simulators(session, experiment_id)
-        measured = tunings.measured(session, row)
-    spec = spec_of(row.spec)
-    space = parameters_of(spec.tunables)
-    discrepancy = discrepancy_of(row.spec)
-    errors = tuple(
-        tunings.per_sample(
-            each.simulator.squared_error, measured.tuned_until(each.repetition, each.iteration), discrepancy
-        )
-        for each in found
-    )
+def simulator_coordinates(tuned: TunedSimulators, *, title: str = "") -> FigureDefinition:
+    """Return the best simulator of each iteration and repetition: iteration, tunables, error, fitness in reality."""
+    found = tuned.simulators
     axes = [
         Coordinate("Iteration", tuple(float(each.iteration) for each in found)),
         *(
             Coordinate(
-                with_unit(spoken(tunable.name), [unit_of(tunable.name)]),
-                tuple(float(each.simulator.parameters[at]) for each in found),
-                float(space.lower[at]),
-                float(space.upper[at]),
+                with_unit(spoken(tunable.name), [tunable.unit]),
+                tuple(each.parameters[at] for each in found),
+                tunable.lower,
+                tunable.upper,
             )
-            for at, tunable in enumerate(spec.tunables)
+            for at, tunable in enumerate(tuned.dimensions)
         ),
-        Coordinate(with_unit("Error per sample", [discrepancy.error_unit(unit(spec))]), errors, wide=True),
-        Coordinate(with_unit("Real fitness", [unit(spec)]), tuple(each.real for each in found)),
+        Coordinate(with_unit("Error per sample", [tuned.error.unit]), tuple(each.error for each in found), wide=True),
+        Coordinate(with_unit("Real fitness", [tuned.unit]), tuple(each.real for each in found)),
     ]
     return coordinates_figure(
         axes,
         shades=[float(each.iteration) for each in found],
         shades_label="Iteration",
-        hover=[f"repetition {each.repetition}, iteration {each.iteration}" for each in found],
+        hover=list(map(str, found)),
         what="simulator",
         title=title,
     )

@@ -16,7 +16,7 @@ from plotly.graph_objects import Figure as Chart
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.matplotlib.files import COLUMN_IN, DPI, LOOK, FileFormat, render_file
-from gaplab.services.figures.matplotlib.text_size import lines, shortened, width_in
+from gaplab.services.figures.matplotlib.page_layout import lines, shortened, width_in
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.figures.plotly.html import render_html
 from gaplab.services.figures.style import INK
@@ -100,7 +100,7 @@ def test_a_name_stands_in_the_legend_once_and_in_the_order_of_the_marks() -> Non
     first = sorted((each for each in drawn if each["xaxis"] == "x2"), key=lambda each: each["legendrank"])
 
     assert len({each["name"] for each in drawn}) == len(drawn)
-    assert [each["name"] for each in first] == ["simulator", "steps", "mean", "equal", "tuned", "truth"]
+    assert [each["name"] for each in first] == ["simulator", "second", "mean", "equal", "tuned", "truth"]
 
 
 def test_panels_one_above_another_share_their_horizontal_axis() -> None:

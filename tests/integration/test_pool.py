@@ -15,7 +15,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
-from gaplab.workers.lending import Pool, SharedCall, sizes
+from gaplab.workers.pool import Pool, SharedCall, sizes
 from tests.processes import processes_of_ray
 from tests.waiting import wait_until
 

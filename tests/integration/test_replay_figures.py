@@ -12,8 +12,7 @@ from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Probed, Transferred, Tuned
 from gaplab.services.engines.analytic import speed
-from gaplab.services.figures.kinds.gait import gait_figure
-from gaplab.services.figures.kinds.readings import readings_figure
+from gaplab.services.figures.kinds.replays import gait_figure, readings_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.figures.marks import Arrow, Bars, Line, Points
 from gaplab.services.figures.matplotlib.files import render_file

@@ -15,8 +15,8 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.types import Probed
 from gaplab.services.experiments import extension, lifecycle, listing, reading, submission
 from gaplab.services.reports.blocks import Code, Paragraph
-from gaplab.services.reports.content import verdict_on
-from gaplab.services.reports.document import report_on
+from gaplab.services.reports.content import facts_of, verdict_on
+from gaplab.services.reports.document import report_of
 from gaplab.services.running import execution
 from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.store.lease import Claim
@@ -238,7 +238,7 @@ def test_the_spec_in_a_report_gives_the_same_experiments(published: Store, study
 
 def how_to_reproduce(store: Store, study: str) -> tuple[list[str], list[str]]:
     """Return the specs and the sentences of the report's section."""
-    blocks = report_on(store, reading.read(store, study)).sections[-1].blocks
+    blocks = report_of(facts_of(store, reading.read(store, study))).sections[-1].blocks
     return (
         [block.text for block in blocks if isinstance(block, Code)],
         [block.text for block in blocks if isinstance(block, Paragraph)],

@@ -21,7 +21,7 @@ ROOMS = {
     "world": (("core", "csv_tables"), {"numpy", "scipy", "pydantic"}),
     "engines": (("core", "world"), {"numpy", "pydantic"}),
     "robots": (("core", "world", "engines"), {"numpy", "scipy", "pydantic", "lxml"}),
-    "figures": ((), {"matplotlib"}),
+    "figures": ((), {"matplotlib", "jinja2"}),
     "findings": (("core", "world", "figures"), {"numpy", "scipy"}),
     "specs": (("core", "world", "engines", "findings", "csv_tables"), {"numpy"}),
     "store": (("core", "world", "specs"), {"sqlalchemy", "psycopg"}),

@@ -29,8 +29,7 @@ from gaplab.services.findings.comparisons import (
     found_by,
     shares_streams,
 )
-from gaplab.services.findings.intervals import improvement, summary
-from gaplab.services.findings.statistics import holm
+from gaplab.services.findings.statistics import holm, improvement, summary
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from tests.experiments import toy

@@ -5,7 +5,7 @@ import pytest
 
 from gaplab.schemas.comparisons import Trend
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.findings.trends import FEWEST_REPETITIONS, curve_end
+from gaplab.services.findings.judged import FEWEST_REPETITIONS, curve_end
 
 
 def curve(means: list[float], noise: float = 0.01, repetitions: int = 20, seed: int = 0) -> FloatArray:

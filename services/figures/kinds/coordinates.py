@@ -65,15 +65,9 @@ def coordinates_figure(
     what: str,
     title: str = "",
 ) -> FigureDefinition:
-    """Return parallel coordinates: each line joins the values of one simulator or experiment.
+    """Return parallel coordinates: each line joins the values of one simulator or experiment, `what` in a word.
 
-    Args:
-        coordinates: the axes, from left to right, with one value for each line.
-        shades: a number for each line, drawn from light to dark.
-        shades_label: the meaning of the shades.
-        hover: a text for each line.
-        what: noun for one line, like "simulator".
-        title: text above the figure.
+    The axes have one value for each line; lines are drawn from light to dark by their shades.
     """
     coordinates, lines = list(coordinates), len(shades)
     scaled = [_scaled(coordinate) for coordinate in coordinates]

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from gaplab.schemas.results import Curve, CurvePoint, Fitness, from_before
-from gaplab.services.figures.kinds.best_of import best_of_in_words, best_of_line
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Line, Mark, Panel, Table, faint_lines
 from gaplab.services.figures.style import INK, Dash, Style, strategy_styles
 from gaplab.services.figures.words import distinct_names, drawable, heading, limits, number, number_of, with_unit
@@ -24,11 +23,11 @@ FEW = 5  # with fewer repetitions, Student's t widens the interval to 1.6 SD and
 
 @dataclass(frozen=True)
 class CostAxis:
-    """A horizontal axis other than the number of real-world evaluations.
+    """A horizontal axis other than the number of real-world evaluations, with its explanation in the caption.
 
     Attributes:
-        label: label of the axis.
-        note: its explanation in the caption.
+        label: its label.
+        note: the explanation.
         at: x by experiment and number of real-world evaluations; points without an x are not drawn.
     """
 
@@ -55,18 +54,11 @@ def curves_figure(
     each: bool = False,
     beside: Sequence[Curve] = (),
 ) -> FigureDefinition:
-    """Return a figure of fitness in reality against the number of real-world evaluations, or their cost.
+    """Return a figure of fitness in reality against the number of real-world evaluations, or against their cost.
 
-    A point without a mean, or with one too large to compute with, is left out. A band needs two repetitions.
-
-    Args:
-        curves: curves in the order of the legend.
-        title: text above the figure; empty for none.
-        band: band around lines and levels; by default the interval, or the SD if few repetitions would make the
-            interval fill the figure.
-        against: the horizontal axis; by default the number of real-world evaluations.
-        each: draw a faint line for every repetition.
-        beside: curves of transferred controllers alone, to draw as thin lines beside those of the same experiments.
+    A point without a mean, or with one too large to compute with, is left out. The band is by default the interval, or
+    the SD if few repetitions would make the interval fill the figure; it needs two repetitions. `each` adds a faint
+    line for every repetition, `beside` thin lines: the same experiments' curves of transferred controllers alone.
     """
     curves = [_drawable(one) for one in curves]
     band = band or _default_band(curves)
@@ -233,3 +225,33 @@ def _table(placed: Sequence[_Placed], best_of: Sequence[Line]) -> Table:
 def _written(point: CurvePoint, n: str = "") -> str:
     deviation = f" ± {point.sd:.3f}" if point.sd is not None else ""
     return f"{point.mean:.3f}{deviation} ({n}{point.n})"
+
+
+def best_of_line(name: str, direct: Curve, last: float) -> Line | None:
+    """Return the expected fitness of the best of e + 1 direct searches, at each number e of real-world evaluations.
+
+    The recorded fitness after e samples is the largest of e + 1 controllers: the samples and the transferred one. In
+    perfect simulators, and with searches of equal size, *simulated fit* would follow this line. A curve between the
+    level of direct and the line has no better controllers than single direct searches. The samples of *random*, *known
+    fit* and *informative* are not searched for fitness, so their curves may stay below.
+
+    The line ends at half of the direct searches, or at the `last` evaluations of the figure; None if there are too few.
+    """
+    best = direct.best_of[: int(last) + 1]
+    if not best:
+        return None
+    hover = tuple(f"{each:.3f} (best of {size})" if each is not None else "" for size, each in enumerate(best, 1))
+    return Line(
+        f"{name}, best of as many searches",
+        tuple(range(len(best))),
+        best,
+        Style(INK, "dotted", "circle"),
+        hover=hover,
+        markers=False,
+    )
+
+
+def best_of_in_words(line: Line, last: float) -> str:
+    """Return the explanation of the line for the caption."""
+    told = f"{line.name}: mean of the best of e + 1, drawn at e evaluations; their own evaluations are not counted."
+    return f"{told} It ends at half of them." if len(line.x) <= last else told

@@ -22,14 +22,8 @@ def predictions_figure(
     """Return a figure of the samples, with the diagonal on which simulation and reality agree.
 
     A sample is left out if one of its three fitnesses is missing or too large to compute with, so that before and after
-    are compared over the same samples.
-
-    Args:
-        items: the samples.
-        unit: unit of fitness.
-        pending: samples that are not computed yet.
-        left_out: samples of later repetitions that will not be computed.
-        title: text above the figure.
+    are compared over the same samples. The caption says how many are `pending`, and how many of later repetitions are
+    `left_out`, which will not be computed.
     """
     told, drawn = _pairs(items)
     values = [value for pairs in drawn.values() for both in pairs for value in both]

@@ -34,11 +34,18 @@ class SimulatorPoint:
 
     Attributes:
         parameters: tuned values, in the order of the dimensions.
+        error: its error per sample; None without samples, or if the physics failed on one.
+        real: fitness in reality of the controller that evolved in it; None if there is none.
     """
 
     repetition: int
     iteration: int
     parameters: tuple[float, ...]
+    error: float | None = None
+    real: float | None = None
+
+    def __str__(self) -> str:
+        return f"repetition {self.repetition}, iteration {self.iteration}"
 
 
 def simulators_figure(
@@ -52,15 +59,9 @@ def simulators_figure(
 ) -> FigureDefinition:
     """Return a figure of the best simulators, from light to dark by iteration, and of reality if it may be shown.
 
-    Two or three tunables are drawn pair by pair; one, or more than three, are drawn against iterations.
-
-    Args:
-        tuned: the best simulator of each iteration of each repetition.
-        dimensions: the tunables.
-        truth: the known parameters of reality by name; None as long as they are hidden.
-        real_engine: engine of reality, if it is not that of the simulators: reality then has no such parameters.
-        title: text above the figure.
-        columns: most panels in a row.
+    Two or three tunables are drawn pair by pair; one, or more than three, are drawn against iterations. `truth` has the
+    known parameters of reality by name, and is None as long as they are hidden. `real_engine` is given if it is not
+    that of the simulators: reality then has no such parameters.
     """
     shown = _first_repetitions(sorted(tuned, key=lambda each: (each.iteration, each.repetition)))
     if 1 < len(dimensions) <= IN_PAIRS:
@@ -115,7 +116,7 @@ def _points(shown: Sequence[SimulatorPoint], x: Sequence[float], y: Sequence[flo
         tuple(y),
         shades=tuple(each.iteration for each in shown),
         shades_label="Iteration",
-        hover=tuple(f"repetition {each.repetition}, iteration {each.iteration}" for each in shown),
+        hover=tuple(map(str, shown)),
     )
 
 

@@ -44,14 +44,7 @@ DEFAULT = ErrorKind()
 
 @dataclass(frozen=True)
 class _Measure:
-    """One measure of the error, by iteration and repetition.
-
-    Attributes:
-        name: its name, with the unit.
-        line: its median and quartiles.
-        values: the known values by iteration.
-        panel: the panel.
-    """
+    """One measure of the error, named with its unit: its median and quartiles, and the known values by iteration."""
 
     name: str
     line: Line
@@ -69,14 +62,9 @@ def squared_error_figure(
 ) -> FigureDefinition:
     """Return a figure of median and quartiles of the error after each iteration with tuning.
 
-    One panel has the error per sample, the other the sum that tuning minimises.
-
-    Args:
-        errors: sums by iteration; values too large to compute with are left out.
-        kind: what they are sums of; by default squared differences in fitness.
-        samples: numbers of samples by iteration; left out: the figure has only the sum.
-        title: text above the figure.
-        each: draw a thin line for every repetition.
+    One panel has the error per sample, if the numbers of samples are given; the other has the sum that tuning
+    minimises. Errors are sums by iteration; those too large to compute with are left out. `each` adds a thin line for
+    every repetition.
     """
     errors = {at: {one: drawable(value) for one, value in found.items()} for at, found in errors.items()}
     unit = printable(kind.unit)

@@ -18,11 +18,9 @@ SHORTEST = 0.03
 
 
 def toy_figure(toys: Sequence[ToyIteration], *, title: str | None = None) -> FigureDefinition:
-    """Return a figure with one panel for each iteration, as in the paper.
+    """Return a figure with one panel for each iteration of one repetition, at least one, as in the paper.
 
-    Args:
-        toys: one or more iterations of one repetition.
-        title: text above the figure; by default the experiment and the repetition.
+    The title is by default the experiment and the repetition.
     """
     several = len(toys) > 1
     first = toys[0]

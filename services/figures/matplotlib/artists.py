@@ -15,7 +15,7 @@ from gaplab.services.figures.marks import (
     Points,
     Polylines,
 )
-from gaplab.services.figures.matplotlib.text_size import printable
+from gaplab.services.figures.matplotlib.page_layout import legend_name, printable
 from gaplab.services.figures.style import INK, SHADES, Style
 from gaplab.services.figures.words import evenly
 
@@ -37,12 +37,9 @@ NAN = float("nan")
 
 
 def draw_marks(panel: Panel, axes: "Axes", shades: tuple[float, float]) -> None:
-    """Draw the marks of a panel, the first lines above later ones.
+    """Draw the marks of a panel into axes whose limits are set, the first lines above later ones.
 
-    Args:
-        panel: panel with the marks.
-        axes: matplotlib's axes, with their limits set.
-        shades: the numbers of the lightest and the darkest shade.
+    `shades` are the numbers of the lightest and the darkest shade.
     """
     for order, mark in enumerate(panel.marks):
         _draw(mark, axes, 10 - 0.01 * order, shades)
@@ -67,15 +64,10 @@ def _draw(mark: Mark, axes: "Axes", order: float, shades: tuple[float, float]) -
             _label(mark, axes)
 
 
-def legend_name(name: str) -> str:
-    """Return the name for matplotlib's legend, which leaves out names that begin with an underscore."""
-    return f" {name}" if name.startswith("_") else name or "_nothing"
-
-
 def _line(line: Line, axes: "Axes", order: float) -> None:
     look = line.style
     x, y = _floats(line.x), _floats(line.y)
-    drawn: dict[str, Any] = {"color": look.color, "drawstyle": "steps-post" if line.steps else "default"}
+    drawn: dict[str, Any] = {"color": look.color}
     if line.faint:
         axes.plot(x, y, **drawn, linewidth=0.4, alpha=0.3, zorder=1.5)
         return
@@ -86,8 +78,7 @@ def _line(line: Line, axes: "Axes", order: float) -> None:
     axes.plot(x, y, **drawn)
     if any(each is not None for each in line.lower):
         lower, upper = _ends(line.lower, line.y), _ends(line.upper, line.y)
-        step: Any = {"step": "post"} if line.steps else {}
-        axes.fill_between(x, lower, upper, color=look.color, alpha=0.13, linewidth=0, zorder=1, **step)
+        axes.fill_between(x, lower, upper, color=look.color, alpha=0.13, linewidth=0, zorder=1)
 
 
 def _shaded(mark: Points | Polylines, axes: "Axes", order: float, shades: tuple[float, float]) -> None:

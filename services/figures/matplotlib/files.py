@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from gaplab.services.figures.marks import Axis, FigureDefinition
 from gaplab.services.figures.matplotlib.artists import draw_marks
-from gaplab.services.figures.matplotlib.page_layout import PageLayout, add_surroundings, draw_bar_of_shades, shades_of
-from gaplab.services.figures.matplotlib.text_size import FAMILY, printable, width_in
+from gaplab.services.figures.matplotlib.page_layout import (
+    FAMILY,
+    PageLayout,
+    add_surroundings,
+    draw_bar_of_shades,
+    printable,
+    shades_of,
+    width_in,
+)
 from gaplab.services.figures.style import INK
 from gaplab.services.figures.words import power
 
@@ -66,13 +73,9 @@ _matplotlib = Lock()  # its settings are global to the process, and the service 
 def render_file(
     figure: FigureDefinition, kind: FileFormat, *, width_in: float = COLUMN_IN, caption: bool = True
 ) -> bytes:
-    """Return the figure as a file; an SVG has letters as paths, so that it needs no font.
+    """Return the figure as a file with its caption or, for a paper, without.
 
-    Args:
-        figure: the content.
-        kind: the format.
-        width_in: width in inches.
-        caption: draw the caption beneath; a paper has its own.
+    An SVG has letters as paths, so that it needs no font.
     """
     from matplotlib import rc_context
 

@@ -1,6 +1,6 @@
-"""One repetition on many cores: the parts of its calls are shared with helpers, which are Ray actors on idle cores.
+"""One repetition on many cores: it shares its calls with helpers, which are Ray actors on idle cores.
 
-A slow helper gets fewer; no call waits for one.
+A slow helper gets fewer parts of a call; no call waits for one.
 """
 
 from collections import deque
@@ -155,14 +155,8 @@ class SharedCall:
     """One call: this core simulates parts from the front, helpers from the back, until they meet.
 
     Once no other part is left, this core also simulates a part whose helper is late. So a core that is slow, dead or
-    used by another program delays the call by little more than one part.
-
-    Args:
-        parts: parts of the call.
-        here: function that simulates a part on this core.
-        helpers: helpers, which simulate parts on other cores.
-        rollout_s: expected seconds of a rollout.
-        question: what helpers answer as `here` does.
+    used by another program delays the call by little more than one part. `here` simulates a part on this core, as
+    helpers answer the question; a rollout is expected to take `rollout_s`.
 
     Attributes:
         gained: rollouts that helpers simulated.
@@ -246,12 +240,8 @@ LEAST_S = 0.005
 class Pool:
     """A Simulate and a Sense that share their rollouts with the idle cores of the cluster; the numbers stay the same.
 
-    Args:
-        spec: spec of the experiment, from which helpers build the same Simulate.
-        here: that Simulate, on this core.
-        per_call: smallest sensible number of rollouts of a call.
-        versions: versions that the node of a helper must have.
-        sense: that Sense, on this core; None if nothing asks for readings.
+    Helpers build the same Simulate from the spec as the one `here`; their nodes must have the versions. A call has at
+    least `per_call` rollouts. There is no Sense if nothing asks for readings.
     """
 
     def __init__(
