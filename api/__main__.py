@@ -10,7 +10,7 @@ from gaplab.services.settings import Settings
 
 
 def main() -> None:
-    """Serve with the settings of the environment."""
+    """Serve the API with the settings in the environment variables."""
     try:
         settings = Settings.from_environment()
         logs.configure()

@@ -46,7 +46,7 @@ class RepetitionRerun(Frozen):
 
 
 class RerunRead(Frozen):
-    """An archive, computed again."""
+    """The repetitions of an archive, computed again and compared with the stored numbers."""
 
     same: int
     different: int

@@ -155,8 +155,8 @@ class Comparison(Groups, Pair):
     """
 
     fitness: Fitness = Fitness.RECORDED
-    unit: Unit = Field(default="", description="of fitness", examples=["m/s"])
-    where: str = Field(default="", description="these numbers", examples=["after 5 real-world evaluations"])
+    unit: Unit = Field(default="", description="unit of fitness", examples=["m/s"])
+    where: str = Field(default="", description="the range in words", examples=["after 5 real-world evaluations"])
     shared_evaluations: int = Field(
         default=0, description="last number of real-world evaluations that all compared experiments share"
     )

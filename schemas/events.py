@@ -66,7 +66,7 @@ class EventKind(StrEnum):
 
 
 class EventRead(Frozen):
-    """One event."""
+    """A change of an experiment, with its number."""
 
     number: int = Field(description="number of the event, from 1 without gaps; a reader resumes after it")
     kind: EventKind

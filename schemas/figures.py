@@ -24,7 +24,7 @@ class TableRead(Frozen):
 
 
 class FigureRead(Frozen):
-    """A figure for a page that knows Plotly."""
+    """A figure for a page that has Plotly."""
 
     figure: Chart
     title: str = Field(examples=["Fig. 4"])

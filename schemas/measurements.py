@@ -1,7 +1,7 @@
 """Measurements of a physical robot: requests for them, takes, answers, corrections, and what is known beforehand.
 
 A request is `open`; an operator or a driver takes it for a while, and answers. `measured` and `failed` end it, and the
-repetition goes on; `void` says that the answer is worth nothing, and asks again. A correction replaces an answer; what
+repetition goes on; `void` declares the answer invalid, and asks again. A correction replaces an answer; what
 was computed from it is computed again, and the old steps stay readable as a closed branch.
 """
 
@@ -60,13 +60,13 @@ class RequestState(StrEnum):
     MEASURED = "measured"
     FAILED = "failed"
     WITHDRAWN = "withdrawn"
-    """It is wanted no more: its experiment ended, or a correction closed its branch."""
+    """It is no longer needed: its experiment ended, or a correction closed its branch."""
     STUCK = "stuck"
     """It was taken too often without an answer; a person opens it again."""
 
 
 class TakeSpec(Frozen):
-    """Who takes a request, and for how long without a sign of life."""
+    """Who takes a request, and for how long without a heartbeat."""
 
     EXAMPLES: ClassVar[Examples] = {"by hand": {"summary": "A person takes it", "value": {"operator": "Ada"}}}
 
@@ -78,22 +78,22 @@ class TakeSpec(Frozen):
 
 
 class HolderSpec(Frozen):
-    """The take that a heartbeat, an answer or a release is of."""
+    """The take that a heartbeat, an answer or a release belongs to."""
 
     EXAMPLES: ClassVar[Examples] = {"the first take": {"value": {"take": 1}}}
 
-    take: int = Field(ge=1, description="number of the take, as it was answered")
+    take: int = Field(ge=1, description="number of the take, as the answer to taking the request has it")
 
 
 class ReleaseSpec(HolderSpec):
-    """The take that ends without an answer. Another person than its holder says who, and why."""
+    """A take to end without an answer; anyone but its holder gives a name and a reason."""
 
     operator: Label | None = None
     reason: Annotated[str, Field(min_length=1, max_length=2_000)] | None = None
     moved_s: Annotated[Real, Field(ge=0, le=1e9)] | None = Field(
         default=None,
-        description="for how many seconds the robot may have moved for it, to now, if it may have ended before: what "
-        "others measured meanwhile does not count by itself",
+        description="seconds, up to now, in which the robot may have moved for this take after its end: what others "
+        "measured meanwhile is then doubtful",
     )
 
 
@@ -115,7 +115,7 @@ class MeasurementSpec(Frozen):
     lags_s: Lags | None = None
     unit: Unit | None = Field(default=None, description="unit of the values, which must be the robot's; null: it is")
     failed: Annotated[str, Field(min_length=1, max_length=2_000)] | None = Field(
-        default=None, description="why there are no values: the controller counts as tried, and teaches nothing"
+        default=None, description="why there are no values: the controller counts as tried, but nothing is tuned on it"
     )
     operator: Label | None = Field(
         default=None, description='default: who took the request; "unknown" if `take` is not its latest take'
@@ -124,7 +124,7 @@ class MeasurementSpec(Frozen):
     attachments: tuple[Hash, ...] = Field(
         default=(), max_length=20, description="hashes of stored attachments: a trace, a photograph"
     )
-    confirmed: bool = Field(default=False, description="a person was asked about what is doubtful, and it is right")
+    confirmed: bool = Field(default=False, description="a person confirms that unlikely values are right")
 
     @model_validator(mode="after")
     def _check_that_it_is_one(self) -> "MeasurementSpec":
@@ -205,11 +205,11 @@ class RequestRead(Frozen):
     )
     between_repeats: str | None = Field(
         default=None,
-        description="how it begins, and what to do between repeats; null: it has no body",
+        description="how the robot begins, and what to do between repeats; null: it has no body",
         examples=["Let it rest for 1 s."],
     )
     needs: str | None = Field(
-        default=None, description="what is needed beside values; null: nothing", examples=["Send a trace."]
+        default=None, description="what is needed besides values; null: nothing", examples=["Send a trace."]
     )
     same_as: Id | None = Field(
         default=None, description="an earlier request for the same controller, whose answer is this one's too"
@@ -232,7 +232,7 @@ class Consequences(Frozen):
     iteration: int = Field(description="iteration from which the repetition goes on")
     steps: int = Field(description="stored steps that followed, which close as a branch and are computed again")
     branch: int | None = Field(default=None, description="number of the closed branch; null if nothing followed")
-    measurements: int = Field(description="measurements among them; asked for again, they are reused")
+    measurements: int = Field(description="measurements among these steps; they are reused if requested again")
     words: str = Field(description="the same in a sentence", examples=["closes 4 steps; 1 measurement is reused"])
 
 
@@ -241,7 +241,7 @@ class CorrectionSpec(Frozen):
 
     EXAMPLES: ClassVar[Examples] = {
         "a wrong number": {
-            "summary": "A slip of the keyboard",
+            "summary": "A typing error",
             "value": {"values": [0.41, 0.44, 0.4], "reason": "4.4 was 0.44"},
         }
     }
@@ -261,7 +261,7 @@ class CorrectionSpec(Frozen):
 
 
 class VoidSpec(Frozen):
-    """Why a measurement is worth nothing; its controller is asked for again."""
+    """Why a measurement is invalid; its controller is requested again."""
 
     EXAMPLES: ClassVar[Examples] = {
         "void": {"summary": "The floor was wet", "value": {"reason": "the floor was wet"}},

@@ -59,7 +59,7 @@ def pointer_to(path: Iterable[object]) -> str:
 
 
 def permitted_by(error: Mapping[str, Any]) -> tuple[str, ...] | str | None:
-    """Return what is permitted in the place of an error: a description, or all permitted texts."""
+    """Return what is permitted instead of the refused value: a description, or all permitted texts."""
     context = error.get("ctx", {})
     if error["type"] in {"literal_error", "enum"}:
         return tuple(re.findall(r"'([^']*)'", context["expected"]))
@@ -93,7 +93,7 @@ def sentence(error: Mapping[str, Any], place: Sequence[str | int] | None = None)
 
 
 def _subject(place: Sequence[str | int]) -> str:
-    """Return the name of a place: the field, with the number of an item; "it" for the whole."""
+    """Return the subject of a sentence on a value: its field, with the number of a list item; "it" for a whole body."""
     names = [part for part in place if isinstance(part, str)]
     if not names:
         return "it"

@@ -128,7 +128,7 @@ class Replay(Frozen):
         description="names of the bodies, the base first", examples=[("trunk", "front_left_shin")]
     )
     feet: tuple[str, ...] = Field(
-        description="up to eight outer bodies that collide with the ground; the base is none",
+        description="up to eight outer bodies that collide with the ground; the base is not one",
         examples=[("front left",)],
     )
     observed: int = Field(default=0, description="index in `bodies` of the body whose motion fitness rates")

@@ -16,7 +16,7 @@ class MeasurementKind(StrEnum):
 
 
 class SampleRead(Frozen):
-    """A real-world evaluation."""
+    """A real-world evaluation: the genome, its fitness and its readings."""
 
     repetition: int
     iteration: int

@@ -1,4 +1,4 @@
-"""What believed simulators expect of a controller, and the limits that its motion should keep."""
+"""What tuned simulators expect of a controller, and the limits that its motion should keep."""
 
 from typing import Annotated, Literal
 
@@ -28,7 +28,7 @@ class LimitsSpec(Frozen):
 
 
 class Safety(Frozen):
-    """What believed simulators expect of a controller; the worst of each.
+    """What tuned simulators expect of a controller; the worst of each.
 
     Attributes:
         simulators: number of simulators that were asked.

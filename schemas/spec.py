@@ -91,13 +91,13 @@ class RealitySpec(Frozen):
     )
     limits: LimitsSpec | None = Field(
         default=None,
-        description="limits of the physical robot; before a controller is offered, the believed simulators forecast "
+        description="limits of the physical robot; before a controller is offered, the latest simulators forecast "
         "whether it keeps them",
     )
     beyond: Beyond = Field(
         default="warn",
         description="`warn`: a controller that is expected to exceed a limit is offered with a warning. `refuse`: it "
-        "is not offered; it counts as tried and failed, and teaches nothing",
+        "is not offered; it counts as tried and failed, and simulators are not tuned on it",
     )
 
 

@@ -74,7 +74,7 @@ class TracesRead(Frozen):
     unit: Unit
     readings: tuple[tuple[tuple[float | None, ...], ...], ...] | None = Field(
         default=None,
-        description="what the sensors would have said in each repeat; null: the robot has none",
+        description="readings of the sensors in each repeat, computed from its trace; null: the robot has none",
         examples=[[[[0.02, None]]]],
     )
     traces: tuple[AlignedTrace, ...]

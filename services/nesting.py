@@ -24,5 +24,5 @@ def refuse_too_deep(value: object) -> None:
             if isinstance(inner, dict | list)
         ]
     for (_, *place), _ in level[:1]:
-        message = f"objects and lists may be nested {MOST_LEVELS} levels deep, and this is deeper"
+        message = f"objects and lists may be nested {MOST_LEVELS} levels deep, but these are deeper"
         raise InvalidSpec([Violation(pointer_to(place), None, message, f"at most {MOST_LEVELS} levels")])

@@ -150,7 +150,7 @@ class Limits(_Environment):
 
 def _command_line(text: str) -> str:
     if not shlex.split(text):
-        raise ValueError("it names no program")
+        raise ValueError("the command line is empty")
     return text
 
 

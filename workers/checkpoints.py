@@ -1,4 +1,4 @@
-"""Repetitions that deliver steps, checkpoints of the running step, and signs of life."""
+"""Repetitions that deliver steps, checkpoints of the running step, and heartbeats."""
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
@@ -30,7 +30,7 @@ CALLS_PER_CHECKPOINT = 4
 """Least number of calls between two checkpoints; longer calls are split."""
 
 PULSE_S = 5.0
-"""Seconds without a delivery after which a worker gives a sign of life."""
+"""Seconds without a delivery after which a worker sends a heartbeat."""
 
 PAUSES_S = (1.0, 10.0, 60.0)
 """Pauses before each repetition of a step whose error may pass; after the last, the error counts."""
@@ -43,7 +43,7 @@ log = logging.getLogger("gaplab.worker")
 Emit: TypeAlias = Callable[[Delivered | Pulse], None]
 
 _Item: TypeAlias = Delivered | Pulse | BaseException | None
-"""What the computation hands over: a delivery, a sign of life, the error that ended it, or None at its end."""
+"""What the computation hands over: a delivery, a heartbeat, the error that ended it, or None at its end."""
 
 
 def recorded(
@@ -52,10 +52,10 @@ def recorded(
     checkpoints: Sequence[Checkpoint],
     every_s: float = CHECKPOINT_S,
 ) -> Iterator[Delivered | Pulse]:
-    """Yield the steps that follow the log, checkpoints of long steps as soon as they exist, and signs of life.
+    """Yield the steps that follow the log, checkpoints of long steps as soon as they exist, and heartbeats.
 
     The given checkpoints are those of the next step; further ones are `every_s` seconds apart. A thread computes,
-    because checkpoints arise deep inside a step, where nothing can yield, and signs of life while it computes.
+    because checkpoints arise deep inside a step, where nothing can yield, and heartbeats while it computes.
 
     Raises:
         BaseException: whatever the computation raises, SystemExit too.
@@ -160,7 +160,7 @@ class StepRecorder:
         return Requested(len(self._log), last.iteration, kind, genome, self._forecast(setting, genome))
 
     def _forecast(self, setting: Setting, genome: Genome) -> dict[str, Any] | None:
-        """Return what the latest simulators expect of a genome, as JSON; None if nothing can be said."""
+        """Return the forecast of the latest simulators for a genome, as JSON; None if there is none."""
         believed = next((step.simulators for step in reversed(self._log) if isinstance(step, Tuned)), ())
         if setting.forecast is None or not believed:
             return None
@@ -175,7 +175,7 @@ class StepRecorder:
         self._progressed = perf_counter()
 
     def pulse(self) -> Pulse:
-        """Return a sign of life."""
+        """Return a heartbeat."""
         now = perf_counter()
         step_s = self._before_s + now - self._begun
         return Pulse(len(self._log), self._measuring, max(0.0, now - self._progressed), step_s)
@@ -209,7 +209,7 @@ class _Unwanted(Exception):
 
 
 def _next(items: SimpleQueue[_Item], recorder: StepRecorder) -> _Item:
-    """Return the next item, or a sign of life if none comes for a while."""
+    """Return the next item, or a heartbeat if none comes for a while."""
     try:
         return items.get(timeout=PULSE_S)
     except Empty:

@@ -80,7 +80,7 @@ def check_nodes() -> None:
     """Check that every node of the cluster has this process's versions of gaplab and its libraries.
 
     Raises:
-        ClusterUnusable: one has other versions, or no gaplab at all.
+        ClusterUnusable: one has other versions, or gaplab is not installed on it.
     """
     alive = [node for node in ray.nodes() if node["Alive"]]
     only = [NodeAffinitySchedulingStrategy(node["NodeID"], soft=False) for node in alive]

@@ -49,7 +49,7 @@ class Helper:
         self._compute = dict(zip((SIMULATE, SENSE), compute, strict=True))
 
     def answer(self, question: str, genomes: Genomes, parameters: Parameters) -> FloatArray:
-        """Return what the question's function returns of genomes `(n, g)` in simulators `(m, p)`."""
+        """Return the fitnesses or outcomes of genomes `(n, g)` in simulators `(m, p)`."""
         return self._compute[question](genomes, parameters)
 
 

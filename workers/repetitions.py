@@ -27,7 +27,7 @@ WAIT_S = 0.2
 """Longest wait for a delivery."""
 
 LOOK_S = 0.5
-"""Shortest interval between looks for queued work, beside the one when a repetition ends; each takes milliseconds."""
+"""Shortest interval between looks for queued work, besides the one when a repetition ends; each takes milliseconds."""
 
 STOP_S = 5.0
 """Longest wait for a task to stop its hardware."""

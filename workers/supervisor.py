@@ -100,7 +100,7 @@ class Supervisor:
     def serve(self, stop: Stop | Event, pulse: PulsePipe | None = None) -> None:
         """Work until `stop` is set; then hand back unfinished repetitions, each after one more delivery.
 
-        The pulse goes to the process that keeps this one; None if no process does.
+        The pulse goes to the process that restarts this one; None if no process does.
 
         Raises:
             ClusterUnusable: a node would compute other numbers, or Ray died; this ends the work as well.

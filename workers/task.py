@@ -115,7 +115,7 @@ CHECK_ROLLOUTS = 60
 
 @dataclass(frozen=True)
 class Patience:
-    """Longest durations of work.
+    """Longest durations of work, after which a task counts as hung.
 
     Attributes:
         rollout_s: most seconds of a rollout.
@@ -162,9 +162,9 @@ class Run:
         asks: true once it has requested a measurement; the task then ends by itself.
         ended: true once the task has ended.
         failed: reason of a failure: an error of its code, or a limit of time.
-        pulse: the last sign of life, if no delivery has followed it.
-        heard_at: time of the last delivery or sign of life.
-        measuring: the place in the log of the step whose measurement the database knows of; None once it has ended.
+        pulse: the last heartbeat, if no delivery has followed it.
+        heard_at: time of the last delivery or heartbeat.
+        measuring: the place in the log of the step whose measurement is in the database; None once it has ended.
         refused: reason why its process did not begin it.
         lost: reason why another worker must continue: the worker is gone, or the log refused a delivery.
     """
@@ -200,7 +200,7 @@ class Run:
             self.lost = f"the worker was lost: {type(error).__name__}"
 
     def take(self, batch: Batch) -> None:
-        """Take a delivery: steps and checkpoints to store, a sign of life, or the reason of a failure."""
+        """Take a delivery: steps and checkpoints to store, a heartbeat, or the reason of a failure."""
         self.begun, self.heard_at, self.pulse = True, monotonic(), None
         for item in batch:
             if isinstance(item, Pulse):

@@ -72,7 +72,7 @@ class Bench:
     def pending(
         self, experiment: Of | None = None, *, bench: str | None = None, wait_s: float = 0.0
     ) -> tuple[RequestRead, ...]:
-        """Return the requests that are still wanted, the oldest first; wait for so long if there is none."""
+        """Return the requests that are still needed, the oldest first; wait up to `wait_s` if there is none."""
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": wait_s, "limit": PAGE}
         return tuple(self._connection.items(Page[RequestRead], "/requests", **parameters))
 
@@ -96,8 +96,8 @@ class Bench:
             id: id of the request.
             values: fitness of each repeat; None if it failed, or has `traces`.
             details: `failed`, `readings`, `unit`, `operator`, `note`, `attachments` (hashes) and `take`; in place of
-                values, `traces` (hashes, one for each repeat) and perhaps their `lags_s`. With `confirmed`, nothing
-                about it is doubtful; else the answer's `doubts` say what is unlikely.
+                values, `traces` (hashes, one for each repeat) and perhaps their `lags_s`. `confirmed` says that
+                unlikely values are right; without it, the `doubts` of the returned answer name them.
         """
         return self._connection.post(AnswerRead, f"/requests/{segment(id)}/measurements", _body(values, details))
 
@@ -121,7 +121,7 @@ class Bench:
         return self._after(answer, "corrections", _body(values, details) | {"reason": reason}, dry_run=dry_run)
 
     def void(self, answer: str, *, reason: str, operator: str | None = None, dry_run: bool = False) -> Consequences:
-        """Void an answer whose controller is then asked for again; with `dry_run` only return what would follow."""
+        """Void an answer, whose controller is then requested again; with `dry_run` only return what would follow."""
         return self._after(answer, "void", {"reason": reason, "operator": operator}, dry_run=dry_run)
 
     def decide(
@@ -138,9 +138,9 @@ class Bench:
         return self._after(answer, "decision", body, dry_run=dry_run)
 
     def reopen(self, id: str, *, reason: str | None = None, operator: str | None = None) -> RequestRead:
-        """Offer a request again that was taken too often without an answer.
+        """Open a request again that was taken too often without an answer.
 
-        With a `reason`, like "her phone is dead", the `operator` ends a take that goes on.
+        With a `reason`, like "her phone is dead", the `operator` ends the take of somebody else, who still has it.
         """
         path = f"/requests/{segment(id)}"
         if reason is None:

@@ -59,7 +59,7 @@ def readings_of(value: Any) -> Any:  # noqa: ANN401 - whatever a driver returns
 
 
 def _python(value: Any) -> Any:  # noqa: ANN401 - anything
-    """Return what NumPy or pandas holds as Python's lists and numbers; anything else as it is."""
+    """Return values of NumPy or pandas as lists and numbers of Python; anything else as it is."""
     if hasattr(value, "to_numpy"):
         value = value.to_numpy()
     return value.tolist() if hasattr(value, "tolist") else value

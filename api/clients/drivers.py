@@ -30,7 +30,7 @@ STOP_S = 10.0
 
 
 class MeasurementFailed(Exception):
-    """Raised by a driver whose robot could not be measured: the controller counts as tried, and teaches nothing."""
+    """Raised by a driver that could not measure: the controller counts as tried, but simulators are not tuned on it."""
 
 
 class DriverBroken(Exception):
@@ -38,7 +38,7 @@ class DriverBroken(Exception):
 
 
 class Driver(Protocol):
-    """What drives a robot."""
+    """The class that a driver file defines: it runs motions on a robot."""
 
     def connect(self) -> None:
         """Connect to the robot."""
@@ -87,7 +87,7 @@ class Robot:
         self._run, self._hangs = _Call(lambda: None), False
 
     def run(self, motion: DriverMotion, take: Take, limit_s: float) -> Any:  # noqa: ANN401 - whatever a driver returns
-        """Return what a run returns; raise TakeLost, MeasurementFailed, or DriverBroken if it is too long or fails."""
+        """Return what the driver returns; raise TakeLost, MeasurementFailed, or DriverBroken if it hangs or fails."""
         self._run = run = _Call(self._driver.run, motion)
         until = time.monotonic() + limit_s
         while run.is_alive() and not take.lost and time.monotonic() < until:
@@ -139,7 +139,7 @@ class _Call(Thread):
 def measure(task: TakenRequest, robot: Robot, limit_s: float | None, tell: Callable[[str], None]) -> None:
     """Run a taken request to its end: all repeats that an earlier run did not measure, then the answer.
 
-    If others may have the robot, or the request is not wanted any more, it ends without an answer.
+    If others may have the robot, or the request is no longer needed, it ends without an answer.
 
     Args:
         task: the taken request.

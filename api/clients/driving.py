@@ -26,15 +26,15 @@ INVALID = 422
 """Status of an answer with a mistake, like too few values: what was measured is still good."""
 
 ENDED = 409
-"""Status of an answer to a request that is wanted no more. Any other refusal may come from a service without it."""
+"""Status of an answer to a request that is no longer needed. Any other refusal may come from a service without it."""
 
 
 class TakenRequest:
-    """A taken request.
+    """A request that this driver has taken, so that nobody else measures it; it is answered once.
 
     Attributes:
         request: the request, as it was taken.
-        take: its take; stop the robot if it is `lost`, and `ask` before the robot moves again.
+        take: the right to measure it; stop the robot if that is `lost`, and `ask` before the robot moves again.
     """
 
     def __init__(self, driving: "Driving", take: Take) -> None:
@@ -88,7 +88,7 @@ class TakenRequest:
 
     @property
     def _void(self) -> list[str]:
-        """Answers that counted once: what was measured before their correction or void is worth nothing."""
+        """Answers that counted once: what was measured before their correction or void is invalid."""
         return [each.id for each in self.request.answers if each.state in {AnswerState.REPLACED, AnswerState.VOID}]
 
     def forget(self) -> None:
@@ -112,7 +112,7 @@ class TakenRequest:
         return self._answer(told | {"note": note})
 
     def fail(self, reason: str | Exception) -> AnswerRead:
-        """Answer that the measurement failed: the controller counts as tried, and teaches nothing."""
+        """Answer that the measurement failed: the controller counts as tried, but simulators are not tuned on it."""
         return self._answer({"failed": str(reason) or type(reason).__name__})
 
     def _answer(self, answer: dict[str, Any]) -> AnswerRead:
@@ -170,7 +170,7 @@ class Driving:
         return None
 
     def _take(self, request: RequestRead) -> TakenRequest | None:
-        """Take a request; None if somebody else was faster, or it is wanted no more."""
+        """Take a request; None if somebody else was faster, or it is no longer needed."""
         try:
             return TakenRequest(self, Take(self.connection, request.id, self._operator, self._lease_s))
         except ServiceError as error:

@@ -78,7 +78,7 @@ class Figures:
         """
         if wrong := sorted({"format", "study", "experiment"} & options.keys()):
             msg = "give ids first, and the format as the suffix of the file that you save"
-            raise TypeError(f"{', '.join(wrong)}: no option of a figure; {msg}")
+            raise TypeError(f"{', '.join(wrong)}: not an option of a figure; {msg}")
         ids = tuple(map(id_of, what))
         drawn = {"study" if of in OF_SEVERAL else "experiment": ids}
 

@@ -19,7 +19,7 @@ class Journal:
     """Lines of JSON in a file, each on disk when its method returns; without a file, they are in memory.
 
     A line is a repeat of a request, an answer with its idempotency key, or the note that the service has an answer. One
-    that is none of these, as a power cut leaves, is logged once, and copied to a file beside, `*.unreadable`.
+    that is none of these, as a power cut leaves, is logged once, and copied to a file beside it, `*.unreadable`.
 
     Args:
         file: created, for its owner alone, if it does not exist; None: no file.
@@ -49,7 +49,7 @@ class Journal:
         self._write({"request": request, "repeat": value, "readings": readings, "void": list(void)})
 
     def forget(self, request: str) -> None:
-        """Note that the repeats of a request are worth nothing."""
+        """Note that the repeats of a request are invalid."""
         self._write({"request": request, "forgotten": True})
 
     def repeats(self, request: str, void: Sequence[str] = ()) -> list[tuple[float, Any]]:

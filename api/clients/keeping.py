@@ -1,4 +1,4 @@
-"""Keeping studies: tags, archived ones, deletion, and saved views."""
+"""Tags, archiving and deletion of studies, and saved views."""
 
 from collections.abc import Iterable
 
@@ -9,7 +9,7 @@ from gaplab.schemas.records import StudyRead
 
 
 class Keeping:
-    """What people do with studies once they have results."""
+    """Requests that tag, archive and delete studies, notify of their ends, and save views."""
 
     def __init__(self, connection: Connection, records: Records) -> None:
         self._connection = connection

@@ -53,7 +53,7 @@ class _Json:
 
 
 def _chosen(summary: Any, topic: str | None, file: Path) -> str:  # noqa: ANN401 - of mcap
-    """Return the topic of poses."""
+    """Return the name of the topic that has poses: the given one, or the only one of the file."""
     if summary is None:
         raise ValueError(f"{file.name} has no summary, perhaps because its recording was cut off; repair it first")
     schemas = {id_: schema.name for id_, schema in summary.schemas.items()}

@@ -136,7 +136,7 @@ def view(snapshot: Snapshot) -> RenderableType:
 
 
 def spark(values: Sequence[float], least: float, greatest: float) -> str:
-    """Return numbers as blocks of eight heights, from the least to the greatest."""
+    """Return numbers as a sparkline: a block character for each, of eight heights between the two limits."""
     height = (greatest - least) or 1.0
     return "".join(BLOCKS[min(7, int(8 * (value - least) / height))] for value in values)
 
@@ -176,7 +176,7 @@ def _replace(snapshots: Iterable[Snapshot], place: Callable[[RenderableType], ob
 
 
 def _cell() -> Callable[[RenderableType], object]:
-    """Return what shows a text in the output of a notebook's cell, in the place of the one before."""
+    """Return a function that shows a text in a notebook's cell, in place of the one before."""
     ipython: Any = import_module("IPython.display")
     handle = ipython.display(ipython.HTML(""), display_id=True)
 

@@ -7,7 +7,7 @@ from gaplab.schemas.comparisons import VerdictRead
 
 
 class Reports:
-    """Reports on studies."""
+    """Requests for the verdict on a study, for its report, and for the files to take home."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection

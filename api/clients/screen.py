@@ -1,4 +1,4 @@
-"""The screen of a person: a terminal, or the file in its place."""
+"""Consoles that print for a person: to a terminal, or to the file that the output is redirected to."""
 
 import re
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 def printable(text: str) -> str:
-    """Return a text without characters that a terminal obeys: names come from others. JSON keeps its meaning."""
+    """Return a text with control characters escaped as in JSON, so that names of others cannot control a terminal."""
     return _CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 

@@ -1,4 +1,4 @@
-"""The take of a request: kept by signs of life, and known to be lost before others may move the robot."""
+"""The take of a request: kept by heartbeats, and known to be lost before others may move the robot."""
 
 import time
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from gaplab.api.clients.journal import PAUSE_S, log
 from gaplab.schemas.measurements import RequestRead
 
 LEASE_SHARE = 0.8
-"""Part of a lease after which a take without a sign of life is lost: the robot stops before others may move it."""
+"""Part of a lease after which a take without a heartbeat is lost: the robot stops before others may move it."""
 
 
 def _now() -> float:
@@ -24,15 +24,15 @@ class TakeLost(Exception):
 
 
 class Take:
-    """A take of a request, which its constructor takes.
+    """The right to measure a request: its constructor takes it, and heartbeats keep it.
 
     Attributes:
         request: what was taken.
         refused: why the service has ended the take; None if it has not.
-        over: is set once it is answered, released, or left to its lease, so that no sign of life is due.
+        over: is set once it is answered, released, or left to its lease, so that no heartbeat is due.
 
     Raises:
-        ServiceError: somebody else was faster, or the request is wanted no more.
+        ServiceError: somebody else was faster, or the request is no longer needed.
     """
 
     def __init__(self, connection: Connection, request: str, operator: str, lease_s: float) -> None:
@@ -48,11 +48,11 @@ class Take:
         """Why others may move the robot, now or soon; None if they may not."""
         silence_s = LEASE_SHARE * self._lease_s
         if self.refused is None and _now() - self._shown > silence_s:
-            return f"no sign of life has reached the service for {silence_s:g} s"
+            return f"no heartbeat has reached the service for {silence_s:g} s"
         return self.refused
 
     def ask(self) -> None:
-        """Show a sign of life, before the robot moves; raise TakeLost if others may move it, now or soon."""
+        """Send a heartbeat before the robot moves; raise TakeLost if others may move it, now or soon."""
         if not self.lost:
             self._show()
         if self.lost:
@@ -60,7 +60,7 @@ class Take:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Show signs of life from another thread, until the take is over or lost; then release what is not over."""
+        """Send heartbeats from another thread, until the take is over or lost; then release what is not over."""
         thread = Thread(target=self._beat, name="heartbeat", daemon=True)
         thread.start()
         try:

@@ -19,7 +19,7 @@ from gaplab.schemas.records import StudyRead
 
 
 class Watcher:
-    """The progress of studies."""
+    """Requests that wait for studies, and show their progress."""
 
     def __init__(self, records: Records, results: Results) -> None:
         self._records = records

@@ -144,7 +144,7 @@ def _verify(file: Path, part: tuple[int | None, str | None, int | None, float | 
 
 @contextmanager
 def _opened(file: Path) -> Iterator[IO[bytes]]:
-    """Yield an open archive; an error that it is none names the file."""
+    """Yield an open archive; if the file is not one, the error names it."""
     with file.open("rb") as source:
         try:
             yield source

@@ -25,11 +25,11 @@ AnswerId = Annotated[str, typer.Argument(metavar="MEASUREMENT", help="a measurem
 _VALUES = typer.Argument(metavar="VALUE", help="fitness of each repeat", show_default=False)
 Numbers = Annotated[list[str] | None, _VALUES]
 Failed = Annotated[str | None, typer.Option("--failed", help="why there are no values", show_default=False)]
-Reason = Annotated[str, typer.Option("--reason", help="why")]
+Reason = Annotated[str, typer.Option("--reason", help="reason, which is stored")]
 Operator = Annotated[str | None, typer.Option("--operator", help="person who measured", show_default=False)]
-By = Annotated[str | None, typer.Option("--operator", help="person who says so", show_default=False)]
-Yes = Annotated[bool, typer.Option("--yes", help="send it without a question, also if it is unlikely")]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="only say what would follow")]
+By = Annotated[str | None, typer.Option("--operator", help="person who decides", show_default=False)]
+Yes = Annotated[bool, typer.Option("--yes", help="send the values without a question, even if they are unlikely")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="only print what would follow; store nothing")]
 
 _NEGATIVE = re.compile(r"-\.?\d")
 
@@ -38,7 +38,7 @@ class ValuesCommand(TyperCommand):
     """A command that takes -0.3 as a number; other commands take it as the option -0."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - in a private module of Typer
-        """Parse arguments; a space before a negative number says that it is no option, and means nothing to `float`."""
+        """Parse arguments; a space before a negative number, which `float` ignores, says that it is not an option."""
         return super().parse_args(ctx, [f" {each}" if _NEGATIVE.match(each) else each for each in args])
 
 
@@ -121,7 +121,7 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
 ) -> None:
     """Compute fitness and readings from recordings of a motion, and answer its request with --answer."""
     if operator and not answer:
-        raise typer.BadParameter("an operator is of an answer; add --answer", param_hint="--operator")
+        raise typer.BadParameter("it names who answers; add --answer", param_hint="--operator")
     with connect(url) as client:
         stored = [client.bench.attach_trace(file, topic, body).id for file in files]
         said = client.bench.traces(id, stored, lag_s)
@@ -162,7 +162,7 @@ def void(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Say that a measurement is worth nothing; its controller is asked for again."""
+    """Declare a measurement invalid; its controller is requested again."""
     with connect(url) as client:
         found = client.bench.void(id, reason=reason, operator=operator, dry_run=dry_run)
     _print_consequences(found, dry_run=dry_run, as_json=as_json)
@@ -188,13 +188,13 @@ def decide(  # noqa: PLR0913, PLR0917 - each is an option of the command
 def reopen(
     id: RequestId,
     reason: Annotated[
-        str | None, typer.Option(help="why a take that goes on ends, like a dead phone", show_default=False)
+        str | None, typer.Option(help="why the take of somebody else ends, like a dead phone", show_default=False)
     ] = None,
     operator: By = None,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Offer a request again that was taken too often without an answer; with a reason, one that somebody has taken."""
+    """Open a request again that was taken too often without an answer; with a reason, one that somebody has taken."""
     with connect(url) as client:
         found = client.bench.reopen(id, reason=reason, operator=operator)
     print_result(found, f"Request {found.id} is {found.state.value}.", as_json=as_json)

@@ -52,7 +52,7 @@ def compare(  # noqa: PLR0913, PLR0917 - each is an option of the command
     fitness: Annotated[
         Fitness, typer.Option(help="recorded as in the paper, transferred controllers alone, or the best of these")
     ] = Fitness.RECORDED,
-    format: Annotated[Format, typer.Option(help="of the output")] = Format.TABLE,  # noqa: A002 - as the API says
+    format: Annotated[Format, typer.Option(help="format of the output")] = Format.TABLE,  # noqa: A002 - as the API says
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:

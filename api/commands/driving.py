@@ -22,9 +22,9 @@ def drive(  # noqa: PLR0913, PLR0917 - each is an option of the command
         Path | None,
         typer.Option("--journal", help="file that keeps answers until the service has them"),
     ] = None,
-    limit_s: Annotated[float | None, typer.Option("--limit-s", min=0.001, help="longest time of one run")] = None,
+    limit_s: Annotated[float | None, typer.Option("--limit-s", min=0.001, help="longest time of one run, s")] = None,
     lease_s: Annotated[
-        float, typer.Option("--lease-s", min=1, help="seconds of silence before others may take over")
+        float, typer.Option("--lease-s", min=1, help="seconds without a heartbeat before others may take over")
     ] = 60.0,
     within_limits: Annotated[
         bool, typer.Option("--within-limits", help="end before a controller that is expected to exceed a limit")
@@ -61,7 +61,7 @@ def _announce(request: RequestRead, *, within_limits: bool) -> None:
     """Print what is to be measured, with warnings about its safety.
 
     Raises:
-        CommandError: it is expected to exceed a limit, and must stay within them.
+        CommandError: the motion is expected to exceed a limit of the robot, and `within_limits` is set.
     """
     place = f"repetition {request.repetition}, iteration {request.iteration}, {request.kind.value}"
     echo(f"{request.id}: {place}")

@@ -36,7 +36,7 @@ def curve(
 
 @app.command(rich_help_panel=RESULTS)
 def figure(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="like curves", autocompletion=completion.figures)],
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="kind, like curves", autocompletion=completion.figures)],
     ids: Ids,
     out: Annotated[
         list[Path],

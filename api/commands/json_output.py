@@ -11,7 +11,7 @@ from gaplab.api.clients.screen import console, printable
 
 
 def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
-    """Print a text without characters that a terminal obeys."""
+    """Print a text with its control characters escaped."""
     typer.echo(printable(text), err=err, nl=nl)
 
 

@@ -12,7 +12,7 @@ from gaplab.api.commands.json_output import echo
 
 @contextmanager
 def keyboard() -> Iterator[Ask | None]:
-    """Yield what asks the person at the terminal, even if standard input is a file; None without a terminal."""
+    """Yield a function that asks a person at the terminal, even if standard input is a file; None without one."""
     if not sys.stdout.isatty():
         yield None
         return

@@ -124,7 +124,7 @@ def read_spec(name: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise CommandError(f"{name} is not JSON: {error}", Exit.FILE) from error
     if not isinstance(spec, dict):
-        raise CommandError(f'{name} holds no JSON object; write one, like {{"strategy": "simulated_fit"}}', Exit.FILE)
+        raise CommandError(f'{name} is not a JSON object; write one, like {{"strategy": "simulated_fit"}}', Exit.FILE)
     return spec
 
 

@@ -42,7 +42,7 @@ def simulator(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Write the best tuned simulator as a robot file, or into the URDF or MJCF of the robot. It is compared before.
+    """Write the best tuned simulator as a robot file, or into the robot's URDF or MJCF, if its rollouts are the same.
 
     A .xml without --from is an MJCF of the simulator for MuJoCo alone, which has one friction and no restitution.
     """

@@ -1,1 +1,1 @@
-"""What HTTP needs beside the endpoints."""
+"""What HTTP needs besides the endpoints."""

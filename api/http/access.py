@@ -30,7 +30,7 @@ WITHOUT_A_STORE = "/metrics"
 """The path that needs no token while the database does not answer, since it then says only that."""
 
 RECHECK_S = 10.0
-"""Pause between checks of the caller of a request that lasts; less than the pause between signs of life of a stream."""
+"""Pause between checks of the caller of a request that lasts; less than the pause between heartbeats of a stream."""
 
 READING = {"GET", "HEAD", "OPTIONS"}
 

@@ -168,7 +168,7 @@ class Revealing(Parameters):
     )
 
     def permitted(self, caller: Caller) -> bool:
-        """Return `reveal`.
+        """Return `reveal`, if the caller may reveal reality.
 
         Raises:
             Forbidden: the caller may not reveal reality.

@@ -29,7 +29,7 @@ def explain(error: Mapping[str, Any], body: object, request: Request) -> SpecErr
     Args:
         error: an item of `ValidationError.errors()`; its `loc` begins with body, query, path or header.
         body: the body that was sent.
-        request: its route knows the valid fields and parameters.
+        request: its route has the valid fields and parameters.
     """
     place, *path = error["loc"]
     kinds = _models(request.scope["route"].body_field.field_info.annotation) if place == "body" else []

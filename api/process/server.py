@@ -70,7 +70,7 @@ class TimedConnection(H11Protocol):
             self._make_room()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """End all waiting."""
+        """Cancel the deadlines of the connection."""
         self._stop_request_timer()
         self.resume_writing()
         super().connection_lost(exc)

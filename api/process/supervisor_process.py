@@ -29,7 +29,7 @@ Together with the grace of the API's requests, the service ends within half a mi
 """
 
 START_S = 300.0
-"""Longest time until the first sign of life: a start may wait for each node of a cluster."""
+"""Longest time until the first heartbeat: a start may wait for each node of a cluster."""
 
 AGAIN_AND_AGAIN = 3
 """Short lives in a row after which a restart is not expected to help."""
@@ -37,12 +37,12 @@ AGAIN_AND_AGAIN = 3
 
 @dataclass(frozen=True)
 class Silence:
-    """How long a supervisor may be silent.
+    """How long a supervisor process may go without a heartbeat.
 
     Attributes:
         told_s: before the silence is reported.
         killed_s: before the process is killed. It is longer than any call may wait for a database that is in use.
-        start_s: before the first sign of life.
+        start_s: before the first heartbeat.
     """
 
     told_s: float = 30.0
@@ -51,7 +51,7 @@ class Silence:
 
     @classmethod
     def of(cls, settings: Settings) -> "Silence":
-        """Return how long a supervisor with this length of lease may be silent."""
+        """Return how long a supervisor with this length of lease may go without a heartbeat."""
         return cls(told_s=settings.lease_s, killed_s=settings.lease_s + PATIENCE_S)
 
 
@@ -61,7 +61,7 @@ class SupervisorProcess:
     Args:
         environment: variables for the process.
         module: that runs as `python -m MODULE serve`.
-        silence: how long it may be silent; left out: as with the default lease.
+        silence: how long it may go without a heartbeat; left out: as with the default lease.
         store: where the work of a supervisor that died is queued again; None leaves it until its lease ends.
         long_life_s: one that lived longer is restarted after the shortest pause: its start succeeded.
         longest_pause_s: together with the start of Ray, the service recovers within a minute.

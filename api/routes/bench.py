@@ -84,10 +84,10 @@ class RequestQuery(Paging):
     experiment: Id | None = Field(default=None, description="only requests of this experiment")
     bench: str | None = Field(default=None, max_length=200, description="only requests of this bench")
     pending: bool = Field(
-        default=True, description="only requests that are still wanted; of a paused experiment, only one that is taken"
+        default=True, description="only requests that are still needed; of a paused experiment, only one that is taken"
     )
     conflicts: bool = Field(default=False, description="only requests with an answer in conflict, to be decided")
-    wait_s: float = Field(default=0.0, ge=0, le=60, description="wait for so long if there is none")
+    wait_s: float = Field(default=0.0, ge=0, le=60, description="seconds to wait for a request if there is none")
 
 
 class MotionQuery(Parameters):
@@ -163,9 +163,9 @@ def release_request(id: Id, spec: Release, store: StoreDep) -> RequestRead:
     return taking.release(store, id, spec)
 
 
-@router.post("/{id}/reopen", summary="Offer a stuck request again", responses=documented(404, 409))
+@router.post("/{id}/reopen", summary="Open a stuck request again", responses=documented(404, 409))
 def reopen_request(id: Id, store: StoreDep) -> RequestRead:
-    """Offer a request again that was taken too often without an answer."""
+    """Open a request again that was taken too often without an answer."""
     return taking.reopen(store, id)
 
 

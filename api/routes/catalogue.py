@@ -37,5 +37,5 @@ def read_catalogue(request: Request, store: StoreDep) -> Response:
     responses=conditional.CACHED | documented(404, 422),
 )
 def read_robot_shapes(request: Request, name: RobotInPath, store: StoreDep) -> Response:
-    """Return what draws a robot of the catalogue with its default options; a robot without bodies has no shapes."""
+    """Return the shapes of a robot of the catalogue with its default options; a robot without bodies has none."""
     return conditional.tagged(request, robot_shapes(store, name))

@@ -14,9 +14,9 @@ router = APIRouter(tags=["bench"])
 
 
 class Rehearsal(Parameters):
-    """Whether to do it."""
+    """Whether to store the correction, or only to answer what would follow from it."""
 
-    dry_run: bool = Field(default=False, description="only say what would follow")
+    dry_run: bool = Field(default=False, description="only answer what would follow; store nothing")
 
 
 Rehearsing = Annotated[Rehearsal, Query()]
@@ -39,7 +39,7 @@ def correct_measurement(
 def void_measurement(
     id: Id, spec: Void, query: Rehearsing, store: StoreDep, admitted: AdmissionDep, response: Response
 ) -> Consequences:
-    """Say that the values are worth nothing, and ask for the controller again."""
+    """Declare the values invalid, and request the controller again."""
     return once_answered(corrections.void(store, id, spec, admitted, dry_run=query.dry_run), response)
 
 

@@ -1,4 +1,4 @@
-"""Keeping studies: their notes, a webhook that is told of their end, archived ones, and deletion."""
+"""Notes of studies, a webhook that is told of their end, archiving and deletion."""
 
 from typing import Annotated
 
@@ -20,7 +20,7 @@ Webhook = Annotated[WebhookSpec, Body(openapi_examples=WebhookSpec.EXAMPLES)]
 
 
 def _deleter(caller: CallerDep) -> Deleter:
-    """Return the caller as a deleter: of what its own token submitted, or an admin of everything."""
+    """Return what the caller may delete: an admin everything, others what their own token submitted."""
     return Deleter(caller.token, may_delete_all=caller.role.permits(Role.ADMIN))
 
 

@@ -142,7 +142,7 @@ def _json(row: Row, place: str) -> str:
 def _plain(value: object) -> str:
     if isinstance(value, datetime):
         return value.astimezone(UTC).isoformat()
-    raise TypeError(f"an archive has no {type(value).__name__}")
+    raise TypeError(f"an archive cannot hold a {type(value).__name__}")
 
 
 @cache

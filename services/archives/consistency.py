@@ -49,12 +49,12 @@ def checked_experiments(rows: Rows, study: str) -> dict[str, Row]:
         spec = _checked_spec(row, robots_within)
         experiments[row["id"]] = row | {"spec": spec, "robot": _on_a_bench(row["id"], spec)}
     if study in experiments and len(experiments) > 1:
-        raise InvalidArchive(f"an experiment among others has the id {study!r} of the study")
+        raise InvalidArchive(f"one of several experiments has the id {study!r}, which is that of the study")
     return experiments
 
 
 def _learn_robots(rows: Rows) -> set[str]:
-    """Let this process know the robot files of an archive, and return their hashes."""
+    """Make the robot files of an archive known to this process, and return their hashes."""
     found = set[str]()
     for row in rows("robot"):
         try:
@@ -103,7 +103,7 @@ def _on_a_bench(id_: str, spec: Row) -> Robot | None:
 
 
 def _moves_it_wrongly(table: str, row: Row, robot: Robot) -> Iterator[Violation]:
-    """Yield what could not have been sent to the robot, or measured of it."""
+    """Yield violations: a genome or readings that do not fit the robot, and traces that the answer does not have."""
     genome = row["body"].get("genome") if table == "step" else row.get("genome")
     if genome is not None:
         yield from genome_violations(genome, robot.label, robot.space)
@@ -125,7 +125,7 @@ def check_attachments(session: Session) -> None:
         InvalidArchive: the message names the first of them.
     """
     if unpaired := sorted(attachments.all_ids(session) ^ attachments.named(session)):
-        raise InvalidArchive(f"the attachment {unpaired[0]!r} is in the archive or named by an answer, but not both")
+        raise InvalidArchive(f"the attachment {unpaired[0]!r} is missing from the archive, or no answer names it")
 
 
 def _check_tags(row: Row) -> None:

@@ -1,6 +1,6 @@
 """Opening of archives: a zip with one SQLite database, whose rows are copied into a new database with our own tables.
 
-A member counts as it is unpacked. The stranger's schema is read, compared and then not used: no trigger, view, virtual
+Sizes are those of unpacked members. The archive's schema is read, compared and then not used: no trigger, view, virtual
 table, index, CHECK, DEFAULT or computed column of it is ever evaluated. Keys and constraints are those of our tables.
 Source: https://sqlite.org/security.html.
 """
@@ -157,7 +157,7 @@ def _unpack(archive: ZipFile, target: Path) -> None:
 
 
 def _revision(connection: sqlite3.Connection) -> str:
-    """Return the revision of the stranger's database, which may have nothing but tables and indices."""
+    """Return the revision of the archive's database, which may have nothing but tables and indices."""
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, attachments.MOST_BYTES + LONGEST_ROW)
     connection.setlimit(sqlite3.SQLITE_LIMIT_SQL_LENGTH, _LONGEST_STATEMENT)
     connection.execute("PRAGMA trusted_schema=OFF")
@@ -259,9 +259,9 @@ class _Size:
                 self._count_file(row[columns.index("id")], row[content])
             yield row
 
-    def _count_file(self, id_: Any, content: Any) -> None:  # noqa: ANN401 - a stranger's values
+    def _count_file(self, id_: Any, content: Any) -> None:  # noqa: ANN401 - values from an archive
         if not isinstance(content, bytes) or not 0 < len(content) <= attachments.MOST_BYTES:
-            raise InvalidArchive(f"the attachment {str(id_)[:64]!r} has not 1 to {attachments.MOST_BYTES:,} bytes")
+            raise InvalidArchive(f"the attachment {str(id_)[:64]!r} must have 1 to {attachments.MOST_BYTES:,} bytes")
         if sha256(content).hexdigest() != id_:
             raise InvalidArchive(f"the content of the attachment {id_[:64]!r} has another hash: it was changed")
         self._files, self._bytes_of_files = self._files + 1, self._bytes_of_files + len(content)

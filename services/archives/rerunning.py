@@ -143,7 +143,7 @@ def _difference(stored: Step, computed: Step | None, same: int) -> str | None:
 def difference(stored: Step, computed: Step) -> str | None:
     """Return the first number that differs, with both values; None if all numbers have the same bits.
 
-    The fit of simulators is compared if the archive knows it: those of earlier versions do not.
+    The fit of simulators is compared if the archive has it: those of earlier versions do not.
     """
     if type(stored) is not type(computed):
         return f"it is {type(computed).__name__} here, and {type(stored).__name__} in the archive"

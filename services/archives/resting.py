@@ -1,4 +1,4 @@
-"""Work that is not over, in an archive: it rests, since its archive is no service."""
+"""Work that had not ended, as an archive has it: without leases, CANCELLED or PAUSED, since nothing runs there."""
 
 from collections.abc import Collection
 from datetime import datetime
@@ -14,7 +14,7 @@ def owner_of(table: str, row: Row) -> str:
 
 
 def is_over(row: Row) -> bool:
-    """Return whether an experiment, a repetition or an attempt has ended, and says when."""
+    """Return whether an experiment, a repetition or an attempt has ended, and has the time of its end."""
     return row["ended_at"] is not None and State(row.get("state", State.COMPLETED)).ended
 
 

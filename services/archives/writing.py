@@ -64,7 +64,7 @@ def _fill(copy: Session, session: Session, found: experiments.Members) -> None:
 
 
 def _rows(session: Session, table: str, found: experiments.Members, hidden: Collection[str]) -> Iterator[Row]:
-    """Yield the rows of a table as they are exported: without secrets, and at rest."""
+    """Yield the rows of a table as they are exported: without secrets, leases and other state of running work."""
     on_bench = {
         row.id for row in found.experiments if row.spec["reality"]["kind"] == "physical" and not row.state.ended
     }

@@ -97,7 +97,7 @@ LATE_S = 1e-9
 
 
 def observes_at_times_that_ascend(plugin: type[Rates]) -> None:
-    """Observes at times that ascend, in arrays of float64, the last of them above 0; its sensors are read within."""
+    """Observes at ascending times, in float64 arrays that end above 0; reads its sensors at such times until then."""
     rates, observe_s = _rating(plugin)
     _check_seconds("observe_s", observe_s)
     _check_seconds("sensors.times_s", rates.sensors.times_s)

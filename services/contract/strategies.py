@@ -153,7 +153,7 @@ def transfers_as_it_says(plugin: Plugin) -> None:
 
 
 def learns_from_its_samples(plugin: Plugin) -> None:
-    """Says which of its samples are lessons."""
+    """States which of its samples simulators are tuned on, in `lessons`."""
     strategy = plugin()
     lessons = strategy.lessons(SAMPLES)
     strange = [each for each in lessons if not any(each is sample for sample in SAMPLES)]

@@ -134,7 +134,7 @@ class Answers:
         return Cost(self._rollouts, self._failures, self.budget - self._rollouts)
 
     def cost_within_budget(self, source: str) -> Cost:
-        """Return the same; `source` says whose budget it is.
+        """Return the cost of the step so far; `source` says whose budget it is, for the error.
 
         Raises:
             PluginBroken: the step took more rollouts.

@@ -1,4 +1,4 @@
-"""Errors that several rooms raise, and the base of all. An error of one room is defined where it is raised.
+"""Errors that several folders raise, and the base of all. An error of one folder is defined where it is raised.
 
 Diverged physics is not an error: its fitness is nan, which never wins.
 """

@@ -2,7 +2,7 @@
 
 Whether any simulator reproduces the samples is told by the error that tuning left, beside what noise and rough physics
 leave. Around the best simulator, models of all differences are fitted to neighbours, as `gauss_newton` does. Then some
-of its plausible neighbours play reality, with the noise of the measurements, and the models estimate each of them from
+of its plausible neighbours stand in for reality, with the noise of the measurements, and the models estimate each from
 its answers. What remains of reality's answers is compared with what remains of theirs: a posterior predictive check.
 Differences are divided by their scatter around the models, so a robot that falls in some simulators and not in others
 says little, and a tilt that no simulator has says much.
@@ -38,7 +38,7 @@ FARTHEST = 3.0
 
 
 def cutter(answers: FloatArray, noise: float) -> Callable[[FloatArray], FloatArray]:
-    """Return what cuts answers `(…, r)` at `FARTHEST` deviations from the medians of these answers `(n, r)`."""
+    """Return a function that clips answers `(…, r)` to `FARTHEST` deviations around the medians of these `(n, r)`."""
     import scipy  # a process that never tunes starts without it
 
     middle = np.median(answers, axis=0)
@@ -130,7 +130,7 @@ CREDIBLE = 0.2
 
 
 def fitted(simulators: tuple[Simulator, ...], misfit: Misfit, space: Space, rng: Generator) -> tuple[Simulator, ...]:
-    """Return the simulators, of which the best knows how well it reproduces the samples; see `fit_of`."""
+    """Return the simulators, of which the best has how well it reproduces the samples; see `fit_of`."""
     best, *others = simulators
     return (replace(best, fit=fit_of(best, misfit, space, rng)), *others)
 
@@ -191,7 +191,7 @@ def _sound(answers: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
 def _left(
     model: LinearModel, asked: FloatArray, place: FloatArray, compared: NDArray[np.bool_]
 ) -> tuple[float, float, float]:
-    """Return what a model leaves of answers `(r,)` at a place.
+    """Return the residuals of a model to answers `(r,)` at a place, as three numbers.
 
     It is the sum of squares; the mean of the squares over their scatter; and the mean of log(1 + these).
     """

@@ -161,7 +161,7 @@ def _drawn(setting: Setting, iteration: int) -> tuple[Simulator, ...]:
 
 
 def _keeps(setting: Setting, history: History) -> bool:
-    """Return whether simulators and controller stay as they are, since the latest sample is no lesson."""
+    """Return whether simulators and controller stay, since the strategy tunes nothing on the latest sample."""
     if len(history.samples) == len(setting.known_samples):
         return False
     return all(each is not history.samples[-1] for each in setting.strategy.lessons(history.samples))

@@ -19,7 +19,7 @@ def count(sample: Sample) -> int:
 
 
 def standard_error(values: FloatArray) -> float | None:
-    """Return the standard error of the mean of repeats `(r,)`; None of fewer than two."""
+    """Return the standard error of the mean of repeats `(r,)`; None for fewer than two."""
     return (pooled_variance([values]) / len(values)) ** 0.5 if len(values) > 1 else None
 
 

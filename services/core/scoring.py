@@ -165,5 +165,5 @@ def log_determinant(information: FloatArray) -> FloatArray:
 
 
 def trace(information: FloatArray) -> FloatArray:
-    """Return `(n,)`: the sum of squared slopes; one loud tunable can dominate it."""
+    """Return `(n,)`: the sum of squared slopes; one very sensitive tunable can dominate it."""
     return np.asarray(np.trace(information, axis1=1, axis2=2))

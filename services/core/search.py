@@ -78,7 +78,7 @@ def maximise(
         genomes = (_asked(optimizer, state, space, rng) if start is None else start)[:evaluations]
         start = None
         if not len(genomes):
-            raise PluginBroken(f"optimizer {optimizer.name!r} asks for no genome although {evaluations} are left")
+            raise PluginBroken(f"optimizer {optimizer.name!r} asks for no genome; evaluations left: {evaluations}")
         keys = [genome.tobytes() for genome in genomes]
         new = [index for index, key in enumerate(keys) if key not in known]
         fitness = np.array([known.get(key, np.nan) for key in keys])
@@ -97,7 +97,7 @@ def _asked(optimizer: Optimizer, state: Population, space: Space, rng: Generator
     """Return the genomes that an optimizer asks for, `(n, g)`.
 
     Raises:
-        PluginBroken: they are no such array.
+        PluginBroken: they are not such an array.
     """
     asked = optimizer.ask(state, rng)
     try:

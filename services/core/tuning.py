@@ -199,7 +199,7 @@ def split(samples: Sequence[Sample], share: float) -> tuple[tuple[Sample, ...], 
 
 
 def tested(simulators: Sequence[Simulator], misfit: Misfit) -> tuple[Simulator, ...]:
-    """Return the simulators, best first, of which the best knows its discrepancy from held-out samples."""
+    """Return the simulators, best first, of which the best has its discrepancy from held-out samples."""
     best, *others = simulators
     error = float(misfit.of(best.parameters[None, :])[0])
     return (replace(best, held_out_error=known(error)), *others)

@@ -53,7 +53,7 @@ def learnable(samples: Iterable[Sample]) -> tuple[Sample, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """How well a simulator reproduces the samples, beside what noise and rough physics alone would leave.
+    """How well a simulator reproduces the samples, compared with what noise and rough physics alone would leave.
 
     Attributes:
         expected_error: the discrepancy that they would leave, as large as `squared_error`.
@@ -79,9 +79,9 @@ class Simulator:
             physics failed on one.
         interval: `(p, 2)`: ends of the 95 % interval of each tunable; None if the tuner gives none.
         weight: share of the posterior probability; None if the tuner gives none.
-        held_out_error: the discrepancy from the held-out samples, which only the best simulator knows; None without
+        held_out_error: the discrepancy from the held-out samples, which only the best simulator has; None without
             any, or where the physics failed on one.
-        fit: how well it reproduces the samples, which only the best simulator knows; None if the noise is unknown.
+        fit: how well it reproduces the samples, which only the best simulator has; None if the noise is unknown.
     """
 
     parameters: FloatArray
@@ -237,7 +237,7 @@ class History:
         simulators: simulators of the latest tuning, best first.
         transferred: the latest transferred controller.
         probed: its latest probe.
-        scale: size of the fitness in simulation of the first transferred controller that has one; None without any.
+        scale: absolute fitness in simulation of the first transferred controller that has one; None without any.
     """
 
     last: Step | None = None
@@ -262,7 +262,7 @@ class History:
 
 
 def _size(fitness: float) -> float | None:
-    """Return the size of a fitness; None of nan, of an infinity and of 0, which are not scales."""
+    """Return the absolute value of a fitness; None for nan, an infinity or 0, which are not scales."""
     return abs(fitness) or None if np.isfinite(fitness) else None
 
 

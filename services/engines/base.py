@@ -174,7 +174,7 @@ class Engine(Plugin):
     def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
         """Return the same rollout, with poses at additional times.
 
-        This default records the base alone. An engine that knows joint angles overrides it.
+        This default records the base alone. An engine that has joint angles overrides it.
 
         Args:
             world: as in `rollout`.

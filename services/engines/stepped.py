@@ -1,6 +1,6 @@
 """Base of engines that advance a scene step by step, and the check that no energy explodes in them.
 
-No motor and no fall can make a rollout's energy explode: its numbers are then no physics.
+No motor and no fall can make a rollout's energy explode: its numbers are then not physics.
 """
 
 from abc import abstractmethod

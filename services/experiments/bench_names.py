@@ -1,4 +1,4 @@
-"""Names of benches that are nearly those of others: a slip of the keyboard would make one robot two."""
+"""Names of benches that are nearly those of others: a typing error would split one robot into two."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches

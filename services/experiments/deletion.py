@@ -50,7 +50,7 @@ _SQL = {"synchronize_session": False}
 
 @dataclass(frozen=True)
 class Deleter:
-    """Who deletes.
+    """Who deletes, and what it may delete.
 
     Attributes:
         token: id of the token; None without one.

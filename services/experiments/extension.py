@@ -27,7 +27,7 @@ from gaplab.services.store.session import Session, transaction
 
 @transaction
 def extend(session: Session, id_: str, extension: ExtensionSpec, admitted: Admission = FREELY) -> StudyRead:
-    """Queue the COMPLETED experiments that the id means again with larger totals; their results so far stay.
+    """Queue again, with larger totals, the COMPLETED experiments that the id names; their results so far stay.
 
     Raises:
         NotFound: no such study or experiment.

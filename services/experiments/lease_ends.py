@@ -38,7 +38,7 @@ class Silences(Generic[K]):
         self._since: dict[tuple[K, datetime], float] = {}
 
     def forget(self) -> None:
-        """Begin anew, as after a time in which nobody could give a sign of life."""
+        """Begin anew, as after a time in which nobody could send a heartbeat."""
         self._since = {}
 
     def longer_than_leases(self, held: Sequence[tuple[K, datetime, float]]) -> list[tuple[K, datetime]]:

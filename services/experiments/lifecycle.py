@@ -43,7 +43,7 @@ _PARTICIPLES = {
 
 @transaction
 def ask(session: Session, id_: str, verb: Verb) -> StudyRead:
-    """Pause, resume, stop, cancel or retry the experiments that the id means and that permit it.
+    """Pause, resume, stop, cancel or retry the experiments that the id names and that permit it.
 
     Raises:
         NotFound: no such study or experiment.
@@ -83,7 +83,7 @@ def schedule(session: Session, id_: str, change: ScheduleChange) -> StudyRead:
 
 
 def members_permitting(session: Session, id_: str, verb: Verb) -> tuple[Members, list[ExperimentRow]]:
-    """Return what the id means, with its experiments locked, and those whose state permits the verb.
+    """Lock the experiments that the id names, and return all of them, and those whose state permits the verb.
 
     Raises:
         NotFound: no such study or experiment.

@@ -2,7 +2,7 @@
 
 Each repetition is one value: its mean over the range. The paper pools the recorded fitnesses of several numbers into
 one sample instead ("combining the data for more than two real-world evaluations"). Values of one repetition at several
-numbers are not independent, so a pooled p is too small. The pooled tests stand beside, since the paper reports them.
+numbers are not independent, so a pooled p is too small. The pooled tests are given too, since the paper reports them.
 
 Random streams have the address (seed, strategy's name, repetition, …). Two experiments of one seed and one strategy
 therefore draw the same numbers in repetitions of one number, and their values may be correlated. Their pair is judged
@@ -87,7 +87,7 @@ class Range:
 
     @np.errstate(over="ignore", invalid="ignore")
     def values(self, one: Compared) -> FloatArray:
-        """Return the mean of each repetition over the range, `(r,)`; nan if a number of the range is missing."""
+        """Return the mean of each repetition over the range, `(r,)`; nan if its fitness is missing anywhere in it."""
         complete = one.level or self.last < one.recorded.shape[1]
         return self._columns(one).mean(axis=1) if complete else np.full(len(one.recorded), np.nan)
 
@@ -250,7 +250,7 @@ def _verdicts(pair: Comparison, groups: Groups, names: Sequence[str]) -> dict[st
 
 
 def found_by(pair: Comparison, groups: Groups, test: str, p_holm: float | None) -> Found:
-    """Return what a test of the groups of a pair says of the first."""
+    """Return what a test found of the first group: higher, lower, wider, narrower, or not shown to differ."""
     if test in PAIRED and not pair.shared_streams:
         return Found.UNPAIRED
     if p_holm is None:

@@ -49,7 +49,7 @@ SENTENCES = {
     EventKind.REFUSED: "{step}: refused before it was offered{why}",
     EventKind.TAKEN: "{step}: taken by {operator}",
     EventKind.RELEASED: "{step}: given back by {giver} without an answer{taken}",
-    EventKind.TAKE_EXPIRED: "{step}: {operator} gave no sign of life, so the measurement is open again",
+    EventKind.TAKE_EXPIRED: "{step}: {operator} sent no heartbeat, so the measurement is open again",
     EventKind.CONFLICTING: "{step}: an answer by {operator} is in conflict, to be decided",
     EventKind.CORRECTED: "{step}: the measurement by {operator} was corrected{by_whom}{why}",
     EventKind.VOIDED: "{step}: the measurement by {operator} is void{says}{why}",

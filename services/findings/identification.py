@@ -30,7 +30,7 @@ FALLING = 0.8
 
 @dataclass(frozen=True)
 class Means:
-    """What an experiment has not used, which may help.
+    """Means to identify tunables that an experiment has not used.
 
     Attributes:
         readings: discrepancies that compare readings which the robot has, and tuning ignores.
@@ -104,7 +104,7 @@ def _judged(left: float | None) -> Identification:
 
 
 def _helps(now: TunableDistribution, then: TunableDistribution | None, samples: float, means: Means) -> Iterator[str]:
-    """Yield what would help, what costs least first.
+    """Yield the means that would help to identify a tunable, the cheapest first.
 
     `then` is the tunable on at most half of the samples; None if there is no such iteration.
     """

@@ -57,7 +57,7 @@ class CurveEnd:
 
 
 def curve_end(recorded: FloatArray, last: int) -> CurveEnd:
-    """Return what the values `(r, k)` up to the count `last` say of its end; nan is a missing value."""
+    """Return the trend at the end of the curve with values `(r, k)` up to the count `last`; nan is a missing value."""
     n = int(np.isfinite(recorded[:, last]).sum())
     if n < FEWEST_REPETITIONS or last < FEWEST_EVALUATIONS:
         return CurveEnd(Trend.TOO_FEW, n, last)
@@ -83,12 +83,12 @@ def _direction(lower: float, upper: float) -> Trend:
 
 @dataclass(frozen=True)
 class Judged:
-    """One curve as it is judged.
+    """A curve, and what a verdict needs of it.
 
     Attributes:
-        name: its name among the others.
-        end: what its end says; None without values.
-        point: its values at the count where all are compared, or of a level; None without values.
+        name: its name, which no other curve has.
+        end: the trend at its end; None without values.
+        point: its point at the number of evaluations where all are compared, or its only one; None without values.
     """
 
     name: str
@@ -111,7 +111,7 @@ def recorded_of(curve: Curve) -> FloatArray:
 def judged_curves(
     curves: Sequence[Curve], experiments: Sequence[ExperimentRead], count: int | None
 ) -> tuple[Judged, ...]:
-    """Return the curves of experiments with their distinct names, their ends, and their points at the common count."""
+    """Return the curves of experiments with distinct names, trends, and points after `count` evaluations."""
     names = distinct_names([(curve.name, curve.strategy, curve.experiment) for curve in curves])
     found = zip(names, curves, experiments, strict=True)
     return tuple(_judged(name, curve, experiment, count) for name, curve, experiment in found)

@@ -126,7 +126,7 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
 
 
 def surprise(tunings: Sequence[Tuning]) -> float | None:
-    """Return the surprise that at least half of the repetitions that know theirs reach; None if none knows."""
+    """Return the surprise that at least half of the repetitions that have one reach; None if none has."""
     known_ = sorted(each.fit.surprise for each in tunings if each.fit is not None)
     return known_[(len(known_) - 1) // 2] if known_ else None
 

@@ -37,7 +37,7 @@ from gaplab.services.core.space import Space
 from gaplab.services.core.streams import stream
 
 RANDOM, EVOLVED = 3, 4
-"""Numbers of random and of evolved controllers, beside the known one."""
+"""Numbers of random and of evolved controllers, besides the known one."""
 
 NOTHING = 0.01
 """Largest relative effect that counts as none: chaotic physics alone has it. Source: docs/decisions/sensitivity.md."""
@@ -193,7 +193,7 @@ def warning(found: Sensitivity) -> str | None:
 
 
 def _noise(found: Sensitivity, where: str) -> str:
-    """Return what roughness means for the tuned value."""
+    """Return a sentence on how roughness limits the precision of the tuned value."""
     share, limit = 100 * (found.roughness or 0.0), 100 * ROUGH
     return (
         f"{where}: {share:.0f} % of its effect on fitness is noise between neighbouring values; the larger this share, "

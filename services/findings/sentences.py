@@ -29,7 +29,7 @@ OTHER_REALITY = "different realities: a difference may come from the reality, no
 
 
 def where(first: int, last: int, *known: int) -> str:
-    """Return at which numbers of real-world evaluations experiments are compared; some have samples from before."""
+    """Return the numbers of real-world evaluations at which experiments are compared, as the start of a sentence."""
     counted = evaluations(last, *known)
     return f"after {counted}" if first == last else f"mean of each repetition over {first} to {counted}"
 
@@ -48,7 +48,7 @@ def streams(one: tuple[int, str], other: tuple[int, str]) -> str:
 
 
 def unlike(what: str, one: str, other: str) -> str:
-    """Return that two experiments have different robots or tasks, with the names of these unless they are equal."""
+    """Return the words that two experiments have different robots or tasks, with the names of these unless equal."""
     names = f" ({'; '.join(sorted((one, other)))})" if one != other else ""
     return f"different {what}{names}: their fitness does not mean the same"
 
@@ -68,7 +68,7 @@ def equivalence(
 
 
 def unreproduced(told: Mapping[str, str], names: Mapping[str, str]) -> Iterator[str]:
-    """Yield that no simulator reproduces the samples of an experiment, with its name if there are others."""
+    """Yield sentences that no simulator reproduces the samples of an experiment, with its name if there are others."""
     for id_, sentence in told.items():
         begin = f"{names[id_]}: {sentence[0]}" if len(names) > 1 else sentence[0].upper()
         yield f"{begin}{sentence[1:]}."
@@ -101,7 +101,7 @@ def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], where: str)
 def ranking(
     learned: Sequence[Judged], pairs: Sequence[Comparison], names: Mapping[str, str], where: str
 ) -> Iterator[str]:
-    """Yield what the highest mean is, and from which strategies it differs."""
+    """Yield which strategy has the highest mean, and from which others it differs."""
     if not learned:
         return
     best = learned[0]
@@ -147,7 +147,7 @@ def _disagreements(pairs: Sequence[Comparison], names: Mapping[str, str]) -> Ite
                 else ("are not shown to differ", f"p below {SIGNIFICANT}")
             )
             both = f"{names[pair.first]} and {names[pair.second]}"
-            yield f"{both} {found} by the test that the verdict goes by, although {listed(other)} has a {p}."
+            yield f"{both} {found} by the test that the verdict uses, although {listed(other)} has a {p}."
 
 
 def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: Sequence[Comparison]) -> Iterator[str]:
@@ -181,7 +181,7 @@ def spread(learned: Sequence[Judged]) -> Iterator[str]:
 
 
 def end_of_curve(one: Judged, end: CurveEnd) -> str:
-    """Return what the end of a curve says, with its numbers."""
+    """Return the trend at the end of a curve in words, with its numbers."""
     if end.trend is Trend.TOO_FEW or end.gain is None:
         counts = f"{number_of('repetition', end.n)} at {evaluations(end.last, one.curve.known)}"
         return f"{one.name}: {counts} are too few to say whether it still rises."
@@ -196,7 +196,7 @@ def end_of_curve(one: Judged, end: CurveEnd) -> str:
 
 
 def continuing(trends: Sequence[TrendRead]) -> Iterator[str]:
-    """Yield what the curves say of continuing."""
+    """Yield whether more iterations are worthwhile, by the trends of the curves."""
     of = {kind: [trend for trend in trends if trend.trend is kind] for kind in Trend}
     if trends and len(of[Trend.TOO_FEW]) == len(trends):
         yield "Too few repetitions or evaluations to say whether continuing is worthwhile."
@@ -254,8 +254,8 @@ RULES = (
     f"rising or falling if the interval of the gain over the last {FEWEST_EVALUATIONS} evaluations is above or below "
     "0. Otherwise more repetitions would tell.",
     "No simulator is said to reproduce the samples if at least half of the repetitions are surprised: of 40 plausible "
-    "simulators that play reality with the noise of the measurements, fewer than two leave as much error after tuning. "
-    "Up to a fifth, no tunable is called identified.",
+    "simulators that stand in for reality with the noise of the measurements, fewer than two leave as much error after "
+    "tuning. Up to a fifth, no tunable is called identified.",
     f"Nothing is said of a curve with fewer than {FEWEST_REPETITIONS} repetitions or {FEWEST_EVALUATIONS} evaluations.",
 )
 
@@ -266,7 +266,7 @@ def judge(
     pairs: Sequence[Comparison],
     wrong: Mapping[str, str],
 ) -> VerdictRead:
-    """Return the verdict on experiments from their curves, in their order, and the pairs at the common count.
+    """Return the verdict on experiments from their curves, in their order, and pairs after the last common evaluation.
 
     `wrong` says, by experiment, that no simulator reproduces its samples.
     """

@@ -77,7 +77,7 @@ def differences(names: Mapping[str, str], pairs: Sequence[Comparison], what: str
 
 
 def verdicts(names: Mapping[str, str], pairs: Sequence[Comparison], what: str) -> Grid:
-    """Return what the trusted test says of all pairs, and whether they are equivalent if that was asked for."""
+    """Return the verdict of the trusted test on all pairs, and whether they are equivalent if that was asked for."""
     rows = tuple(
         (
             _pair(names, pair),

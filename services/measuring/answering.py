@@ -33,7 +33,7 @@ UNKNOWN = "unknown"
 def answer(
     store: Store, id_: str, spec: MeasurementSpec, admitted: Admission, traces: TracesRead | None = None
 ) -> Once[AnswerRead]:
-    """Store an answer to a request; it counts if the request is still wanted and nobody else holds it.
+    """Store an answer to a request; it counts if the request is still needed and nobody else holds it.
 
     An answer that came late counts unless somebody else took or answered the request meanwhile. Then it is kept as a
     conflict. The answer that counts, sent twice, is stored once, also if parts of it are left out the second time. With
@@ -42,7 +42,7 @@ def answer(
     Raises:
         NotFound: the request does not exist.
         InvalidSpec: the values do not fit the request; every violation is named.
-        Conflict: the request is wanted no more, or its traces are doubtful and not confirmed.
+        Conflict: the request is no longer needed, or its traces are doubtful and not confirmed.
     """
 
     def work(session: Session) -> AnswerRead:
@@ -64,7 +64,7 @@ def _answer(
     answered = row.state in requests.ANSWERED
     counted = requests.counted_answer(session, row) if answered else None
     if row.state is RequestState.WITHDRAWN or (answered and counted is None):
-        msg = f"request {row.id} is wanted no more: its experiment has ended, or a correction closed its branch"
+        msg = f"request {row.id} is no longer needed: its experiment has ended, or a correction closed its branch"
         raise Conflict(msg)
     if counted is not None and _says_nothing_new(counted, spec):
         counted.doubts = None if spec.confirmed else counted.doubts
@@ -112,7 +112,7 @@ def insert_answer(
 
 
 def settle_request(session: Session, row: RequestRow, given: AnswerRow) -> None:
-    """End a request with the answer that counts. If it is of another, the holder has the bench until he lets go."""
+    """End a request with the answer that counts. If it is not of the holder, the take still keeps the bench."""
     to = RequestState.MEASURED if given.values is not None else RequestState.FAILED
     held = None if given.take == row.takes else row.held
     become(session, row, to, held=held, unanswered=0, ended_at=moment(session))

@@ -48,7 +48,7 @@ def correct(
 
 
 def void(store: Store, id_: str, spec: VoidSpec, admitted: Admission, *, dry_run: bool = False) -> Once[Consequences]:
-    """Say that the answer that counts is worth nothing; its controller is asked for again.
+    """Void the answer that counts: it is invalid, and its controller is requested again.
 
     Raises:
         NotFound: there is no such answer.
@@ -69,7 +69,7 @@ def decide(
 
     Raises:
         NotFound: there is no such answer.
-        Conflict: it is neither in conflict nor doubtful, or the request is wanted no more.
+        Conflict: it is neither in conflict nor doubtful, or the request is no longer needed.
     """
     if dry_run:
         with store.reading() as session:
@@ -148,7 +148,7 @@ def _decided(
     elif request.state in requests.PENDING:
         found = nothing_follows(request, repetition, "the answer counts, and the repetition goes on")
     else:
-        raise Conflict(f"request {request.id} is wanted no more")
+        raise Conflict(f"request {request.id} is no longer needed")
     return found.model_copy(update={"answer": row.id})
 
 

@@ -56,7 +56,7 @@ def doubts(
 
 
 def doubt_others(session: Session, request: RequestRow, take: int, moved_s: float, by: str) -> None:
-    """Let nothing count by itself that others measured of a bench in the last `moved_s`: this take moved its robot too.
+    """Make doubtful what others measured on a bench in the last `moved_s`, since this take moved its robot too.
 
     Answers that count are doubtful. Takes end: answers of theirs are in conflict, and the bench is free once the holder
     is silent.
@@ -92,7 +92,7 @@ def _beside_known(values: Sequence[float], known: float) -> Iterator[str]:
 
 
 def _largest_known(session: Session, repetition: RepetitionRow, request: RequestRow) -> float:
-    """Return the largest size of a fitness that is known from other requests of the experiment; 0 without any."""
+    """Return the largest absolute fitness that is known from other requests of the experiment; 0 without any."""
     row = StepRow
     own = (row.repetition_id == repetition.id) & (row.iteration == request.iteration) & row.measured_by.is_not(None)
     known = of_experiments(row, [repetition.experiment_id], row.fitness).where(row.branch == LOG, ~own)

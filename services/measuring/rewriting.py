@@ -40,7 +40,7 @@ from gaplab.services.store.session import Session, snapshot
 def recorded(session: Session, request: RequestRow, repetition: RepetitionRow) -> tuple[RequestRow, ...]:
     """Return the requests whose steps in the log are the answer to a request, by place.
 
-    A controller that is measured once may be several.
+    One measurement answers all requests of a repetition for the same controller.
     """
     (log,) = logs(session, [repetition.id]).values()
     return tuple(
@@ -74,13 +74,13 @@ def consequences(
         iterations = session.get_one(ExperimentRow, repetition.experiment_id).iterations
         if repetition.state is State.COMPLETED and repetition.iterations_done < iterations:
             words += "; the repetition, which was stopped, goes on to its last iteration"
-    words += "" if verb == "correct" else "; the controller is asked for again"
+    words += "" if verb == "correct" else "; the controller is requested again"
     follows = {"iteration": rows[0].iteration, "steps": len(later), "measurements": measurements}
     return nothing_follows(request, repetition, words).model_copy(update=follows)
 
 
 def nothing_follows(request: RequestRow, repetition: RepetitionRow, words: str) -> Consequences:
-    """Return that no step follows, in these words."""
+    """Return consequences without a step, with these words."""
     return Consequences(
         request=request.id,
         repetition=repetition.number,
@@ -141,7 +141,7 @@ def _shown(step: StepRow) -> dict[str, Any]:
 
 
 def _withdraw(session: Session, repetition: int, place: int, branch: int | None) -> None:
-    """Withdraw what the closed steps still wait for, and say of the answered requests that they are of the branch."""
+    """Withdraw what the closed steps still wait for, and assign the answered requests to the branch."""
     row = RequestRow
     later = (row.repetition_id == repetition) & (row.place >= place) & row.branch.is_(None)
     requests.withdraw(session, later)
@@ -206,7 +206,7 @@ def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) 
 
 
 def _settle(session: Session, repetition: RepetitionRow) -> None:
-    """Update the state of a repetition's experiment, which a correction may bring back to life."""
+    """Update the state of a repetition's experiment, which a correction may resume."""
     experiment = session.get_one(ExperimentRow, repetition.experiment_id, populate_existing=True)
     alive = any(not each.state.ended for each in repetitions_of(session, experiment.id))
     revived = experiment.state is State.COMPLETED and alive

@@ -1,4 +1,4 @@
-"""Takes of requests: one holder a bench at a time, who shows signs of life. Use cases raise StoreUnavailable."""
+"""Takes: one operator a bench reserves a request, and keeps it by heartbeats. Use cases raise StoreUnavailable."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class RequestFilter:
     Attributes:
         experiment: only those of this experiment.
         bench: only those of this bench.
-        pending: only those that are still wanted; of a paused experiment, only one that is taken.
+        pending: only those that are still needed; of a paused experiment, only one that is taken.
         conflicts: only those with an answer in conflict, which a person decides.
     """
 
@@ -179,7 +179,7 @@ def release(session: Session, id_: str, spec: ReleaseSpec) -> RequestRead:
 
 @transaction
 def reopen(session: Session, id_: str) -> RequestRead:
-    """Offer a request again that was taken too often without an answer.
+    """Open a request again that was taken too often without an answer.
 
     Raises:
         NotFound: it does not exist.
@@ -193,9 +193,9 @@ def reopen(session: Session, id_: str) -> RequestRead:
 
 
 def open_again(store: Store, silences: Silences[str]) -> int:
-    """Open the requests whose holder was silent for a whole lease, and return their number.
+    """Open the requests whose holder sent no heartbeat for a whole lease, and return their number.
 
-    A supervisor calls it now and then, with the silences that it has seen: no clock that is set ends a take.
+    A supervisor calls it periodically, with the silences by its monotonic clock: setting a clock ends no take.
     """
     row = RequestRow
     with store.reading() as session:
@@ -213,7 +213,7 @@ def _expire(session: Session, silent: Sequence[tuple[str, datetime]]) -> int:
 
 
 def _fence_silent(session: Session, bench: str) -> None:
-    """Let answers of takes that ended by silence not count by themselves: their holders may drive the robot on."""
+    """Let a person decide about answers of takes that lost their heartbeat: the holders may still drive the robot."""
     row = RequestRow
     silent = (row.unanswered > 0) & row.state.in_((RequestState.OPEN, RequestState.STUCK))
     session.execute(update(row).where(row.bench.in_(spellings(session, bench)), silent).values(takes=row.takes + 1))
@@ -225,7 +225,7 @@ def _refuse_unless_open(row: RequestRow) -> None:
     why = {
         RequestState.TAKEN: f"{row.taken_by} has taken it",
         RequestState.STUCK: f"it was taken {row.unanswered} times in a row without an answer; open it again first",
-        RequestState.WITHDRAWN: "it is wanted no more",
+        RequestState.WITHDRAWN: "it is no longer needed",
     }.get(row.state, "it is answered")
     raise Conflict(f"request {row.id} cannot be taken: {why}")
 

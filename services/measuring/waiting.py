@@ -76,8 +76,8 @@ OPERATOR = "gaplab"
 def refuse(session: Session, claim: Claim, request: RequestRow) -> AnswerRow | None:
     """Answer a request as failed if its forecast exceeds the limits and the spec says to refuse that; else return None.
 
-    No answer counts for it yet. The controller then counts as tried, and teaches nothing. A person who voids the answer
-    overrules it: the controller is offered, and never refused in this repetition again.
+    No answer counts for it yet. The controller then counts as tried, but simulators are not tuned on it. A person who
+    voids the answer overrules it: the controller is offered, and never refused in this repetition again.
     """
     beyond = (request.safety or {}).get("beyond", ())
     if claim.spec.reality.beyond != "refuse" or not beyond or _overruled(session, request):

@@ -93,7 +93,7 @@ def _fault_of_name(plugin: type[Any], kind: str) -> str | None:
 
 
 def _fault_of_options(plugin: type[Any]) -> str | None:
-    """Return that the defaults, completed as a spec stores them, are refused, alone or with a set of options."""
+    """Return why the defaults, completed as a spec stores them, are refused, alone or with a set of options."""
     options = plugin.Options
     if not isinstance(options, type) or not issubclass(options, Frozen):
         return "has Options that accept misspelt names: derive them from gaplab.plugins.Frozen"

@@ -1,4 +1,4 @@
-"""Threads of plug-ins, which keep no process."""
+"""Threads of plug-ins, which must not keep a process from ending."""
 
 import threading
 

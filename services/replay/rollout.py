@@ -59,7 +59,7 @@ class ReplayRequest:
         simulated: the stored fitness in the simulator, if there is one.
         real: the stored fitness in reality.
         readings: the stored readings in reality, if there are any.
-        known: whether reality can be shown: the spec has its parameters, and it is no hardware.
+        known: whether reality can be shown: the spec has its parameters, and it is not hardware.
         revealed: whether its shapes and its slope are shown; those of the robot as it is, as long as reality is hidden.
     """
 

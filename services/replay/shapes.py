@@ -40,8 +40,8 @@ def observed_of(world: World) -> int:
 def feet_of(world: World) -> tuple[int, ...]:
     """Return the indices of the feet: bodies that collide with the ground and carry no other such body.
 
-    The base is none. If only one body of a robot that moves would be left, as in a snake, all bodies that collide are
-    feet; of more than `MOST_FEET`, some are taken at equal distances in the list of bodies.
+    The base is not a foot. If only one body of a robot that moves would be left, as in a snake, all bodies that collide
+    are feet; of more than `MOST_FEET`, some are taken at equal distances in the list of bodies.
     """
     names = [body.name for body in world.bodies]
     parents = {names.index(joint.child): names.index(joint.parent) for joint in world.joints}
@@ -130,7 +130,7 @@ def _size_m(low: FloatArray, high: FloatArray) -> float:
 
 
 def _outline(shape: Shape) -> FloatArray:
-    """Return points `(n, 3)` of a shape's frame between which it is, closely enough to frame it."""
+    """Return points `(n, 3)`, in a shape's frame, that enclose it closely enough to place the camera."""
     if shape.kind == "hull":
         return np.array(shape.vertices_m)
     if shape.kind == "box":

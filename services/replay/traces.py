@@ -1,4 +1,4 @@
-"""Evaluation of traces: fitness and readings of a physical robot, computed by its code from its recorded motion."""
+"""Evaluation of traces: the task computes fitness and readings of a physical robot from its recorded motion."""
 
 from collections.abc import Mapping, Sequence
 from math import isfinite
@@ -35,12 +35,12 @@ LONGEST_PLOT_S = 20.0
 def evaluate_traces(
     store: Store, process: RolloutProcess, request: str, spec: TracesSpec, *, answer: bool = False
 ) -> TracesRead:
-    """Return what traces say about the controller of a request; nothing is stored. An answer takes one of each repeat.
+    """Return fitness and readings by traces of a request's motion, one for each repeat; nothing is stored.
 
     Raises:
         NotFound: the request does not exist.
         Conflict: the request belongs to a closed branch.
-        InvalidSpec: a trace is not stored, is no trace, or does not contain the motion; all errors are named.
+        InvalidSpec: a trace is not stored, is not a trace, or does not contain the motion; all errors are named.
         EngineUnavailable: the library of the engine is not installed.
         EngineInterrupted: the physics ended its process.
         LimitReached: earlier requests took too long.
@@ -55,7 +55,7 @@ def evaluate_traces(
         simulators = replays.tuned_parameters(session, experiment.id, repetition.number, tuned)
         genome = tuple(row.genome)
     if not simulators:
-        raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
+        raise Conflict(f"request {request} is no longer needed: a correction closed its branch")
     sent_spec = sent(resolved)
     asked = sent_spec, genome, tuple(simulators[0]), spec
     found = process.call(said_by_files, *asked, load=lambda: _contents(store, spec.traces), plugins=sent_spec.plugins)
@@ -71,7 +71,7 @@ def said_by_files(
     spec: TracesSpec,
     files: Mapping[str, bytes],
 ) -> TracesRead | tuple[Violation, ...]:
-    """Return what traces say about a genome, beside the motion in a simulator of a spec; or what is wrong with them.
+    """Return fitness and readings by traces of a genome, beside the motion in a simulator of a spec; or their errors.
 
     `files` are contents by hash; each is read once, however often the spec names it.
     """
@@ -89,7 +89,7 @@ def said_by_files(
 
 
 def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec: MeasurementSpec) -> TracesRead | None:
-    """Return what the traces of an answer say; None if it has none. Errors are those of `evaluate_traces`."""
+    """Return fitness and readings by the traces of an answer; None if it has none. Errors: as `evaluate_traces`."""
     if spec.traces is None:
         return None
     return evaluate_traces(store, process, request, TracesSpec(traces=spec.traces, lags_s=spec.lags_s), answer=True)
@@ -98,7 +98,7 @@ def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec
 def expected_motion(
     sent_spec: SentSpec, genes: Sequence[float], parameters: Sequence[float]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return what `expected_in` does, in a simulator of a spec."""
+    """Return times, poses and fitness as `expected_in` does, in a simulator of a spec."""
     spec = received(sent_spec)
     robot = robot_of(spec)
     simulation = simulation_of(spec, robot)
@@ -153,7 +153,7 @@ def _contents(store: Store, traces: Sequence[str]) -> dict[str, bytes]:
 def evaluated(
     robot: Robot, genome: FloatArray, traces: Sequence[Trace], expected: Trace, spec: TracesSpec
 ) -> TracesRead:
-    """Return what traces say about a genome `(g,)`, beside the expected motion.
+    """Return fitness and readings by traces of a genome `(g,)`, beside the expected motion.
 
     Raises:
         InvalidSpec: a trace does not contain the motion; all errors are named.

@@ -58,7 +58,7 @@ class Facts:
         curves: their curves.
         transferred: the same of transferred controllers alone.
         judged: the curves with their distinct names.
-        at_last: comparisons of all pairs at the common count; empty for one experiment.
+        at_last: comparisons of all pairs after the last common evaluation; empty for one experiment.
         beside: the same of transferred controllers alone, and of the best of these.
         over_all: the same over all counts up to it, one value for each repetition, with the paper's pooled tests; empty
             if there is a single count.
@@ -168,7 +168,7 @@ def _verdict(
     misfits: Mapping[str, MisfitRead],
     margin: Margin | None,
 ) -> tuple[VerdictRead, tuple[Comparison, ...]]:
-    """Return the verdict, and the comparisons at the common count that it uses."""
+    """Return the verdict, and the comparisons after the last common evaluation that it uses."""
     count, ids = common_count(experiments), [curve.experiment for curve in curves]
     pairs: tuple[Comparison, ...] = ()
     if count is not None and len(ids) > 1:

@@ -19,7 +19,7 @@ MOST_SHOWN = 60
 
 
 def at_last(facts: Facts) -> Grid:
-    """Return the fitness of each experiment at the common count."""
+    """Return the fitness of each experiment after the last common evaluation."""
     baseline = next((one.mean for one in facts.judged if one.curve.direct and one.mean > 0), None)
     head = ("Experiment", "n", f"Mean ({facts.unit})", "SD", "95 % interval", "Share of direct", "End of the curve")
     caption = "Recorded fitness at the last number of real-world evaluations that the experiments share"

@@ -260,7 +260,7 @@ def tuned_mjcf(sent_spec: SentSpec, parameters: Sequence[float], headline: str) 
 def plain_motion(
     sent_spec: SentSpec, parameters: Sequence[float], genome: Sequence[float], times_s: FloatArray
 ) -> FloatArray | None:
-    """Return `(t, 3)`: where the body that counts is in MuJoCo alone, m; None of a controller that observes."""
+    """Return `(t, 3)`: where the body that counts is in MuJoCo alone, m; None for a controller that observes."""
     robot, world = _tuned(sent_spec, parameters)
     motion = robot.motion(frozen(genome)).observed_at(times_s)
     return plain_positions(world, motion) if isinstance(motion, Motion) else None

@@ -134,7 +134,7 @@ def _direct(rows: Sequence[ExperimentRow]) -> list[ExperimentRow]:
 
 
 def warnings_of(store: Store, ids: Sequence[str]) -> tuple[str, ...]:
-    """Return why any two of the experiments that ids mean should not be compared, each reason once.
+    """Return why any two of the experiments that ids name should not be compared, each reason once.
 
     Raises:
         NotFound: there is nothing with one of the ids.

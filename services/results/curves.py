@@ -79,7 +79,7 @@ def values_of(
     found = (
         results.recorded(session, ids) if recorded else results.measured_fitness(session, ids, MeasurementKind.PROBE)
     )
-    done = progress.most_done(session, ids)  # not those of the spec, which may be a stranger's
+    done = progress.most_done(session, ids)  # not those of the spec, which may come from an archive
     values = {row.id: np.full((row.spec["repetitions"], max(1, done[row.id])), np.nan) for row in rows}
     for experiment, repetition, iteration, value in found:
         values[experiment][repetition, iteration] = -np.inf if value is None else value

@@ -126,7 +126,7 @@ def _noise(measured: Sequence[Sequence[float]]) -> float | None:
 
 
 def _deviations(members: list[list[float]], weights: list[float]) -> FloatArray | None:
-    """Return the standard deviations `(p,)` of weighted simulators; None of a single one."""
+    """Return the standard deviations `(p,)` of weighted simulators; None for a single one."""
     if len(members) < 2:
         return None
     values = np.array(members)

@@ -117,7 +117,7 @@ class Shapes:
         return max(float(model.geom_friction[at, 0]) for at in leading)
 
     def part(self, geom: int, center: FloatArray, turn: Rotation) -> Part | None:
-        """Return the part of a geom; None of one that a World cannot have.
+        """Return the part of a geom; None for one that a World cannot have.
 
         Args:
             geom: number of the geom.
@@ -182,7 +182,7 @@ FREE, BALL, SLIDE, HINGE = 0, 1, 2, 3
 """MuJoCo's types of joints."""
 
 HELD_KG = 1.0
-"""Mass of the base that is made for a robot on a rail or a hinge of the scene; it never moves."""
+"""Mass of the base that is made for a robot on a rail or a hinge of the world; it never moves."""
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ class Bodies:
 
     @property
     def is_held(self) -> bool:
-        """Whether the base is the scene, since the first joint is not free."""
+        """Whether the base is fixed to the world, since the first joint is not free."""
         return bool(self.model.jnt_type[0] != FREE)
 
     def name(self, head: int) -> str:

@@ -184,7 +184,7 @@ def _note_losses(source: Source, notes: Notes) -> None:
         if count := int(getattr(model, field, 0)):
             notes.lose(f"{count} {what} are lost")
     if np.any(model.opt.gravity[:2]) or model.opt.gravity[2] > 0:
-        notes.refuse(f"gravity is {model.opt.gravity.tolist()}, but in a World it points down; a slope is a tunable")
+        notes.refuse(f"gravity is {model.opt.gravity.tolist()}, but must point down; a slope is a tunable")
     for field, what in (("density", "air or water"), ("viscosity", "air or water"), ("wind", "wind")):
         if np.any(getattr(model.opt, field)):
             notes.lose(f"{what} ({field}) is lost")

@@ -44,7 +44,7 @@ def with_motors(joints: list[Joint], source: Source, options: ImportOptions, not
         return _of_the_file(joints, source, options, notes)
     chosen = [joint.name for joint in joints if fnmatchcase(joint.name, options.motored)]
     if not chosen:
-        notes.refuse(f"no joint is called like {options.motored!r}; joints: {listed((j.name for j in joints), 30)}")
+        notes.refuse(f"no joint has a name like {options.motored!r}; joints: {listed((j.name for j in joints), 30)}")
     kind = options.motor or "position"
     why = "in place of the file's" if source.model.nu else "as the file has none"
     notes.lose(

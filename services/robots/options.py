@@ -1,4 +1,4 @@
-"""Options of an import, and what it says: what it lost or changed, and why it refuses a file.
+"""Options of an import, and its notes: what it lost or changed, and why it refuses a file.
 
 The same file with the same options gives the same robot.
 """
@@ -92,7 +92,7 @@ class Notes:
     """Lines about one import, in the order of its steps.
 
     Attributes:
-        refused: what has no place in a World; the file cannot be imported.
+        refused: why the file cannot be imported, a sentence each.
     """
 
     def __init__(self) -> None:
@@ -122,7 +122,7 @@ class Notes:
         """Note each pattern of locked joints that matches none."""
         for pattern in patterns:
             if not any(fnmatchcase(name, pattern) for name in joints):
-                self.refuse(f"no joint is called like {pattern!r}, as --lock says; joints: {listed(joints, 30)}")
+                self.refuse(f"no joint has a name like {pattern!r}, as --lock says; joints: {listed(joints, 30)}")
 
     def check(self) -> None:
         """Raise all reasons to refuse the file so far.

@@ -19,11 +19,11 @@ ROUNDED = 1e-4
 
 
 def start_angles(source: Source, options: ImportOptions, notes: Notes) -> FloatArray:
-    """Return MuJoCo's `qpos`, `(nq,)`, at the start: a keyframe or the reference angles; the user may turn the base."""
+    """Return MuJoCo's `qpos`, `(nq,)`, at the start: a keyframe or the reference angles, the base as `options.turn`."""
     qpos = _angles_of_the_file(source, options, notes)
     if options.turn is not None:
         if source.model.jnt_type[0] != FREE:
-            notes.refuse("the base is the scene, which cannot be turned")
+            notes.refuse("the base is fixed to the world, so it cannot be turned")
         else:
             qpos[3:7] = np.roll(quaternion(Rotation.from_euler("xyz", options.turn)), 1)
     return qpos
@@ -53,7 +53,7 @@ def with_starts(
     unknown = [each for each in options.start if not any(fnmatchcase(joint.name, each) for joint in joints)]
     if unknown:
         names = listed((joint.name for joint in joints), 30)
-        notes.refuse(f"no joint is called like {listed(unknown)}, of which a start was given; joints: {names}")
+        notes.refuse(f"no joint has a name like {listed(unknown)}, of which a start was given; joints: {names}")
     return [replace(joint, start=_start(joint, given[joint.name], options.start, notes)) for joint in joints]
 
 

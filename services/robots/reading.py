@@ -93,7 +93,7 @@ def _key(model: Any, at: int) -> str | int:  # noqa: ANN401
 
 @dataclass(frozen=True)
 class Source:
-    """A compiled file.
+    """A URDF or MJCF, compiled by MuJoCo.
 
     Attributes:
         model: MuJoCo's `MjModel`, with static bodies of their own.
@@ -169,7 +169,7 @@ def _compiled(spec: Any, options: ImportOptions, notes: Notes, source: Source) -
     if not root.joints:
         fixed = fixed or not source.is_urdf
         root.add_freejoint()
-    if fixed and all("FREE" in str(joint.type) for joint in root.joints):  # else the base is the scene
+    if fixed and all("FREE" in str(joint.type) for joint in root.joints):  # else the base is the world
         replaced.update(hold(root, notes))
     moved = {body.name or f"body{at}" for at, body in enumerate(spec.bodies) if body.joints}
     replaced.update(mend(spec, notes, moved, allowed=options.mend))
@@ -182,7 +182,7 @@ def _compiled(spec: Any, options: ImportOptions, notes: Notes, source: Source) -
 
 
 def _root(spec: Any, notes: Notes) -> Any:  # noqa: ANN401
-    """Return the body that carries all others; note static things beside it."""
+    """Return the body that carries all others; note static things besides it."""
     bodies = spec.worldbody.find_all("body")
     roots = [body for body in bodies if body.parent == spec.worldbody]
     if len(roots) != 1:
@@ -208,9 +208,9 @@ def _lock(spec: Any, options: ImportOptions, notes: Notes) -> None:  # noqa: ANN
 
 
 _COUPLINGS = {
-    "equalities": "a World has no constraints but joints",
-    "tendons": "a World has motors on joints alone",
-    "flexes": "the bodies of a World are rigid",
+    "equalities": "gaplab has no constraints but joints",
+    "tendons": "gaplab has motors on joints alone",
+    "flexes": "the bodies of gaplab are rigid",
 }
 """Why elements of a spec are refused, by the name of their list."""
 
@@ -219,7 +219,7 @@ def _refuse(spec: Any, notes: Notes) -> None:  # noqa: ANN401
     for joint in spec.joints:
         kind, name = str(joint.type).rpartition("_")[2].lower(), joint.name or "(unnamed)"
         if kind == "ball":
-            notes.refuse(f"joint {name} is a ball joint: a World has hinges and slides; --lock fixes it")
+            notes.refuse(f"joint {name} is a ball joint, but must be a hinge or slide; --lock fixes it")
         if kind == "free" and joint.parent.parent != spec.worldbody:
             notes.refuse(f"joint {name} is free, but its body is not the base")
     for kind, why in _COUPLINGS.items():
@@ -228,7 +228,7 @@ def _refuse(spec: Any, notes: Notes) -> None:  # noqa: ANN401
     for body in spec.bodies:
         if len(body.joints) > 1:
             names = listed(_names(body.joints))
-            notes.refuse(f"body {body.name} has {len(body.joints)} joints ({names}), but a World has one for each body")
+            notes.refuse(f"body {body.name} has {len(body.joints)} joints ({names}), but at most one is permitted")
 
 
 def _names(things: Any) -> list[str]:  # noqa: ANN401

@@ -52,7 +52,7 @@ class Urdf:
 
 
 def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Urdf:
-    """Return a URDF that MuJoCo can read, and note what it would lose.
+    """Return a URDF that MuJoCo can read, and note what MuJoCo ignores.
 
     Raises:
         InvalidRobot: a name, a link or a number is wrong, or a mesh is missing; with every reason.
@@ -103,9 +103,9 @@ def _lock(root: Element, options: ImportOptions, notes: Notes) -> None:
 def _refuse(root: Element, notes: Notes) -> None:
     for joint in root.findall("joint"):
         if joint.find("mimic") is not None:
-            notes.refuse(f"joint {_name(joint)} mimics another: a World has no coupled joints; --lock fixes it")
+            notes.refuse(f"joint {_name(joint)} mimics another, but gaplab cannot couple joints; --lock fixes it")
         if joint.get("type") in {"planar", "floating"}:
-            notes.refuse(f"joint {_name(joint)} is {joint.get('type')}: a World has hinges and slides; --lock fixes it")
+            notes.refuse(f"joint {_name(joint)} is {joint.get('type')}, but must be a hinge or slide; --lock fixes it")
 
 
 def _note_losses(root: Element, notes: Notes) -> None:

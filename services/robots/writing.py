@@ -1,4 +1,4 @@
-"""Tuned values back in the file that a robot came from; the new file is imported again and compared before."""
+"""Write tuned values into the file that a robot came from, after the new file was imported again and compared."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -100,7 +100,7 @@ def write_json(tuning: Tuning, output: Path, accept: Accept) -> WrittenFile:
     text = json.dumps(file.content, ensure_ascii=False, indent=1) + "\n"
     again = read_robot_file(text).world
     if again != world:
-        raise InvalidRobot(["the robot file does not give the tuned world again"])
+        raise InvalidRobot(["the robot file, read again, differs from the tuned world"])
     accept(again)
     output.write_text(text, encoding="utf-8")
     return WrittenFile(tuple(changes(tuning.robot.world, tuning.world)), (), (), again)
@@ -220,7 +220,7 @@ def _computed(again: World, tuning: Tuning, left_out: Sequence[Change]) -> tuple
     tuned = {change.place for change in changes(tuning.robot.world, tuning.world)}
     differing = [change for change in changes(tuning.world, again) if change.place not in missing]
     if wrong := [each for each in differing if each.place[2] not in _COMPUTED or each.place in tuned]:
-        raise InvalidRobot(f"{change}: not the same after the new file is imported again" for change in wrong)
+        raise InvalidRobot(f"{change}: the new file, imported again, has another value" for change in wrong)
     return tuple(differing)
 
 

@@ -1,4 +1,4 @@
-"""The pipe from a supervisor to the process that keeps it: signs of life, its name, and why it ends.
+"""The pipe from a supervisor to the process that restarts it: heartbeats, its name, and why it ends.
 
 It works while the database is away, so that a supervisor that waits for the database is told from one that hangs.
 """
@@ -12,19 +12,19 @@ VARIABLE = "GAPLAB_PULSE"
 """Environment variable with the number of the inherited end of the pipe; not a setting."""
 
 EVERY_S = 0.5
-"""Shortest interval between two signs of life."""
+"""Shortest interval between two heartbeats."""
 
 _BEAT, _OWNER, _REASON = ".", "o", "r"
 
 
 class PulsePipe:
-    """The supervisor's end; without a keeper it does nothing.
+    """The supervisor's end of the pipe; without a parent that listens it does nothing.
 
     Args:
-        descriptor: to write to; None without a keeper.
+        descriptor: to write to; None without such a parent.
 
     Attributes:
-        trouble: why nothing runs although this supervisor lives; told with each sign of life.
+        trouble: why nothing runs although this supervisor lives; sent with each heartbeat.
     """
 
     trouble = ""
@@ -35,7 +35,7 @@ class PulsePipe:
 
     @classmethod
     def inherited(cls) -> Self:
-        """Return the end that the keeper handed down; processes that this one starts do not inherit it."""
+        """Return the end that the parent handed down; processes that this one starts do not inherit it."""
         if not (number := os.environ.pop(VARIABLE, "")):
             return cls()
         os.set_inheritable(int(number), False)
@@ -43,7 +43,7 @@ class PulsePipe:
         return cls(int(number))
 
     def beat(self) -> None:
-        """Give a sign of life."""
+        """Send a heartbeat."""
         if monotonic() - self._beaten >= EVERY_S:
             self._beaten = monotonic()
             self._write(_BEAT + self.trouble)
@@ -58,17 +58,17 @@ class PulsePipe:
 
     def _write(self, line: str) -> None:
         if self._descriptor is not None:
-            with suppress(OSError):  # the keeper is gone, or stands still with a full pipe
+            with suppress(OSError):  # the parent is gone, or stands still with a full pipe
                 os.write(self._descriptor, f"{' '.join(line.split())[:500]}\n".encode())
 
 
 class Heard:
-    """The keeper's end: what it has heard of a supervisor.
+    """The parent's end of the pipe: what it has heard of a supervisor.
 
     Attributes:
         owner: name of the supervisor in the database; None before it is told.
         reason: why the supervisor ends; None before it is told.
-        begun: whether it has given a sign of life.
+        begun: whether it has sent a heartbeat.
         trouble: why nothing runs; empty if all is well.
     """
 

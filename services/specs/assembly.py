@@ -45,7 +45,7 @@ class HiddenReality:
         self._parameters = parameters[None, :]
 
     def ask(self, question: Callable[[Genomes, Parameters], FloatArray], genomes: Genomes) -> FloatArray:
-        """Return what the simulation answers about genomes `(n, g)` in reality, `(n, 1, ...)`.
+        """Return fitness or outcomes of genomes `(n, g)` in reality, `(n, 1, ...)`.
 
         Raises:
             RealityFailed: its code raised an error.
@@ -135,7 +135,7 @@ def _realities(
 
 
 def subject(checked: Checked) -> Subject:
-    """Return what a sensitivity check simulates."""
+    """Return the subject of a sensitivity check: its simulation, controllers and tunables."""
     robot = robot_of(checked)
     return Subject(
         simulate=simulation_of(checked, robot),

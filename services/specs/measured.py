@@ -64,7 +64,7 @@ def readings_violations(tables: Sequence[Table], repeats: int | None, sensors: S
 
 
 def genome_violations(genome: Sequence[float], robot: str, space: Space) -> Iterator[Violation]:
-    """Yield that a genome has another size than the robot's, and each gene beyond its bounds."""
+    """Yield a violation for a genome of another size than the robot's, or for each gene beyond its bounds."""
     if len(genome) != space.size:
         message = f"a controller of the {robot} has {space.size} genes, not {len(genome)}"
         yield Violation("/genome", f"{len(genome)} numbers", message, f"exactly {space.size} numbers")
@@ -107,9 +107,9 @@ def lack_violations(
     readings: Sequence[Any] | None,
     remedy: str,
 ) -> Iterator[Violation]:
-    """Yield that measured values, as of `outcome_of`, lack what the discrepancy compares: every simulator would fit.
+    """Yield a violation if measured values lack what the discrepancy compares, since every simulator would fit.
 
-    The remedy says what to do.
+    Arguments are as of `outcome_of`; the remedy says what to do.
     """
     if not (discrepancy.senses and sensors.size):
         return
@@ -139,7 +139,7 @@ def _standardised(sensors: Sensors, readings: Sequence[Any] | None) -> Readings:
 
 
 def samples_of(spec: ResolvedSpec) -> tuple[Sample, ...]:
-    """Return the samples that a spec knows from before the experiment."""
+    """Return the samples that a spec has from before the experiment."""
     found, sensors = [], robot_of(spec).sensors if spec.reality.samples else Sensors()
     for known in spec.reality.samples:
         outcome, repeats = outcome_of(sensors, known.values, known.readings)
@@ -148,7 +148,7 @@ def samples_of(spec: ResolvedSpec) -> tuple[Sample, ...]:
 
 
 def bench_violations(spec: ExperimentSpec, robot: Robot, discrepancy: Discrepancy) -> Iterator[Violation]:
-    """Yield limits that nothing can check, a refusal without limits, and samples that cannot be, or teach nothing."""
+    """Yield limits that nothing can check, a refusal without limits, and samples that are invalid, or not tuned on."""
     if spec.reality.kind != "physical":
         return
     yield from _limit_violations(spec, robot)

@@ -1,4 +1,4 @@
-"""The named budgets, each a share of the paper's computation, and what they set beside numbers.
+"""The named budgets, each a share of the paper's computation, and what they set besides numbers.
 
 With each of them, all strategies select their samples from searches of equal size. `reuse_transfer: true` in a spec
 changes that: docs/decisions/a-fair-comparison.md.

@@ -203,7 +203,7 @@ def _assembled(numbers: Numbers, reads: bool, robot: Robot) -> KnownSample:
 
 
 def _unknown(line: int, heading: str, robot: Robot, *, hint: bool) -> CellError:
-    """Return that a column is unknown, perhaps with the known name that is nearest."""
+    """Return the error of an unknown column, perhaps with the known name that is nearest."""
     genes = [f"gene_{place}" for place in range(robot.space.size)]
     names = [*genes, "value", "value_1", "value_2", *robot.sensors.columns]
     nearest = get_close_matches(heading, names, n=1, cutoff=0.5) if hint else []

@@ -155,7 +155,7 @@ class SafetyForecast:
         self._robot, self._simulation = robot, simulation
 
     def __call__(self, genome: Genome, parameters: Parameters, progress: Callable[[], None] = lambda: None) -> Safety:
-        """Return what simulators `(m, p)`, the best first, expect of a genome `(g,)`; the first 20 are asked."""
+        """Return the forecast of simulators `(m, p)`, the best first, for a genome `(g,)`; the first 20 are run."""
         rollouts, errors = list[Extremes](), set[str]()
         for simulator in parameters[:MOST_SIMULATORS]:
             try:

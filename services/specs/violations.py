@@ -50,7 +50,7 @@ def tuning_violations(robot: Robot, discrepancy: Discrepancy, tuner: Tuner) -> I
         yield Violation("/discrepancy", discrepancy.name, message, able)
     if tuner.needs_squares and not discrepancy.squares:
         able = [name for name, each in discrepancies.items() if each.squares]
-        message = f"the tuner {tuner.name} needs a sum of squares, and {discrepancy.name} is none"
+        message = f"the tuner {tuner.name} needs a sum of squares, and {discrepancy.name} is not one"
         yield Violation("/discrepancy", discrepancy.name, message, able)
 
 
@@ -159,7 +159,7 @@ def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[V
         message = "a physical reality has no engine; the engine of the simulators is `/engine`"
         yield Violation("/reality/engine", reality.engine.name, message, "left out")
     for name, value in reality.parameters.items():
-        message = "a physical reality has no hidden parameters; what they are is the question"
+        message = "a physical reality has no hidden parameters; leave them out"
         yield Violation(pointer_to(["reality", "parameters", name]), value, message, "left out")
     if reality.probes == "never" and not strategy.takes_samples:
         message = f"{strategy.name} takes no samples, so without probes nothing would be measured"

@@ -58,12 +58,12 @@ def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
 
 @contextmanager
 def replacing(file: Path, mode: int) -> Iterator[Path]:
-    """Open a part file to write into; it takes the name, from another file too, when the context ends well.
+    """Yield a temporary file to write into, which replaces `file`, if any, when the context ends without an error.
 
-    As root, it belongs to the owner of the file that has the name, or of the folder.
+    If root writes it, it belongs to the owner of the replaced file, or else of the folder.
 
     Args:
-        file: its name.
+        file: final name, which may be taken.
         mode: permissions, restricted by the process's umask.
 
     Raises:

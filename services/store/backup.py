@@ -36,7 +36,7 @@ def backup(url: str, file: Path) -> int:
         raise Unsupported(msg)
     source = engine.url.database
     if source is None or not Path(source).is_file():
-        raise StoreUnavailable(f"there is no database at {source or 'no place'}, so there is nothing to copy")
+        raise StoreUnavailable(f"there is no database at {source or 'this URL'}, so there is nothing to copy")
     try:
         with appearing(file, PRIVATE) as part, database_errors.named(), engine.connect() as connection:
             source_connection = connection.connection.driver_connection

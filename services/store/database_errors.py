@@ -63,7 +63,7 @@ def named() -> Iterator[None]:
 
 
 def is_damage(error: BaseException | None) -> bool:
-    """Return whether SQLite found a file damaged, or no database at all."""
+    """Return whether SQLite found a file damaged, or not a database at all."""
     return getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED  # the low byte is the kind of error
 
 

@@ -87,7 +87,7 @@ class TimedStep:
 
 @dataclass(frozen=True)
 class Pulse:
-    """A sign of life of a worker, while it has nothing else to deliver.
+    """A heartbeat of a worker, while it has nothing else to deliver.
 
     Attributes:
         step: place of the running step in the log.
@@ -126,7 +126,7 @@ class Requested:
         iteration: iteration of the measurement.
         kind: sample or probe.
         genome: `(g,)`: the controller to run.
-        safety: what the believed simulators expect of it, as JSON; None if nothing was asked.
+        safety: what the latest tuned simulators expect of it, as JSON; None if nothing was asked.
     """
 
     place: int

@@ -23,7 +23,7 @@ PG_RESTORE = (
     "pg_restore --single-transaction --exit-on-error --no-owner "
     '--dbname="postgresql:${{GAPLAB_DATABASE_URL#*:}}" {file}'
 )
-"""A new, empty database, and all of the dump in it or nothing: `--clean` keeps tables that the dump does not know."""
+"""A new, empty database, and all of the dump in it or nothing: `--clean` keeps tables that the dump does not have."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _copy(source: Path, part: Path) -> None:
         with closing(sqlite3.connect(f"{source.absolute().as_uri()}?mode=ro", uri=True)) as connection:
             copy_checked(connection, part)
     except StoreDamaged as error:
-        raise StoreDamaged(f"{source} is damaged, or no database: {error}") from error
+        raise StoreDamaged(f"{source} is damaged, or is not a database: {error}") from error
     except sqlite3.Error as error:
         raise StoreUnavailable(f"{source} cannot be read: {error}") from error
 

@@ -51,7 +51,7 @@ def url_of(file: Path) -> str:
 
 
 def identity(file: Path) -> tuple[int, int] | None:
-    """Return what tells a file from another of the same name; None if there is none."""
+    """Return numbers that differ between a file and another of the same name; None if there is no file."""
     try:
         found = file.stat()
     except OSError:
@@ -78,7 +78,7 @@ def refuse_damaged(file: Path) -> None:
     """Check the structure of a database that may be absent; it reads the whole file.
 
     Raises:
-        StoreDamaged: it is damaged, or no database; the message says what to do.
+        StoreDamaged: it is damaged, or not a database; the message says what to do.
         StoreUnavailable: it cannot be read now.
     """
     if not file.is_file() or not file.stat().st_size:

@@ -1,4 +1,4 @@
-"""Texts as a database takes them."""
+"""Text to store: without characters that databases refuse, of limited length, and tags as one text."""
 
 from collections.abc import Iterable
 

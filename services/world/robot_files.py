@@ -131,7 +131,7 @@ def stored_robot_file(text: str | bytes) -> RobotFile:
 
 
 def _world_violations(content: Any) -> Iterator[Violation]:  # noqa: ANN401 - any JSON
-    """Yield what is seen of a world at once, before every value in it is looked at."""
+    """Yield violations that are found quickly, before every value of a world is checked."""
     world = content.get("world") if isinstance(content, dict) else None
     if not isinstance(world, dict):
         return

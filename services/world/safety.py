@@ -15,7 +15,7 @@ from gaplab.services.world.motions import Loop, Motion, Recording
 from gaplab.services.world.world import World
 
 MOST_SIMULATORS = 20
-"""Largest number of believed simulators that a forecast asks, the best first."""
+"""Largest number of tuned simulators that a forecast asks, the best first."""
 
 FALL_RAD = pi / 2
 """Tilt beyond which a robot has fallen."""
@@ -101,7 +101,7 @@ def extremes(world: World, motion: Motion | Loop, recording: Recording, fitness:
 
 
 def safety(rollouts: Sequence[Extremes], limits: LimitsSpec | None, engine: str) -> Safety:
-    """Return the worst of the rollouts of a controller in all simulators; the name of the engine is for the words."""
+    """Return the worst of the rollouts of a controller in all simulators; sentences have the name of the engine."""
     ran = [rollout for rollout in rollouts if np.isfinite(rollout.fitness)]
     falls = sum(rollout.tilt > FALL_RAD for rollout in ran)
     worst = {limit.name: _worst(ran, limit.name, min if limit.least else max) for limit in LIMITS}
@@ -119,7 +119,7 @@ def safety(rollouts: Sequence[Extremes], limits: LimitsSpec | None, engine: str)
 
 
 def expected(found: Safety, unit: str) -> Iterator[str]:
-    """Yield what a forecast expects of a controller, a line each; `unit` is that of its fitness."""
+    """Yield the predictions of a forecast for a controller, a line each; `unit` is that of its fitness."""
     ends = [f"{end:.3g}" for end in (found.fitness_low, found.fitness_high) if end is not None]
     if ends:
         yield f"simulators expect {' to '.join(dict.fromkeys(ends))} {unit}".rstrip()
@@ -190,5 +190,5 @@ def _joint_speed(recording: Recording) -> float:
 
 
 def _largest(values: FloatArray | None) -> float:
-    """Return the largest size of a value; nan without values."""
+    """Return the largest absolute value; nan without values."""
     return nan if values is None or not values.size else float(np.abs(values).max())

@@ -90,7 +90,7 @@ WORLDS_KEPT = 64
 
 @dataclass(frozen=True, eq=False)
 class Bearing:
-    """What an engine knows of n robots in one world at one time.
+    """What an engine provides about n robots in one world at one time.
 
     Attributes:
         poses: `(n, 7)`: positions and quaternions x, y, z, w of the base's frame.

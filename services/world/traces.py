@@ -289,7 +289,7 @@ def _table(rows: Iterable[CsvRow], places: Mapping[str, int]) -> tuple[list[list
 
 
 def _nonsense(table: FloatArray) -> Iterator[str]:
-    """Yield what is wrong with poses `(k, 8)`: too few, times that do not ascend, quaternions of another size."""
+    """Yield what is wrong with poses `(k, 8)`: too few, times that do not ascend, quaternions whose norm is not 1."""
     if len(table) < 2:
         yield f"the trace has {len(table)} poses; at least 2 are needed"
         return
@@ -302,7 +302,7 @@ def _nonsense(table: FloatArray) -> Iterator[str]:
         yield f"the trace lasts {duration:g} s; at most {LONGEST_S:g} s are permitted"
     sizes = np.linalg.norm(table[:, 4:], axis=1)
     for place in np.nonzero(np.abs(sizes - 1.0) > 0.01)[0][:3]:
-        yield f"pose {place + 1}: qx, qy, qz, qw have size {sizes[place]:.3g}; permitted: 1, as of a rotation"
+        yield f"pose {place + 1}: qx, qy, qz, qw have norm {sizes[place]:.3g}; permitted: 1, as of a rotation"
 
 
 def unlikely(trace: Trace, expected: Trace, alignment: Alignment) -> Iterator[str]:

@@ -271,7 +271,7 @@ def test_what_was_sent_is_corrected_and_voided_after_what_follows_is_said(visit:
     page.get_by_label("Why?").fill("a leg slipped off")
     page.get_by_role("button", name="Send that it failed").click()
     page.get_by_role("button", name=re.compile("Void….*sample of iteration 1")).click()
-    expect(dialog).to_contain_text("the controller is asked for again")
+    expect(dialog).to_contain_text("the controller is requested again")
     dialog.get_by_label("Why?").fill("it was the wrong leg")
     dialog.get_by_role("button", name="Void it").click()
     dialog.wait_for(state="detached")

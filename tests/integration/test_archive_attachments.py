@@ -139,7 +139,7 @@ def test_a_file_that_does_not_fit_its_hash_is_refused(sqlite_store: Store, good:
             sqlite_store, with_file(good, of(PHOTO), content), f"content of the attachment '{of(PHOTO)}' has another"
         )
     for value in (5, "text", b"", bytes(20_000_001), None):
-        refused(sqlite_store, with_file(good, of(PHOTO), value), "has not 1 to 20,000,000 bytes")
+        refused(sqlite_store, with_file(good, of(PHOTO), value), "must have 1 to 20,000,000 bytes")
 
 
 def test_a_file_that_no_answer_names_or_that_is_missing_is_refused(sqlite_store: Store, good: bytes) -> None:
@@ -148,13 +148,13 @@ def test_a_file_that_no_answer_names_or_that_is_missing_is_refused(sqlite_store:
     for archive, what in (
         (
             changed(good, f"DELETE FROM attachment WHERE id = '{of(PHOTO)}'"),
-            f"'{of(PHOTO)}' is in the archive or named",
+            f"'{of(PHOTO)}' is missing from the archive",
         ),
         (
             with_file(good, of(b"more"), b"more"),
-            f"'{of(b'more')}' is in the archive or named by an answer, but not both",
+            f"'{of(b'more')}' is missing from the archive, or no answer names it",
         ),
-        (changed(good, names.format(json.dumps([of(TRACE)]))), "is in the archive or named by an answer, but not both"),
+        (changed(good, names.format(json.dumps([of(TRACE)]))), "is missing from the archive, or no answer names it"),
         (changed(good, names.format("[{}]")), "attachments/0: item 0 of attachments must be text"),
         (changed(good, names.format("[5]")), "attachments/0: item 0 of attachments must be text"),
         (changed(good, names.format("7")), "attachments: attachments must be a list"),

@@ -252,7 +252,7 @@ def test_an_id_that_would_mean_a_study_and_one_of_its_experiments(sqlite_store: 
         values = ", ".join("'another'" if each == "id" else each for each in names)
         connection.execute(f"INSERT INTO experiment SELECT {values} FROM experiment")
 
-    refused(sqlite_store, changed(free, another), "an experiment among others has the id")
+    refused(sqlite_store, changed(free, another), "one of several experiments has the id")
 
 
 EMPTIED = ("step", "attempt", "repetition", "experiment_provenance", "experiment")

@@ -319,7 +319,7 @@ def test_an_answer_that_comes_to_count_when_nobody_wants_it_any_more_is_refused(
     other = measure(store, request, 0.3)
     lifecycle.ask(store, experiment.id, Verb.CANCEL)
 
-    with pytest.raises(Conflict, match="wanted no more"):
+    with pytest.raises(Conflict, match="no longer needed"):
         corrections.decide(store, other.id, ConflictSpec(counts="this", reason="Bo is right"), FREELY)
 
     assert taking.read_request(store, request.id).answers[0].state == "conflict"
@@ -549,7 +549,7 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
     assert lifecycle.ask(store, one.id, Verb.RESUME).state is State.QUEUED
     assert lifecycle.ask(store, two.id, Verb.STOP).state is State.CANCELLED
     assert lifecycle.ask(store, three.id, Verb.CANCEL).state is State.CANCELLED
-    with pytest.raises(Conflict, match="wanted no more"):
+    with pytest.raises(Conflict, match="no longer needed"):
         measure(store, requests[three.id], 0.4)
     waiting_for = [RequestFilter(experiment=id_) for id_ in (one.id, three.id)]
     assert [taking.none_will_follow(store, each) for each in (*waiting_for, RequestFilter())] == [False, True, False]
@@ -557,7 +557,7 @@ def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
 
 @pytest.mark.dialects
 def test_a_bench_stays_taken_until_its_holder_has_let_go_or_is_silent(store: Store) -> None:
-    """Also if the request is wanted no more, or somebody else's answer counts: a driver may still move the robot."""
+    """Also if the request is no longer needed, or somebody else's answer counts: a driver may still move the robot."""
     first, second, third = (submit_one(store, bench(reality={"bench": "table"})) for _ in range(3))
     compute(store)
     one, two, three = pending(store)

@@ -171,7 +171,7 @@ def test_an_answer_in_the_journal_that_is_refused_holds_no_other_back(
     assert following.id != wanted.id
     assert client.bench.request(wanted.id).answers[0].values == (0.5,)
     assert f"the answer {{'values': [0.25]}} in the journal, to request {wanted_no_more.id}, is refused" in caplog.text
-    assert "is wanted no more" in caplog.text
+    assert "is no longer needed" in caplog.text
     with Journal(tmp_path / "journal") as journal:
         assert journal.unsent() == []
 

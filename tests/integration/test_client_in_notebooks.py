@@ -60,7 +60,7 @@ def test_a_study_or_an_experiment_stands_for_its_id(client: Client, finish: Call
 def test_an_option_of_a_figure_changes_neither_its_format_nor_its_experiments(client: Client) -> None:
     id = client.submit(SMALL).id
 
-    with pytest.raises(TypeError, match=r"^experiment, format: no option of a figure; give ids first"):
+    with pytest.raises(TypeError, match=r"^experiment, format: not an option of a figure; give ids first"):
         client.figure(id, format="png", experiment="x")
 
 

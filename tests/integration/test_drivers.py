@@ -171,7 +171,7 @@ def test_a_driver_without_a_network_stops_its_robot_within_its_lease_and_goes_on
     with served(app) as network:
         driven = gaplab("drive", id_, "--driver", driver, "--limit-s", "60", "--lease-s", "1", GAPLAB_URL=network)
 
-    assert "stopped: no sign of life has reached the service for 0.8 s" in driven.out
+    assert "stopped: no heartbeat has reached the service for 0.8 s" in driven.out
     assert (driven.code, "the driver's run raised IndexError" in driven.err) == (1, True)
     assert requests_of(sqlite_store, id_)[0].answers == ()
 
@@ -192,7 +192,7 @@ def test_a_driver_goes_on_after_a_request_that_is_not_wanted_any_more(
     RUNS.append(corrected)
     driven = gaplab("drive", id_, "--driver", driver)
 
-    assert f"not taken: request {first.id} is wanted no more" in driven.out
+    assert f"not taken: request {first.id} is no longer needed" in driven.out
     assert f"{second.id}: repetition 1" in driven.out
 
 

@@ -125,7 +125,7 @@ def test_only_what_has_ended_is_archived_and_what_goes_on_is_shown_again(store: 
     extend(store, first, ExtensionSpec(repetitions=2))
 
     assert reading.read(store, made.id).archived_at is None
-    with pytest.raises(Conflict, match="this is about all of it: use the id of the study"):
+    with pytest.raises(Conflict, match="this request is about all of it: use the id of the study"):
         archiving.archive(store, second)
 
 

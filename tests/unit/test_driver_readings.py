@@ -104,13 +104,13 @@ def test_repeats_are_forgotten_if_somebody_else_may_have_moved_the_robot_meanwhi
 
     def ask() -> None:
         if next(left, "lost"):
-            raise TakeLost(refused or "no sign of life")
+            raise TakeLost(refused or "no heartbeat")
 
     task.take = SimpleNamespace(lost=None, refused=refused, ask=ask)
     task.forget = lambda: journal.forget("r")
     measure(task, Robot(Driver(0.4)), None, said.append)  # type: ignore[arg-type]
 
-    assert (len(task.noted), task.told, said[-1]) == (1, [], f"stopped: {refused or 'no sign of life'}")
+    assert (len(task.noted), task.told, said[-1]) == (1, [], f"stopped: {refused or 'no heartbeat'}")
     assert journal.repeats("r") == kept
 
 

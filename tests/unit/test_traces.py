@@ -222,7 +222,7 @@ ENDLESS = '"' + "0123456789\n" * 20_000
         ),
         (table(time_s=1700000000.02), "pose 3: time_s must ascend, and 0.2 follows 1700000000.02"),
         (table(time_s=9e9), "pose 3: time_s must ascend"),
-        (table(qw=2), "pose 2: qx, qy, qz, qw have size 2; permitted: 1"),
+        (table(qw=2), "pose 2: qx, qy, qz, qw have norm 2; permitted: 1"),
         (",".join(TRACE_COLUMNS), "the trace has 0 poses; at least 2 are needed"),
         (table().replace("0.2,0.0,0", "5000,0,0").replace("\n0.2", "\n5000"), "at most 3600 s are permitted"),
         (f"{table()}\n{ENDLESS}", r"line 13112: the line is not CSV: field larger than field limit \(131072\)"),

@@ -47,7 +47,7 @@ class AbsoluteFitness(Discrepancy):
 
 
 class HuberOptions(Frozen):
-    """Options of Huber's loss."""
+    """Options of the discrepancy `huber`."""
 
     beyond: Annotated[Real, Field(gt=0, le=1e6)] = Field(
         default=0.05, description="difference from which it counts in proportion, in the unit of fitness"

@@ -12,7 +12,7 @@ from gaplab.services.core.discrepancies.base import Discrepancy
 
 
 class ReadingsOptions(Frozen):
-    """Options of the discrepancy of readings."""
+    """Options of the discrepancy `readings`."""
 
     seconds: Annotated[float, Field(strict=True, gt=0, le=3_600)] = Field(
         default=1.0,
@@ -36,13 +36,13 @@ class Readings(Discrepancy):
     options: ReadingsOptions
 
     def lack(self, readings: FloatArray, times_s: FloatArray) -> str | None:
-        """Return that there is no reading early enough."""
+        """Return what is missing if no reading is early enough; else None."""
         if not np.isnan(readings[self._early(times_s)]).all():
             return None
         return f"a reading up to {self.options.seconds:g} s after the first"
 
     def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
-        """Return the mean squares."""
+        """Return the mean squared differences over the readings that count."""
         return np.asarray((self.residuals(simulated, measured, times_s) ** 2).sum(axis=-1))
 
     def residuals(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:

@@ -85,7 +85,7 @@ class CmaEs(Optimizer):
         return CmaEsState(state.space, kept.genomes, kept.fitness, learned)
 
     def diverse(self, size: int) -> "CmaEs":
-        """Return this optimizer with a diverse set of `size` members."""
+        """Return the same optimizer, except that it keeps `size` members that differ from each other."""
         return CmaEs(self.options.model_copy(update={"members": size, "diverse": True}))
 
     def _learned(self, state: CmaEsState, genomes: Genomes, fitness: FloatArray) -> Any:  # noqa: ANN401 - of the library

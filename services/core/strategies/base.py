@@ -40,8 +40,8 @@ class Search(Protocol):
 
         Args:
             score: what to maximise; a score that is not finite never wins.
-            parameters: `(m, p)`, the simulators to search in; default: all that the belief has.
-            senses: true if the score needs readings; a robot without sensors has none, so q is 0.
+            parameters: `(m, p)`, the simulators to search in; default: all that were tuned.
+            senses: true if the score needs `(n, m, 1 + q)`: fitness, then q readings; 0 of a robot without sensors.
             candidates: `(n, g)`, the only genomes to evaluate, as far as the budget goes; default: the optimizer's.
 
         Raises:
@@ -56,7 +56,7 @@ class Strategy(Plugin):
     Attributes:
         searches: true if a selection searches, which spends its budget.
         selects_transferred: true if its search has the transfer's goal, the fittest controller in the best simulator.
-        takes_samples: false if nothing is tuned and a controller transferred at once: a level across the figure.
+        takes_samples: false if it tunes nothing and transfers one controller at once; its curve is a horizontal line.
         in_reality: true for the direct baseline, which evolves in reality and takes no samples.
     """
 

@@ -15,7 +15,7 @@ from gaplab.services.core.types import Belief
 
 
 class EstimationExplorationOptions(Frozen):
-    """Options of `estimation_exploration`."""
+    """Options of the strategy `estimation_exploration`."""
 
     models: Annotated[int, Field(strict=True, ge=2, le=1_000)] = Field(
         default=15, description="simulators that compete; the authors': 15"

@@ -40,7 +40,7 @@ class Random(Strategy):
 
 
 class KnownFitOptions(Frozen):
-    """Options of `known_fit`."""
+    """Options of the strategy `known_fit`."""
 
     spread: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
         default=0.25,
@@ -130,7 +130,7 @@ class SimulatedFitAndInformative(Diverse):
 
 
 class SimulatedFitAndUniqueOptions(Frozen):
-    """Options of `simulated_fit_and_unique`."""
+    """Options of the strategy `simulated_fit_and_unique`."""
 
     distances: Literal["scaled", "plain"] = Field(
         default="scaled",

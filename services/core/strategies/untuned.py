@@ -16,7 +16,7 @@ from gaplab.services.core.types import Belief
 
 
 class DomainRandomizationOptions(Frozen):
-    """Options of `domain_randomization`."""
+    """Options of the strategy `domain_randomization`."""
 
     simulators: Annotated[int, Field(strict=True, ge=1, le=1_000)] = Field(
         default=20, description="random simulators in which every controller is evaluated; gaplab's default"
@@ -67,7 +67,7 @@ def _names(value: object) -> object:
 
 
 class NoiseEnvelopeOptions(Frozen):
-    """Options of `noise_envelope`."""
+    """Options of the strategy `noise_envelope`."""
 
     base: Annotated[tuple[str, ...], BeforeValidator(_names), Field(max_length=100)] = Field(
         default=BASE,
@@ -83,7 +83,7 @@ class NoiseEnvelopeOptions(Frozen):
         default=8, description="draws in which every controller is evaluated; gaplab's default"
     )
     fitness: Literal["minimum", "mean_minus_deviation"] = Field(
-        default="minimum", description="what becomes of the fitnesses in all draws; gaplab's default: the minimum"
+        default="minimum", description="how the fitnesses in all draws are combined; gaplab's default: the minimum"
     )
     kappa: Annotated[float, Field(strict=True, ge=0, le=1e6)] = Field(
         default=1.0,

@@ -46,8 +46,8 @@ class WeightedOptions(DiverseOptions):
     )
     information: Literal["log_determinant", "trace"] = Field(
         default="log_determinant",
-        description="number that stands for the Fisher information; one loud tunable can dominate the trace; gaplab's "
-        "default",
+        description="number that stands for the Fisher information; one sensitive tunable can dominate the trace; "
+        "gaplab's default",
     )
     normalise: bool = Field(
         default=True,

@@ -28,7 +28,7 @@ TRIES = 100
 
 
 class AbcSmcOptions(Frozen):
-    """Options of approximate Bayesian computation."""
+    """Options of the tuner `abc_smc`."""
 
     rounds: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
         default=4, description="most rounds, each narrower; one for every two evaluations at most"

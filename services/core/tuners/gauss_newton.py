@@ -26,7 +26,7 @@ NARROWEST = 1e-3
 
 
 class GaussNewtonOptions(Frozen):
-    """Options of least squares."""
+    """Options of the tuner `gauss_newton`."""
 
     evaluations: Annotated[int, Field(strict=True, ge=8, le=1_000_000)] = Field(
         default=60, description="most simulators to evaluate; the rest of the budget is saved"

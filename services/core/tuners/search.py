@@ -16,7 +16,7 @@ from gaplab.services.core.types import Simulator
 
 
 class SearchOptions(Frozen):
-    """Options of the paper's tuner."""
+    """Options of the tuner `search`, the paper's."""
 
     warm_start: bool = Field(
         default=False,
@@ -60,7 +60,7 @@ class SearchTuner(Tuner):
 
 
 class ClimbersOptions(Frozen):
-    """Options of the climbers."""
+    """Options of the tuner `climbers`."""
 
     mutations: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
         default=4, description="most mutations of a child, each of a tunable drawn at random; the authors': 1 to 4"

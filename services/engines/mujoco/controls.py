@@ -178,6 +178,6 @@ class _Run:
 
 
 def _looks(world: World) -> Hashable:
-    """Return what observations depend on, of worlds of one structure: the slope, and where shapes are."""
+    """Return what observations in worlds of one structure depend on: the slope, and the places of shapes."""
     solids = [body.center_m for body in world.bodies if not isinstance(body.shape, tuple)]
     return world.slope_rad, *solids

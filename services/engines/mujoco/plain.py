@@ -61,7 +61,7 @@ def mjcf_of(world: World, comments: Sequence[str] = ()) -> str:
 
 
 def plain_positions(world: World, motion: Motion) -> FloatArray:
-    """Return `(t, 3)`: where a motion's observed body is in MuJoCo alone, m."""
+    """Return `(t, 3)`: positions of a motion's observed body in MuJoCo with its own contacts and motors, m."""
     mujoco = import_module("mujoco")
     model = mujoco.MjModel.from_xml_string(mjcf_of(world))
     data = mujoco.MjData(model)

@@ -142,7 +142,7 @@ class States:
         return states[..., self._speeds_at :]
 
     def bearing(self, states: FloatArray) -> Bearing:
-        """Return what states `(n, state)` say of the robots."""
+        """Return the poses, angles and speeds of the robots in states `(n, state)`."""
         turning = np.zeros((len(states), 3))
         if self._fixed is None:
             turning = states[:, self._speeds_at + TURNING : self._speeds_at + TURNING + 3]

@@ -39,7 +39,7 @@ def within(value: float, limit: float) -> float:
 
 
 def spring_of(motor: Motor | PDMotor | None) -> Spring:
-    """Return the law of a motor; that of a servo, which PhysX knows alone, is none."""
+    """Return the law of a motor; without torque for a servo, which is a drive of its own kind in PhysX."""
     if not isinstance(motor, PDMotor):
         return Spring()
     limit = min(motor.max_torque_nm, STRONGEST)
@@ -52,7 +52,7 @@ def spring_of(motor: Motor | PDMotor | None) -> Spring:
 
 
 def resists(joint: Joint) -> bool:
-    """Return whether a joint needs torques in each step: PhysX's drive alone cannot be all that acts in it."""
+    """Return whether a joint needs torques in each step: for dry friction, or damping beside a motor."""
     follows = isinstance(joint.motor, Motor) or (isinstance(joint.motor, PDMotor) and joint.motor.follows != "torque")
     return joint.dry_friction > 0 or (follows and joint.damping > 0)
 

@@ -38,7 +38,7 @@ class PyBullet(SteppedEngine[PyBulletScene]):
         needed = len(links_of(world)) - 1 if world.bodies else 0
         if needed <= MOST_LINKS:
             return None
-        return f"its bodies and shapes need {needed} links beside the base, and Bullet has {MOST_LINKS}"
+        return f"its bodies and shapes need {needed} links besides the base, and Bullet has {MOST_LINKS}"
 
     def _build(self, world: World) -> PyBulletScene:
         return PyBulletScene(self._bullet, world)

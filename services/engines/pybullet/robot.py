@@ -36,7 +36,7 @@ from gaplab.services.world.world import (
 )
 
 MOST_LINKS = 127
-"""Most links of a robot beside its base; Bullet has no place for the state of others."""
+"""Most links of a robot besides its base; Bullet has no place for the state of others."""
 
 BASE = -1
 """Bullet's index of the base. Links count from 0."""
@@ -47,7 +47,7 @@ NO_JOINT = -1
 
 @dataclass(frozen=True)
 class Link:
-    """A link of Bullet's.
+    """A link in Bullet: a body, or a further shape of one.
 
     Attributes:
         body: the body that it is, or that it is welded to.

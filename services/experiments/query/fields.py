@@ -24,7 +24,7 @@ OF_MISSING = ("=", "!=", "in", "not in")
 """Operators of `none`."""
 
 LAST = datetime.max.replace(tzinfo=UTC)
-"""The last time that a database knows."""
+"""The last time that a database can store."""
 
 _SPANS = {"m": "minutes", "h": "hours", "d": "days", "w": "weeks"}
 _FLAGS = ("true", "false", "any")

@@ -88,21 +88,21 @@ class Words:
 
 @dataclass(frozen=True)
 class Not:
-    """What must not hold."""
+    """A condition that must not hold."""
 
     part: "Tree"
 
 
 @dataclass(frozen=True)
 class Every:
-    """What must hold together."""
+    """Conditions that must all hold."""
 
     parts: tuple["Tree", ...]
 
 
 @dataclass(frozen=True)
 class Some:
-    """What must hold at least in part."""
+    """Conditions of which at least one must hold."""
 
     parts: tuple["Tree", ...]
 
@@ -189,7 +189,7 @@ def _check_size(query: str, tree: Tree) -> None:
 
 
 def inside(tree: Tree) -> tuple[Tree, ...]:
-    """Return what a tree consists of; nothing for a condition."""
+    """Return the branches of a tree; none for a condition."""
     match tree:
         case Not(part):
             return (part,)

@@ -1,4 +1,4 @@
-"""The text of a file, and the parts around its panels: title, legend, bar of shades, caption.
+"""The text of a file, and the parts around its panels: title, legend, colour bar, caption.
 
 The width of a text is measured within matplotlib's settings for files.
 """
@@ -175,7 +175,7 @@ def shades_of(figure: FigureDefinition) -> tuple[float, float]:
 
 
 def draw_bar_of_shades(canvas: "Canvas", figure: FigureDefinition) -> None:
-    """Draw the bar that explains the shades beside the panels, if there are any."""
+    """Draw the colour bar of the shades beside the panels, if there are any."""
     from matplotlib.ticker import MaxNLocator
 
     drawn = [each for axes in canvas.axes for each in axes.collections if each.get_array() is not None]

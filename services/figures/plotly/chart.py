@@ -284,7 +284,7 @@ def _points(points: Points) -> list[Trace]:
 
 
 def _polylines(lines: Polylines) -> list[Trace]:
-    """Return a trace for the lines of each shade, and points without place that bring the bar of shades."""
+    """Return a trace for the lines of each shade, and an empty trace that shows the colour bar."""
     least, most = min(lines.shades, default=0.0), max(lines.shades, default=0.0)
     found = []
     for shade in sorted(set(lines.shades)):

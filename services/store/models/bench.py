@@ -18,13 +18,13 @@ class RequestRow(Base):
     Attributes:
         place: place of the measurement's step in the log of the repetition.
         bench: name of the physical robot.
-        held: what the spellings of the bench share, until the holder has let go, also if the request is wanted no more;
+        held: what the spellings of the bench share, until its holder ends the take, also if the request is withdrawn;
             else NULL. It is unique, so a bench has one holder at a time.
         takes: number of the latest take; it fences the answer of an earlier one.
         unanswered: takes in a row that ended without an answer.
         taken_until: time at which the take ends unless a heartbeat extends it, to be shown; it changes with each one.
         lease_s: seconds that a heartbeat extends it by.
-        safety: what the believed simulators expect of the controller.
+        safety: what the latest tuned simulators expect of the controller.
         branch: number of the closed branch that it belongs to; NULL if it belongs to none.
         same_as: id of an earlier request with the same controller, whose answer is this one's too; NULL if none.
     """

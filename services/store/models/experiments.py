@@ -95,7 +95,7 @@ class ExperimentRow(Base):
 
     @property
     def tunes(self) -> bool:
-        """Whether it has samples to tune on: it takes some, beside iteration 0, or has some from before."""
+        """Whether it has samples to tune on: it takes some, besides iteration 0, or has some from before."""
         return self.iterations > 1 or self.known > 0
 
     @property

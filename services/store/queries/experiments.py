@@ -51,7 +51,7 @@ class Extent:
 
 @dataclass(frozen=True)
 class Members:
-    """What an id means: all experiments of a study, or one of them alone.
+    """The experiments that an id names: all of a study, or one of them alone.
 
     Attributes:
         study: their study.
@@ -142,7 +142,7 @@ def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
 
 
 def members(session: Session, id_: str) -> Members:
-    """Return what an id means: the experiments of a study, or one of them; the only one stands for its study.
+    """Return the experiments that an id names: those of a study, or one of them; the only one stands for its study.
 
     Raises:
         NotFound: there is neither.
@@ -173,8 +173,8 @@ def whole(session: Session, id_: str) -> Members:
     """
     found = members(session, id_)
     if found.one is not None:
-        msg = f"{id_!r} is one experiment of the study {found.study.id!r} ({found.study.name}), and this is about all"
-        raise Conflict(f"{msg} of it: use the id of the study")
+        msg = f"{id_!r} is one experiment of the study {found.study.id!r} ({found.study.name})"
+        raise Conflict(f"{msg}, and this request is about all of it: use the id of the study")
     return found
 
 

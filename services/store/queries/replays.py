@@ -19,7 +19,7 @@ class TunedSample:
 
     Attributes:
         fitness: fitness in reality; None if the measurement failed.
-        before: None of a sample from before the experiment, which is one of iteration 0.
+        before: None for a sample from before the experiment, which is one of iteration 0.
     """
 
     repetition: int

@@ -25,10 +25,10 @@ from gaplab.services.store.queries.logs import vector
 from gaplab.services.store.statements import storable
 
 PENDING = (RequestState.OPEN, RequestState.TAKEN, RequestState.STUCK)
-"""States of a request that is still wanted."""
+"""States of a request that is still needed."""
 
 LET_GO_S = 60.0
-"""Longest time for which a silent holder keeps the bench of a request that is wanted no more."""
+"""Longest time for which a silent holder keeps the bench of a request that is no longer needed."""
 
 ANSWERED = (RequestState.MEASURED, RequestState.FAILED)
 
@@ -76,7 +76,7 @@ def judge(session: Session, row: AnswerRow, to: AnswerState, reason: str) -> Non
 
 
 def withdraw(session: Session, which: ColumnElement[bool]) -> None:
-    """Withdraw the requests of a condition that are still wanted; its holder has the bench until he lets go."""
+    """Withdraw the still needed requests that meet a condition; a holder keeps the bench until the take ends."""
     row = RequestRow
     values = {"ended_at": now(), "lease_s": case((row.lease_s > LET_GO_S, LET_GO_S), else_=row.lease_s)}
     session.execute(update(row).where(which, row.state.in_(PENDING)).values(state=RequestState.WITHDRAWN, **values))
@@ -197,7 +197,7 @@ def get_answer(session: Session, id_: str) -> AnswerRow:
 
 
 def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
-    """End the take of a request that got no answer; `more` is told in its event, if it is still wanted."""
+    """End the take of a request that got no answer; `more` is added to its event, if it is still needed."""
     if row.state is not RequestState.TAKEN:
         row.held = None
         return
@@ -208,7 +208,7 @@ def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> 
 
 
 def note_take(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:
-    """Add the event of a take; `more` is told in it."""
+    """Add the event of a take; `more` is added to it."""
     repetition = session.get_one(RepetitionRow, row.repetition_id)
     body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by, **more}
     note(session, kind, repetition.experiment_id, repetition.number, **body)
@@ -246,7 +246,7 @@ def doubtful(session: Session, experiments: Sequence[str]) -> dict[str, tuple[st
 
 
 def bench_key(bench: str) -> str:
-    """Return what the spellings of a bench share."""
+    """Return the name of a bench without case and surplus spaces, which all its spellings share."""
     return " ".join(storable(bench).split()).casefold()[:200]
 
 

@@ -18,7 +18,7 @@ KNOWN_SWING = 0.5
 
 
 class MlpOptions(Frozen):
-    """Options of `mlp`."""
+    """Options of the controller `mlp`."""
 
     senses: Senses = Field(
         default=("angles", "tilt", "turning"),

@@ -19,7 +19,7 @@ QUARTER = 0.25
 
 
 class SineOptions(Frozen):
-    """Options of `sine`."""
+    """Options of the controller `sine`."""
 
     slowest_hz: Annotated[Real, Field(gt=0, le=50)] = Field(default=0.5, description="frequency at gene value 0")
     fastest_hz: Annotated[Real, Field(gt=0, le=50)] = Field(
@@ -71,7 +71,7 @@ INTEGRATED_S = 0.005
 
 
 class CpgOptions(Frozen):
-    """Options of `cpg`."""
+    """Options of the controller `cpg`."""
 
     gait: Literal["free", "trot", "pace", "bound", "walk"] = Field(
         default="free",

@@ -29,7 +29,7 @@ NEGATIVE_SIGN, PLAIN_RULE, RATE_OF_A_THIRD = 0.25, 0.125, 0.375
 
 
 class PlasticOptions(Frozen):
-    """Options of `plastic`."""
+    """Options of the controller `plastic`."""
 
     base: Literal["pulses", "none"] = Field(
         default="pulses",
@@ -40,7 +40,7 @@ class PlasticOptions(Frozen):
         description="groups of observations, separated by commas: angles, speeds, tilt, turning, contacts",
     )
     hidden: Annotated[int, Field(strict=True, ge=0, le=256)] = Field(
-        default=0, description="neurons beside those of the actuators, one for each"
+        default=0, description="neurons besides those of the actuators, one for each"
     )
     gain: Annotated[Real, Field(gt=0, le=10)] = Field(
         default=0.5, description="farthest target of the network alone, as a factor of each joint's usual swing"

@@ -27,7 +27,7 @@ MOST_TARGETS = 10_000_000
 
 
 class SquarePulsesOptions(Frozen):
-    """Options of `square_pulses`."""
+    """Options of the controller `square_pulses`."""
 
     period_s: Annotated[Real, Field(ge=0.001, le=60)] = Field(default=0.5, description="period of all pulses")
     amplitude: Annotated[Real, Field(gt=0, le=10)] = Field(
@@ -131,7 +131,7 @@ LEAST_UPRIGHT = 0.9
 
 
 class AnticipatingOptions(Frozen):
-    """Options of `anticipating`."""
+    """Options of the controller `anticipating`."""
 
     gain: Annotated[Real, Field(ge=0, le=10)] = Field(
         default=0.5, description="share of the error of each angle that is added to its target; gaplab's default"

@@ -116,12 +116,12 @@ class Robot(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return what the catalogue tells of the robot."""
+        """Return the engine and the details of the robot, for the catalogue."""
         return {"engine": cls.engine, **cls.told(cls.example())}
 
     @staticmethod
     def told(robot: "Robot") -> dict[str, Any]:
-        """Return what the catalogue tells of a robot, but for its engine."""
+        """Return the details of a robot for the catalogue, except its engine."""
         return {
             "controller": _as_json(robot.usual_controller),
             "task": _as_json(robot.usual_task),

@@ -26,7 +26,7 @@ AMPLITUDES_RAD = (0.63, 0.42, 0.49)
 
 PERIOD_S = 0.5
 SETTLING_S = 0.5
-"""Time before the counted time: the robot drops to the ground and starts its gait."""
+"""Time before fitness counts: the robot drops to the ground and starts its gait."""
 
 COUNTED_S = 2.5
 
@@ -40,11 +40,11 @@ LEGS: dict[str, tuple[int, int]] = {
 
 
 class QuadrupedOptions(Frozen):
-    """Options of the quadruped."""
+    """Options of the robot `quadruped`."""
 
     counted_s: Annotated[Real, Field(gt=0, le=600)] = Field(
         default=COUNTED_S,
-        description="counted seconds of its usual task, after the robot has settled; a spec with a task says so there",
+        description="seconds in which its usual task rates it, after settling; a spec with a task sets them there",
     )
 
 
@@ -53,8 +53,8 @@ class Quadruped(Robot):
 
     Gene 2i is the phase of actuator i, and gene 2i + 1 the width of its pulse, both in [0, 1]; phases wrap around. The
     actuators are leg by leg, front left, front right, rear left, rear right; positive is forwards for a yaw, upwards
-    for a roll, outwards for a knee. Fitness is the distance over ground in any direction, divided by the counted
-    time. This is a reconstruction: the publication that describes the paper's robot could not be found.
+    for a roll, outwards for a knee. Fitness is the distance over ground in any direction, divided by `counted_s`.
+    This is a reconstruction: the publication that describes the paper's robot could not be found.
     """
 
     name = "quadruped"
@@ -65,7 +65,7 @@ class Quadruped(Robot):
     usual_controller = PluginRef(name="square_pulses", options={"period_s": PERIOD_S})
 
     def build(self) -> None:
-        """Set the world, and a task of the counted time."""
+        """Set the world, and the task `walk` with the option `counted_s`."""
         self.world, self.designed = _world(), {"square_pulses": _trot()}
         timing = {"settling_s": SETTLING_S, "counted_s": self.options.counted_s}
         self.usual_task = PluginRef(name="walk", options=timing)

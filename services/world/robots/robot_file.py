@@ -68,7 +68,7 @@ def _pattern(name: str) -> str:
 
 
 class ImportedOptions(Frozen):
-    """Options of `robot_file`."""
+    """Options of the robot `robot_file`."""
 
     sha256: str = Field(default="", max_length=64, description="hash of the robot file")
     name: str = Field(default="", max_length=60, description="name of the robot, for people")

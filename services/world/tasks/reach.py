@@ -24,16 +24,16 @@ Metres = Annotated[Real, Field(ge=-100, le=100)]
 
 
 class ReachOptions(Frozen):
-    """Options of `reach`."""
+    """Options of the task `reach`."""
 
     x_m: Metres = Field(default=0.3, description="target, along x from the origin of the world")
     y_m: Metres = Field(default=0.2, description="target, along y")
     z_m: Metres = Field(default=0.5, description="target, above the ground")
     settling_s: Annotated[Real, Field(ge=0, le=600)] = Field(
-        default=1.0, description="seconds before the counted time, in which the robot may approach the target"
+        default=1.0, description="seconds before fitness counts, in which the robot may approach the target"
     )
     counted_s: Annotated[Real, Field(gt=0, le=600)] = Field(
-        default=1.0, description="counted seconds; the cost of a rollout grows with it"
+        default=1.0, description="seconds in which fitness counts; the cost of a rollout grows with it"
     )
     measure: Literal["distance", "reduction"] = Field(
         default="distance",
@@ -42,7 +42,7 @@ class ReachOptions(Frozen):
 
 
 class Reach(Task):
-    """Minus the mean distance of the observed body from a target place, over the counted time.
+    """Minus the mean distance of the observed body from a target place, during `counted_s` after `settling_s`.
 
     Name the body in the robot, as its observed one, such as the last link of an arm. Distances are those of its frame.
     The sensors are the place of the body.

@@ -19,13 +19,13 @@ TILT_NOISE_RAD, PLACE_NOISE_M = 0.02, 0.005
 
 
 class WalkOptions(Frozen):
-    """Options of `walk`."""
+    """Options of the task `walk`."""
 
     settling_s: Annotated[Real, Field(ge=0, le=600)] = Field(
-        default=0.5, description="seconds before the counted time: the robot drops to the ground and starts its gait"
+        default=0.5, description="seconds before fitness counts: the robot drops to the ground and starts its gait"
     )
     counted_s: Annotated[Real, Field(gt=0, le=600)] = Field(
-        default=2.5, description="counted seconds, after the robot has settled; the cost of a rollout grows with it"
+        default=2.5, description="seconds in which fitness counts, after settling; the cost of a rollout grows with it"
     )
     direction: Literal["any", "forward"] = Field(
         default="any", description="`any`: the distance over ground; `forward`: the distance along x"
@@ -33,7 +33,7 @@ class WalkOptions(Frozen):
 
 
 class Walk(Task):
-    """The distance over ground, divided by the counted time."""
+    """The distance over ground during `counted_s`, after `settling_s`, divided by that time."""
 
     name = "walk"
     source = "Paper, section 2"

@@ -80,7 +80,7 @@ def matching(pattern: str, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def lacking(kind: str, pattern: str, names: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
-    """Return that no name matches a pattern, as a sentence, and the names; None if one does."""
+    """Return a sentence if no name matches a pattern, and the permitted names; None if one does."""
     if matching(pattern, names):
         return None
     nearest = get_close_matches(pattern, names, n=1, cutoff=0.5)
@@ -135,7 +135,7 @@ class MaterialTunable(Tunable):
         return replace(material, **change)
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
-        """Return that the robot has no such surface."""
+        """Return, if the robot has no such surface, a sentence and the permitted names."""
         return lacking("surface", self.options.of, [name for name, _ in world.surfaces]) if self.options.of else None
 
 
@@ -168,7 +168,7 @@ class Limits(NamedTuple):
 
 
 class Grouped(Tunable):
-    """A number of each member of a group.
+    """A physical quantity, here *the number*, of each member of a group, such as the mass of bodies.
 
     Attributes:
         kind: what has the number, for errors.
@@ -222,7 +222,7 @@ class Grouped(Tunable):
         return self.lower, max(self.upper, 2 * max(self.number(member) for member in self._group(world)))
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
-        """Return that the robot has nothing of this name."""
+        """Return, if the robot has nothing of this name, a sentence and the permitted names."""
         return lacking(self.kind, self.options.of, [each.name for each in self.members(world) if self.has(each)])
 
     def has(self, member: Any) -> bool:  # noqa: ANN401, ARG002 - a Body or a Joint
@@ -252,7 +252,7 @@ class Grouped(Tunable):
 
 
 class BodyTunable(Grouped):
-    """A number of bodies."""
+    """A number of bodies, such as their mass."""
 
     kind = "body"
 
@@ -274,11 +274,11 @@ class JointTunable(Grouped):
         return world.joints
 
     def number(self, member: Joint) -> float:
-        """Return the number of a joint."""
+        """Return the attribute of a joint."""
         return float(getattr(member, self._attribute))
 
     def with_number(self, member: Joint, number: float) -> Joint:
-        """Return a joint with another number."""
+        """Return a joint with another value of the attribute."""
         changes: dict[str, Any] = {self._attribute: number}
         return replace(member, **changes)
 
@@ -307,11 +307,11 @@ class MotorTunable(JointTunable):
         return hasattr(motor, self._attribute) and follows in self.follows
 
     def number(self, member: Joint) -> float:
-        """Return the number of a joint's motor."""
+        """Return the attribute of a joint's motor."""
         return float(getattr(member.motor, self._attribute))
 
     def with_number(self, member: Joint, number: float) -> Joint:
-        """Return a joint whose motor has another number."""
+        """Return a joint whose motor has another value of the attribute."""
         assert member.motor is not None
         changes: dict[str, Any] = {self._attribute: number}
         return replace(member, motor=replace(member.motor, **changes))

@@ -68,7 +68,7 @@ class Mass(BodyTunable):
 
 
 class CenterOptions(Frozen):
-    """Options of `center_of_mass`."""
+    """Options of the tunable `center_of_mass`."""
 
     of: Pattern = Field(default="*", description=ALL)
     along: Literal["x", "y", "z"] = Field(default="x", description="axis of the body's frame")
@@ -110,7 +110,7 @@ class CenterOfMass(Tunable):
         return parted.edited(self.field, bodies=tuple(map(shifted, parted.bodies)))
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
-        """Return that the robot has no such body."""
+        """Return, if the robot has no such body, a sentence and the names of its bodies."""
         return lacking("body", self.options.of, [body.name for body in world.bodies])
 
 
@@ -129,7 +129,7 @@ def _parted(world: World, chosen: tuple[str, ...]) -> World:
 
 
 class LengthOptions(Frozen):
-    """Options of `length_scale`."""
+    """Options of the tunable `length_scale`."""
 
     of: Pattern = Field(default="*", description=ALL)
     what: Literal["all", "places", "shapes"] = Field(
@@ -175,7 +175,7 @@ class LengthScale(Tunable):
         return replace(edited, start_height_m=world.start_height_m + lowest_m(world, turn) - lowest_m(edited, turn))
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
-        """Return that the robot has no such body."""
+        """Return, if the robot has no such body, a sentence and the names of its bodies."""
         return lacking("body", self.options.of, [body.name for body in world.bodies])
 
     def _scaled(self, body: Body, factor: float) -> Body:

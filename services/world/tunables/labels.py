@@ -17,7 +17,7 @@ NUMBER = re.compile(r"-?\d+(\.\d*)?([eE][-+]?\d+)?")
 
 
 def plain_name(label: str) -> str:
-    """Return the name of the plug-in that a label names."""
+    """Return the name in a label, like `mass` in `mass(trunk)`."""
     return label.partition("(")[0].strip()
 
 

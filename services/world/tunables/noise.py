@@ -21,7 +21,7 @@ UNITS = {
 
 
 class NoiseOptions(Frozen):
-    """Options of `noise`."""
+    """Options of the tunable `noise`."""
 
     of: Literal["target", "angle_rad", "speed_rad_s", "tilt", "turning_rad_s", "start_tilt_rad"] = Field(
         default="target",
@@ -57,7 +57,7 @@ class NoiseDeviation(Tunable):
         return world.edited(self.field, noise=replace(world.noise, **changes))
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
-        """Return that a base that never moves cannot be tilted."""
+        """Return, if the base never moves, so that it cannot be tilted, a sentence and the other options."""
         if world.fixed and self.options.of == "start_tilt_rad":
             return "the base of the robot never moves, so its start has no tilt", tuple(UNITS)[:-1]
         return None

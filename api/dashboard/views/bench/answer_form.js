@@ -98,7 +98,7 @@ function make(request, view) {
     doubt, h("button", { type: "submit", class: "big" }, repeats === 1 ? "Send the value" : `Send ${repeats} values`),
     h("details", { open: Boolean(draft.failed) }, h("summary", {}, "It failed…"),
       h("p", { class: "field" }, h("label", { for: "failed" }, "Why?"), why,
-        h("small", {}, "The controller counts as tried and teaches nothing. If the measurement itself was wrong, measure again instead.")),
+        h("small", {}, "The controller counts as tried, but simulators are not tuned on it. If the measurement itself was wrong, measure again instead.")),
       trouble, h("button", { type: "button", class: "quiet", onclick: fail }, "Send that it failed")));
 }
 

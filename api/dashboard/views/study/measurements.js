@@ -23,7 +23,7 @@ export const BENCH_KINDS = ["requested", "refused", "taken", "released", "take_e
 const HISTORY = { counted: "counts", conflict: "in conflict", replaced: "replaced", void: "void", dismissed: "dismissed" };
 
 /** @type {Record<string, string>} */
-const ENDED = { failed: "✕ failed", withdrawn: "– wanted no more", measured: "✓ measured" };
+const ENDED = { failed: "✕ failed", withdrawn: "– no longer needed", measured: "✓ measured" };
 
 /** Return the table, with its filter above and the way to its other pages below. @param {Page.StudyPage} page */
 export function measurements(page) {
