@@ -15,12 +15,8 @@ from gaplab.api.http.limits import SPARE, BodyLimit, RequestLimit, Streams, most
 from gaplab.api.http.metrics import Metrics, RequestCounter
 from gaplab.api.http.security_headers import SecurityHeaders
 from gaplab.api.routes import (
-    archives,
-    attachments,
     bench,
     catalogue,
-    comparisons,
-    corrections,
     curves,
     dashboard,
     events,
@@ -28,15 +24,9 @@ from gaplab.api.routes import (
     figures,
     health,
     keeping,
-    lifecycle,
-    replay_figures,
     replays,
     reports,
-    robots,
-    samples,
-    sensitivity,
     studies,
-    views,
 )
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.settings import Limits, Notify, Settings
@@ -69,30 +59,12 @@ TAGS = [
     {"name": "health", "description": "for monitoring the service"},
 ]
 
-MODULES = (
-    studies,
-    experiments,
-    lifecycle,
-    bench,
-    corrections,
-    attachments,
-    samples,
-    keeping,
-    views,
-    events,
-    curves,
-    comparisons,
-    figures,
-    replay_figures,
-    reports,
-    archives,
-    replays,
-    sensitivity,
-    catalogue,
-    robots,
-    health,
+ROUTERS = (
+    *(studies.router, experiments.router, bench.router, keeping.router, keeping.view_router, events.router),
+    *(curves.router, figures.router, reports.router, keeping.archive_router, replays.router),
+    *(experiments.check_router, catalogue.router, health.router),
 )
-"""The modules of the API, in the order of the documentation."""
+"""The parts of the API, in the order of the documentation."""
 
 
 def create_app(
@@ -100,11 +72,7 @@ def create_app(
 ) -> FastAPI:
     """Return the application over a database, which it neither migrates nor closes; it needs no Ray.
 
-    Args:
-        store: the database.
-        settings: settings of the service; None for a program that calls the app directly.
-        limits: left out: the defaults.
-        notify: settings of notifications; left out: none.
+    A program that calls the app directly leaves out the settings.
     """
     app = FastAPI(
         title="gaplab",
@@ -131,8 +99,8 @@ def create_app(
     app.add_middleware(SecurityHeaders)
     app.add_middleware(RequestCounter, metrics=app.state.metrics)
     problems.install(app)
-    for module in MODULES:
-        app.include_router(module.router, dependencies=[Depends(take_place)])
+    for router in ROUTERS:
+        app.include_router(router, dependencies=[Depends(take_place)])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

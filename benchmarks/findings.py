@@ -16,7 +16,6 @@ from rich.console import Console
 from rich.table import Table
 
 from gaplab import migrations
-from gaplab.api.commands.tables import curves
 from gaplab.schemas.archives import ImportRead
 from gaplab.services.archives import import_archive
 from gaplab.services.core.arrays import FloatArray
@@ -24,6 +23,7 @@ from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.results.comparisons import compare
+from gaplab.services.results.curves import curves
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries import experiments, tunings

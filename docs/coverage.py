@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from rich.console import Console
 
+from gaplab.schemas.misfit import Identification
 from gaplab.schemas.plugin import PluginRef
-from gaplab.schemas.results import Identification
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.discrepancies.readings import Readings

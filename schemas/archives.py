@@ -21,7 +21,7 @@ class ImportRead(Frozen):
         examples=[{"kx3t9vbm2q": "01f2e3d4c5"}],
     )
     called_off: tuple[str, ...] = Field(
-        default=(), description="ids of experiments that had not ended: they are CANCELLED here, and never run"
+        (), description="ids of experiments that had not ended: they are CANCELLED here, and never run"
     )
 
 
@@ -38,11 +38,9 @@ class RepetitionRerun(Frozen):
     steps: int = Field(description="steps with the same bits, up to the first that differs")
     stored_steps: int = Field(description="steps in the archive")
     code: str | None = Field(
-        default=None,
-        description="processor's code that gives these bits, if it is not the usual one",
-        examples=["AVX-512"],
+        None, description="processor's code that gives these bits, if it is not the usual one", examples=["AVX-512"]
     )
-    reason: str | None = Field(default=None, description="first difference, or why it was not computed")
+    reason: str | None = Field(None, description="first difference, or why it was not computed")
 
 
 class RerunRead(Frozen):

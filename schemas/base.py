@@ -44,11 +44,17 @@ Real = Annotated[float, Field(strict=True)]
 Seed = Annotated[int, Field(strict=True, ge=0, lt=SEED_LIMIT)]
 """A seed: a whole number of 64 bits."""
 
+Repetitions = Annotated[Count, Field(le=10_000)]
+"""A number of repetitions."""
+
 Priority = Annotated[int, Field(strict=True, ge=-10, le=10)]
 """A priority: a whole number; higher is computed first."""
 
 Label = Annotated[str, Field(min_length=1, max_length=200)]
 """A name that a person gives to a study or an experiment."""
+
+Reason = Annotated[str, Field(min_length=1, max_length=2_000)]
+"""Why a person does something, or why there is nothing."""
 
 TAG_PATTERN = r"^[^\W_][\w.:/+-]*$"
 

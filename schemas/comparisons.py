@@ -1,4 +1,4 @@
-"""Experiments, compared: tests, intervals, equivalence within a margin, columns of tables, and verdicts."""
+"""Two experiments, compared: tests, intervals, and equivalence within a margin; and the columns of a table of pairs."""
 
 from collections.abc import Sequence
 from enum import StrEnum
@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Id, Name, Statistic, Unit
-from gaplab.schemas.results import Fitness
+from gaplab.schemas.curves import Fitness
 
 
 class Found(StrEnum):
@@ -25,16 +25,14 @@ class Found(StrEnum):
 class PValue(Frozen):
     """A p-value, and what it says of a pair."""
 
-    p: Statistic = Field(default=None, description="two-sided p-value, uncorrected; null if undefined")
-    p_holm: Statistic = Field(default=None, description="p-value with Holm's correction over all pairs")
+    p: Statistic = Field(None, description="two-sided p-value, uncorrected; null if undefined")
+    p_holm: Statistic = Field(None, description="p-value with Holm's correction over all pairs")
     found: Found = Field(
-        default=Found.UNDEFINED,
+        Found.UNDEFINED,
         description="what it says of the first of the pair: its mean is higher or lower, or its spread wider or "
         "narrower, if p_holm is below 0.05",
     )
-    text: str = Field(
-        default="", description="p with Holm's correction, and the uncorrected p", examples=["0.012 (raw 0.004)"]
-    )
+    text: str = Field("", description="p with Holm's correction, and the uncorrected p", examples=["0.012 (raw 0.004)"])
 
     @property
     def differs(self) -> bool:
@@ -60,14 +58,14 @@ class Estimate(Frozen):
     value: Statistic = None
     lower: Statistic = None
     upper: Statistic = None
-    text: str = Field(default="", description="the number with its interval", examples=["0.71 [0.62, 0.8]"])
+    text: str = Field("", description="the number with its interval", examples=["0.71 [0.62, 0.8]"])
 
 
 class Summary(Frozen):
     """The values of one experiment, one for each repetition."""
 
     n: int
-    sd: Statistic = Field(default=None, description="sample standard deviation")
+    sd: Statistic = Field(None, description="sample standard deviation")
     mean: Estimate
     interquartile_mean: Estimate = Field(description="mean of the middle half of the values, robust to outliers")
 
@@ -78,7 +76,7 @@ class Groups(Frozen):
     n_first: int
     n_second: int
     sizes: str = Field(
-        default="",
+        "",
         description="how many values the difference is of: of the pairs where streams are shared, else of each group",
         examples=["8, 8"],
     )
@@ -87,10 +85,8 @@ class Groups(Frozen):
         description="Cohen's d: the difference divided by the pooled standard deviation; where streams are shared, "
         "over the repetitions that both have"
     )
-    difference_text: str = Field(
-        default="", description="the difference with its interval", examples=["+0.12 [0.05, 0.19]"]
-    )
-    effect_size_text: str = Field(default="", examples=["+0.52"])
+    difference_text: str = Field("", description="the difference with its interval", examples=["+0.12 [0.05, 0.19]"])
+    effect_size_text: str = Field("", examples=["+0.52"])
     student: Test = Field(description="Student's t-test, which the paper uses")
     welch: Test
     mann_whitney: Test
@@ -127,8 +123,8 @@ class Equivalence(Frozen):
 
     margin: float = Field(description="margin in the unit of fitness", examples=[0.03])
     test: Literal["welch", "paired_t"]
-    p: Statistic = Field(default=None, description="the larger p of the two tests, uncorrected")
-    p_holm: Statistic = Field(default=None, description="p-value with Holm's correction over all pairs")
+    p: Statistic = Field(None, description="the larger p of the two tests, uncorrected")
+    p_holm: Statistic = Field(None, description="p-value with Holm's correction over all pairs")
     verdict: EquivalenceVerdict = Field(
         description="equivalent: this p_holm is below 0.05, even where the pair differs by less than the margin; "
         "different: the trusted test's p_holm is; undecided: neither"
@@ -155,25 +151,25 @@ class Comparison(Groups, Pair):
     """
 
     fitness: Fitness = Fitness.RECORDED
-    unit: Unit = Field(default="", description="unit of fitness", examples=["m/s"])
-    where: str = Field(default="", description="the range in words", examples=["after 5 real-world evaluations"])
+    unit: Unit = Field("", description="of fitness", examples=["m/s"])
+    where: str = Field("", description="these numbers", examples=["after 5 real-world evaluations"])
     shared_evaluations: int = Field(
-        default=0, description="last number of real-world evaluations that all compared experiments share"
+        0, description="last number of real-world evaluations that all compared experiments share"
     )
     difference: Statistic = Field(
         description="difference of the means; where streams are shared, over the repetitions that both have"
     )
     caution: str | None = Field(
-        default=None,
+        None,
         description="why not to trust the unpaired tests; null if they can be trusted",
         examples=["both draw the random numbers of seed 0 and the strategy simulated_fit …"],
     )
     lower: Statistic = Field(
-        default=None, description="lower end of the 90 % interval of the difference; paired if the streams are shared"
+        None, description="lower end of the 90 % interval of the difference; paired if the streams are shared"
     )
-    upper: Statistic = Field(default=None, description="upper end of that interval")
+    upper: Statistic = Field(None, description="upper end of that interval")
     warnings: tuple[str, ...] = Field(
-        default=(),
+        (),
         description="what differs besides the strategy, so that fitness says little of it: robot, task or reality",
         examples=[["different robots (quadruped; toy_function): their fitness does not mean the same"]],
     )
@@ -193,10 +189,8 @@ class Comparison(Groups, Pair):
     brown_forsythe: Test = Field(description="test of equal spread: Levene's with the median")
     summary_first: Summary
     summary_second: Summary
-    equivalence: Equivalence | None = Field(default=None, description="null without a margin")
-    pooled: Pooled | None = Field(
-        default=None, description="the paper's tests over the same range; null at a single number"
-    )
+    equivalence: Equivalence | None = Field(None, description="null without a margin")
+    pooled: Pooled | None = Field(None, description="the paper's tests over the same range; null at a single number")
 
     @property
     def differs(self) -> bool:
@@ -266,45 +260,3 @@ def _value(pair: Comparison, path: str) -> object:
     for name in path.split("."):
         value = None if value is None else getattr(value, name)
     return value
-
-
-class Trend(StrEnum):
-    """The end of a curve; `too_few`: too few repetitions or evaluations to say."""
-
-    RISING = "rising"
-    FLAT = "flat"
-    FALLING = "falling"
-    UNCLEAR = "unclear"
-    TOO_FEW = "too_few"
-
-
-class TrendRead(Frozen):
-    """The end of one curve, by the paired gain of its repetitions."""
-
-    experiment: Id
-    name: Name
-    trend: Trend
-    n: int = Field(description="repetitions with a value at both ends of the gain", examples=[20])
-    since: int | None = Field(description="number of evaluations at which the gain begins", examples=[3])
-    last: int = Field(description="number of evaluations at which the gain ends", examples=[10])
-    gain: Statistic = Field(description="mean gain in recorded fitness between the two")
-    lower: Statistic = Field(description="lower end of its 95 % interval, by Student's t")
-    upper: Statistic = Field(description="upper end of that interval")
-    continuing: bool | None = Field(description="whether continuing is worthwhile; null: the data do not say")
-    sentence: str = Field(examples=["Random is flat since iteration 3; not worth continuing."])
-
-
-class VerdictRead(Frozen):
-    """The verdict, computed by stated rules from curves and tests."""
-
-    headline: str = Field(examples=["No pair differs at 10 real-world evaluations."])
-    sentences: tuple[str, ...] = Field(examples=[("Simulated fit reaches 94 % of the direct baseline.",)])
-    trends: tuple[TrendRead, ...]
-    evaluations: int | None = Field(
-        description="last number of real-world evaluations that the experiments share; strategies are compared there; "
-        "null without results",
-        examples=[10],
-    )
-    rules: tuple[str, ...] = Field(
-        description="the rules of the verdict", examples=[("A pair differs if its p after Holm is below 0.05.",)]
-    )

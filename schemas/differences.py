@@ -41,12 +41,12 @@ class SpecDiff(Frozen):
     equal: int = Field(description="number of the other settings", examples=[31])
     note: str = Field(description="that number in a sentence", examples=["31 other settings are equal."])
     warnings: tuple[str, ...] = Field(
-        default=(),
+        (),
         description="why experiments of the service should not be compared: other robots, tasks or realities",
         examples=[("different robots (quadruped; toy_function): their fitness does not mean the same",)],
     )
     hidden: tuple[str, ...] = Field(
-        default=(),
+        (),
         description="pointers of parameters of reality that are still hidden in a column, so they cannot be compared",
         examples=[("/reality/parameters/restitution",)],
     )

@@ -28,7 +28,7 @@ class ExperimentCost(Frozen):
     rollouts: int = Field(
         description="upper bound over all repetitions; rollouts that cannot change a number are saved"
     )
-    runs: int = Field(default=0, description="runs of the physical robot, with probes and repeats; 0: it is simulated")
+    runs: int = Field(0, description="runs of the physical robot, with probes and repeats; 0: it is simulated")
     core_seconds: float = Field(examples=[166_400.0])
 
 
@@ -45,5 +45,5 @@ class EstimateRead(Frozen):
     seconds: float = Field(description="expected duration if nothing else is waiting", examples=[10_400.0])
     supervisors: int = Field(description="supervisors that run now; with 0, nothing starts")
     specs: tuple[dict[str, Any], ...] = Field(
-        default=(), description="spec of each experiment with every field, as it would be stored"
+        (), description="spec of each experiment with every field, as it would be stored"
     )

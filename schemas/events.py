@@ -71,15 +71,13 @@ class EventRead(Frozen):
     number: int = Field(description="number of the event, from 1 without gaps; a reader resumes after it")
     kind: EventKind
     experiment: Id
-    study: Id | None = Field(default=None, description="id of its study")
-    repetition: int | None = Field(
-        default=None, description="number of the repetition; null for an event of the experiment"
-    )
+    study: Id | None = Field(None, description="id of its study")
+    repetition: int | None = Field(None, description="number of the repetition; null for an event of the experiment")
     body: dict[str, Any] = Field(
         description="details, such as iteration, fitness or reason", examples=[{"iteration": 1, "fitness": 1.31}]
     )
     at: Moment
-    sentence: str = Field(default="", examples=["Repetition 0, iteration 1: measured in reality, 1.31"])
+    sentence: str = Field("", examples=["Repetition 0, iteration 1: measured in reality, 1.31"])
 
 
 class EventPage(Frozen):

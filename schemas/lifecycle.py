@@ -39,7 +39,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Count, Examples, Frozen, Priority
+from gaplab.schemas.base import Count, Examples, Frozen, Priority, Repetitions
 
 
 class State(StrEnum):
@@ -127,11 +127,9 @@ class ExtensionSpec(Frozen):
     }
 
     iterations: Annotated[Count, Field(le=1_000)] | None = Field(
-        default=None, description="total real-world evaluations of each repetition; iteration 0 does not count"
+        None, description="total real-world evaluations of each repetition; iteration 0 does not count"
     )
-    repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
-        default=None, description="total number of repetitions"
-    )
+    repetitions: Repetitions | None = Field(None, description="total number of repetitions")
 
 
 class ScheduleChange(Frozen):
@@ -142,4 +140,4 @@ class ScheduleChange(Frozen):
     }
 
     priority: Priority = 0
-    max_parallel: Annotated[Count, Field(le=10_000)] | None = None
+    max_parallel: Repetitions | None = None

@@ -10,10 +10,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Real, RobotName, Statistic, Unit
+from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Real, Reason, RobotName, Statistic, Unit
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind
-from gaplab.schemas.safety import Safety as Safety
 from gaplab.schemas.traces import AttachmentRead as AttachmentRead
 from gaplab.schemas.traces import Hash, Lags, TraceRead, Traces
 
@@ -31,7 +30,7 @@ class MeasuredValues(Frozen):
 
     values: Values = Field(description="fitness of each repeat, in the robot's unit")
     readings: tuple[Table, ...] | None = Field(
-        default=None,
+        None,
         max_length=MOST_VALUES,
         description="what the sensors said in each repeat: a row for each time, a column for each sensor, in its unit; "
         "null where a sensor failed",
@@ -49,7 +48,7 @@ class KnownSample(MeasuredValues):
     """A controller that was measured before the experiment; the first simulators are tuned on it."""
 
     genome: tuple[Real, ...] = Field(min_length=1, max_length=100_000, examples=[(0.12, 0.55, 0.83, 0.31)])
-    unit: Unit | None = Field(default=None, description="unit of the values, which must be the robot's; null: it is")
+    unit: Unit | None = Field(None, description="unit of the values, which must be the robot's; null: it is")
 
 
 class RequestState(StrEnum):
@@ -72,8 +71,7 @@ class TakeSpec(Frozen):
 
     operator: Label = Field(description="person or driver", examples=["Ada"])
     lease_s: Annotated[Real, Field(ge=1, le=86_400)] = Field(
-        default=600.0,
-        description="seconds without a heartbeat, by the clock of a supervisor, after which it is open again",
+        600.0, description="seconds without a heartbeat, by the clock of a supervisor, after which it is open again"
     )
 
 
@@ -89,9 +87,9 @@ class ReleaseSpec(HolderSpec):
     """A take to end without an answer; anyone but its holder gives a name and a reason."""
 
     operator: Label | None = None
-    reason: Annotated[str, Field(min_length=1, max_length=2_000)] | None = None
+    reason: Reason | None = None
     moved_s: Annotated[Real, Field(ge=0, le=1e9)] | None = Field(
-        default=None,
+        None,
         description="seconds, up to now, in which the robot may have moved for this take after its end: what others "
         "measured meanwhile is then doubtful",
     )
@@ -105,26 +103,25 @@ class MeasurementSpec(Frozen):
         "failed": {"summary": "Nothing to learn from", "value": {"take": 1, "failed": "a leg slipped off"}},
     }
 
-    take: int | None = Field(default=None, ge=1, description="number of the take; null: nobody took the request")
-    values: Values | None = Field(default=None, description="fitness of each repeat; null if the measurement failed")
-    readings: tuple[Table, ...] | None = Field(default=None, max_length=MOST_VALUES)
+    take: int | None = Field(None, ge=1, description="number of the take; null: nobody took the request")
+    values: Values | None = Field(None, description="fitness of each repeat; null if the measurement failed")
+    readings: tuple[Table, ...] | None = Field(None, max_length=MOST_VALUES)
     traces: Traces | None = Field(
-        default=None,
-        description="in place of values: a trace of each repeat, from which the robot's code computes them",
+        None, description="in place of values: a trace of each repeat, from which the robot's code computes them"
     )
     lags_s: Lags | None = None
-    unit: Unit | None = Field(default=None, description="unit of the values, which must be the robot's; null: it is")
-    failed: Annotated[str, Field(min_length=1, max_length=2_000)] | None = Field(
-        default=None, description="why there are no values: the controller counts as tried, but nothing is tuned on it"
+    unit: Unit | None = Field(None, description="unit of the values, which must be the robot's; null: it is")
+    failed: Reason | None = Field(
+        None, description="why there are no values: the controller counts as tried, but nothing is tuned on it"
     )
     operator: Label | None = Field(
-        default=None, description='default: who took the request; "unknown" if `take` is not its latest take'
+        None, description='default: who took the request; "unknown" if `take` is not its latest take'
     )
     note: Annotated[str, Field(max_length=20_000)] | None = None
     attachments: tuple[Hash, ...] = Field(
-        default=(), max_length=20, description="hashes of stored attachments: a trace, a photograph"
+        (), max_length=20, description="hashes of stored attachments: a trace, a photograph"
     )
-    confirmed: bool = Field(default=False, description="a person confirms that unlikely values are right")
+    confirmed: bool = Field(False, description="a person confirms that unlikely values are right")
 
     @model_validator(mode="after")
     def _check_that_it_is_one(self) -> "MeasurementSpec":
@@ -158,24 +155,69 @@ class AnswerRead(Frozen):
     id: Id
     request: Id
     state: AnswerState
-    values: tuple[float, ...] | None = Field(default=None, examples=[(0.41, 0.44, 0.4)])
-    fitness: Statistic = Field(default=None, description="mean of the values; null if the measurement failed")
-    readings: tuple[Table, ...] | None = Field(default=None, examples=[[[[0.02, None]]]])
-    failed: str | None = Field(default=None, examples=["a leg slipped off"])
+    values: tuple[float, ...] | None = Field(None, examples=[(0.41, 0.44, 0.4)])
+    fitness: Statistic = Field(None, description="mean of the values; null if the measurement failed")
+    readings: tuple[Table, ...] | None = Field(None, examples=[[[[0.02, None]]]])
+    failed: str | None = Field(None, examples=["a leg slipped off"])
     operator: str = Field(examples=["Ada"])
-    note: str | None = Field(default=None, examples=["on the new carpet"])
+    note: str | None = Field(None, examples=["on the new carpet"])
     attachments: tuple[str, ...] = ()
-    traces: tuple[TraceRead, ...] = Field(default=(), description="the traces that the values were computed from")
+    traces: tuple[TraceRead, ...] = Field((), description="the traces that the values were computed from")
     doubts: tuple[str, ...] = Field(
-        default=(),
+        (),
         description="what is unlikely about it, until a person confirms it: a decision that `this` counts",
         examples=[("31 is 1e+02 times the other repeats",)],
     )
-    replaces: Id | None = Field(default=None, description="the answer that it corrects")
-    reason: str | None = Field(
-        default=None, description="why it was corrected, voided or dismissed", examples=["4.4 was 0.44"]
-    )
+    replaces: Id | None = Field(None, description="the answer that it corrects")
+    reason: str | None = Field(None, description="why it was corrected, voided or dismissed", examples=["4.4 was 0.44"])
     at: Moment
+
+
+Beyond = Literal["warn", "refuse"]
+"""What happens to a controller that is expected to exceed a limit."""
+
+
+class LimitsSpec(Frozen):
+    """Limits of a physical robot; a missing one is not checked."""
+
+    joint_speed: Annotated[Real, Field(gt=0, examples=[12.0])] | None = Field(
+        None, description="greatest speed of a joint, rad/s"
+    )
+    torque: Annotated[Real, Field(gt=0, examples=[6.0])] | None = Field(
+        None, description="greatest torque of a joint, N·m; checked only if the engine tells torques"
+    )
+    tilt: Annotated[Real, Field(gt=0, examples=[0.8])] | None = Field(
+        None, description="greatest tilt of the base from upright, rad"
+    )
+    height: Annotated[Real, Field(examples=[0.08])] | None = Field(
+        None, description="least height of the base's frame above the ground, m"
+    )
+
+
+class Safety(Frozen):
+    """What tuned simulators expect of a controller; the worst of each.
+
+    Attributes:
+        simulators: number of simulators that were asked.
+        failed: number of them in which the physics failed.
+    """
+
+    simulators: int
+    failed: int
+    joint_speed: float | None = Field(None, description="greatest speed of a joint, rad/s", examples=[8.1])
+    torque: float | None = Field(None, description="greatest torque of a joint, N·m", examples=[6.5])
+    tilt: float | None = Field(None, description="greatest tilt of the base from upright, rad", examples=[0.18])
+    height: float | None = Field(None, description="least height of the base's frame, m", examples=[0.16])
+    clearance: float | None = Field(
+        None,
+        description="least height of the lowest point of the base's body, m; negative inside the ground",
+        examples=[0.12],
+    )
+    falls: int = Field(0, description="number of simulators in which it falls: it tilts by more than 90°")
+    fitness_low: Statistic = Field(None, description="least fitness")
+    fitness_high: Statistic = Field(None, description="greatest fitness")
+    beyond: tuple[str, ...] = Field((), description="limits of the spec that it exceeds, in words")
+    unknown: tuple[str, ...] = Field((), description="what could not be forecast, and why, in words")
 
 
 class RequestRead(Frozen):
@@ -196,100 +238,25 @@ class RequestRead(Frozen):
     state: RequestState
     takes: int = Field(description="number of the latest take; 0: it was never taken")
     unanswered: int = Field(description="takes in a row that ended without an answer")
-    taken_by: str | None = Field(default=None, examples=["Ada"])
-    taken_until: Moment | None = Field(default=None, description="about when the take ends without a heartbeat")
-    busy: bool = Field(default=False, description="whether another request of the same bench is taken")
+    taken_by: str | None = Field(None, examples=["Ada"])
+    taken_until: Moment | None = Field(None, description="about when the take ends without a heartbeat")
+    busy: bool = Field(False, description="whether another request of the same bench is taken")
     safety: Safety | None = None
     expected: tuple[str, ...] = Field(
-        default=(), description="`safety` in words", examples=[("3 simulators expect 0.3 to 0.5 m/s",)]
+        (), description="`safety` in words", examples=[("3 simulators expect 0.3 to 0.5 m/s",)]
     )
     between_repeats: str | None = Field(
-        default=None,
+        None,
         description="how the robot begins, and what to do between repeats; null: it has no body",
         examples=["Let it rest for 1 s."],
     )
     needs: str | None = Field(
-        default=None, description="what is needed besides values; null: nothing", examples=["Send a trace."]
+        None, description="what is needed besides values; null: nothing", examples=["Send a trace."]
     )
     same_as: Id | None = Field(
-        default=None, description="an earlier request for the same controller, whose answer is this one's too"
+        None, description="an earlier request for the same controller, whose answer is this one's too"
     )
-    branch: int | None = Field(default=None, description="number of the closed branch that it belongs to; null: none")
+    branch: int | None = Field(None, description="number of the closed branch that it belongs to; null: none")
     answers: tuple[AnswerRead, ...] = ()
     created_at: Moment
     ended_at: Moment | None = None
-
-
-_OPERATOR = "person who says so; the event names them"
-
-
-class Consequences(Frozen):
-    """What follows from a correction or a void."""
-
-    answer: Id | None = Field(default=None, description="id of the new answer; null for a dry run or a void")
-    request: Id = Field(description="id of the request that it answers")
-    repetition: int
-    iteration: int = Field(description="iteration from which the repetition goes on")
-    steps: int = Field(description="stored steps that followed, which close as a branch and are computed again")
-    branch: int | None = Field(default=None, description="number of the closed branch; null if nothing followed")
-    measurements: int = Field(description="measurements among these steps; they are reused if requested again")
-    words: str = Field(description="the same in a sentence", examples=["closes 4 steps; 1 measurement is reused"])
-
-
-class CorrectionSpec(Frozen):
-    """The right values in place of wrong ones."""
-
-    EXAMPLES: ClassVar[Examples] = {
-        "a wrong number": {
-            "summary": "A typing error",
-            "value": {"values": [0.41, 0.44, 0.4], "reason": "4.4 was 0.44"},
-        }
-    }
-
-    values: Values | None = None
-    readings: tuple[Table, ...] | None = Field(default=None, max_length=MOST_VALUES)
-    unit: Unit | None = None
-    failed: Annotated[str, Field(min_length=1, max_length=2_000)] | None = None
-    reason: Annotated[str, Field(min_length=1, max_length=2_000)] = Field(description="why it is corrected")
-    operator: Label | None = Field(default=None, description=_OPERATOR)
-
-    @model_validator(mode="after")
-    def _check_that_it_is_one(self) -> "CorrectionSpec":
-        if (self.values is None) == (self.failed is None):
-            raise ValueError("a correction has either `values` or the reason `failed`")
-        return self
-
-
-class VoidSpec(Frozen):
-    """Why a measurement is invalid; its controller is requested again."""
-
-    EXAMPLES: ClassVar[Examples] = {
-        "void": {"summary": "The floor was wet", "value": {"reason": "the floor was wet"}},
-    }
-
-    reason: Annotated[str, Field(min_length=1, max_length=2_000)]
-    operator: Label | None = Field(default=None, description=_OPERATOR)
-
-
-class ConflictSpec(Frozen):
-    """Which of several answers counts."""
-
-    EXAMPLES: ClassVar[Examples] = {"dismissed": {"value": {"counts": "other", "reason": "it came late"}}}
-
-    counts: Literal["this", "other"] = Field(description="`this` replaces what counted; `other` dismisses this one")
-    reason: Annotated[str, Field(min_length=1, max_length=2_000)]
-    operator: Label | None = Field(default=None, description=_OPERATOR)
-
-
-class BranchRead(Frozen):
-    """Steps of a repetition that a correction closed; they count nowhere, and stay readable."""
-
-    repetition: int
-    number: int
-    iteration: int = Field(description="iteration of the measurement that was corrected")
-    reason: str = Field(examples=["4.4 was 0.44"])
-    steps: tuple[dict[str, object], ...] = Field(examples=[[{"kind": "probed", "iteration": 2, "fitness": 0.43}]])
-    sentences: tuple[str, ...] = Field(
-        description="the steps in words", examples=[["Repetition 0: iteration 2 reaches 0.43 in reality"]]
-    )
-    closed_at: Moment

@@ -127,7 +127,7 @@ class SpecError(Frozen):
     pointer: str = Field(
         description="JSON pointer into the body, or the name of a query or path parameter", examples=["/robot"]
     )
-    value: Any = Field(default=None, description="the offending value, as sent")
+    value: Any = Field(None, description="the offending value, as sent")
     message: str = Field(
         examples=["unknown robot 'quadrupet' (did you mean 'quadruped'?); permitted: quadruped, toy_function"]
     )

@@ -90,9 +90,7 @@ class PluginRead(Frozen):
     source: str
     options: dict[str, Any] = Field(description="JSON Schema of the plug-in's options, with defaults")
     available: bool = True
-    note: str | None = Field(
-        default=None, description="why the plug-in is not available, and how to install or repair it"
-    )
+    note: str | None = Field(None, description="why the plug-in is not available, and how to install or repair it")
     details: dict[str, Any] = Field(
         default_factory=dict, description="bounds and unit of a tunable, engines of a robot"
     )
@@ -115,9 +113,9 @@ class BudgetRead(Frozen):
     selection_evaluations: int
     simulator_evaluations: int
     as_published: bool = Field(
-        default=False, description="whether options that a spec leaves out are those of the plain, published formulas"
+        False, description="whether options that a spec leaves out are those of the plain, published formulas"
     )
-    lean: bool = Field(default=False, description="whether plug-ins and options that a spec leaves out save rollouts")
+    lean: bool = Field(False, description="whether plug-ins and options that a spec leaves out save rollouts")
 
 
 class Catalogue(Frozen):
@@ -134,7 +132,7 @@ class Catalogue(Frozen):
     tuners: tuple[PluginRead, ...] = ()
     budgets: tuple[BudgetRead, ...] = ()
     ignored: tuple[IgnoredFile, ...] = Field(
-        default=(), description="files in the folders of GAPLAB_PLUGINS that are not plug-ins"
+        (), description="files in the folders of GAPLAB_PLUGINS that are not plug-ins"
     )
     defaults: dict[str, Any] = Field(
         default_factory=dict, description="the value of each field that a study's spec leaves out"

@@ -10,10 +10,8 @@ class Provenance(Frozen):
 
     gaplab: str = Field(examples=["0.1.0"])
     code: str = Field(description="hash of the code that numbers depend on", examples=["a1b2c3d4"])
-    commit: str | None = Field(
-        default=None, description="git commit, if the code runs from a clone", examples=["3b875b0d"]
-    )
-    dirty: bool | None = Field(default=None, description="whether the clone has changes since that commit")
+    commit: str | None = Field(None, description="git commit, if the code runs from a clone", examples=["3b875b0d"])
+    dirty: bool | None = Field(None, description="whether the clone has changes since that commit")
     python: str = Field(examples=["3.11.14"])
     libraries: dict[str, str] = Field(
         description="version of each library that numbers depend on, and the variables that choose its code",
@@ -27,9 +25,9 @@ class Provenance(Frozen):
     system: str = Field(examples=["Linux-6.8.0-x86_64-with-glibc2.36"])
     spec_version: int
     plugins: dict[str, str] = Field(
-        default={}, description="files of external plug-in folders, including data in packages, each with its hash"
+        {}, description="files of external plug-in folders, including data in packages, each with its hash"
     )
-    outside: dict[str, str] = Field(default={}, description="file and hash of each external plug-in, by kind and name")
+    outside: dict[str, str] = Field({}, description="file and hash of each external plug-in, by kind and name")
 
 
 class ProvenanceUse(Frozen):
@@ -45,12 +43,12 @@ class ProvenanceRead(Frozen):
     """Everything that computed an experiment; empty until it starts."""
 
     computed_with: str | None = Field(
-        default=None,
+        None,
         description="decisive versions: engines, architecture, spec, external plug-ins; others cannot continue it",
         examples=["pybullet (pybullet 3.2.7), x86_64, spec 1"],
     )
     refused_by: str | None = Field(
-        default=None,
+        None,
         description="versions of a supervisor that did not claim the experiment because they differ",
         examples=["pybullet (pybullet 3.3.0), x86_64, spec 1"],
     )

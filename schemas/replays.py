@@ -1,4 +1,4 @@
-"""Replays: the motion of a controller as shapes, positions over time and contacts with the ground."""
+"""Replays: the motion of a controller as shapes, positions over time and contacts; and the toy function of Fig. 3."""
 
 from enum import StrEnum
 from typing import Literal
@@ -31,15 +31,15 @@ class Shape(Frozen):
 
     kind: ShapeKind
     size_m: tuple[float, ...] = Field(examples=[(0.3, 0.2, 0.06)])
-    position_m: Position = Field(default=(0.0, 0.0, 0.0), description="position of the centre")
-    orientation: Orientation = Field(default=(0.0, 0.0, 0.0, 1.0), description="quaternion x, y, z, w")
+    position_m: Position = Field((0.0, 0.0, 0.0), description="position of the centre")
+    orientation: Orientation = Field((0.0, 0.0, 0.0, 1.0), description="quaternion x, y, z, w")
     role: ShapeRole = Field(
         description="role, which determines the colour; the trunk is the body whose motion fitness rates"
     )
-    body: int | None = Field(default=None, description="index of the body in `bodies`; null: fixed")
-    vertices_m: tuple[Position, ...] = Field(default=(), description="vertices of a hull, in its own frame")
+    body: int | None = Field(None, description="index of the body in `bodies`; null: fixed")
+    vertices_m: tuple[Position, ...] = Field((), description="vertices of a hull, in its own frame")
     faces: tuple[tuple[int, ...], ...] = Field(
-        default=(),
+        (),
         description="faces of a hull: indices of `vertices_m`, anticlockwise as seen from outside",
         examples=[((0, 1, 2),)],
     )
@@ -49,15 +49,13 @@ class Shown(Frozen):
     """Shapes on their ground, and where they are."""
 
     shapes: tuple[Shape, ...]
-    positions_m: tuple[tuple[float, ...], ...] = Field(default=(), description="by frame: x, y, z of each body in turn")
-    orientations: tuple[tuple[float, ...], ...] = Field(
-        default=(), description="by frame: x, y, z, w of each body in turn"
-    )
+    positions_m: tuple[tuple[float, ...], ...] = Field((), description="by frame: x, y, z of each body in turn")
+    orientations: tuple[tuple[float, ...], ...] = Field((), description="by frame: x, y, z, w of each body in turn")
     slope_rad: float = Field(
-        default=0.0, description="angle by which the ground, the plane z = 0, rises along x: gravity is turned by it"
+        0.0, description="angle by which the ground, the plane z = 0, rises along x: gravity is turned by it"
     )
     contacts: tuple[tuple[Interval, ...], ...] = Field(
-        default=(),
+        (),
         description="by foot: intervals in s during which it is less than 2 mm above the ground; empty: unknown, "
         "as the engine tells no joint angles",
     )
@@ -78,10 +76,9 @@ class ReplayWorld(Shown):
     engine: EngineName
     fitness: Statistic = Field(description="fitness in this replay")
     recorded: Statistic = Field(description="stored fitness of the same controller; null: not computed, or failed")
-    heights_m: tuple[float, ...] = Field(default=(), description="height of the observed body, by frame")
+    heights_m: tuple[float, ...] = Field((), description="height of the observed body, by frame")
     speeds_m_s: tuple[float, ...] = Field(
-        default=(),
-        description="speed of the observed body towards its final position, by frame, averaged over 0.2 s",
+        (), description="speed of the observed body towards its final position, by frame, averaged over 0.2 s"
     )
 
 
@@ -108,10 +105,9 @@ class Framing(Frozen):
     """How a robot is seen, so that a large one and a small one fill a picture alike."""
 
     scale: float = Field(
-        default=1.0,
-        description="lengths in the picture, like the camera's distance, relative to those of the quadruped",
+        1.0, description="lengths in the picture, like the camera's distance, relative to those of the quadruped"
     )
-    height_m: float = Field(default=0.12, description="height that the camera looks at")
+    height_m: float = Field(0.12, description="height that the camera looks at")
 
 
 class Replay(Frozen):
@@ -131,7 +127,7 @@ class Replay(Frozen):
         description="up to eight outer bodies that collide with the ground; the base is not one",
         examples=[("front left",)],
     )
-    observed: int = Field(default=0, description="index in `bodies` of the body whose motion fitness rates")
+    observed: int = Field(0, description="index in `bodies` of the body whose motion fitness rates")
     framing: Framing = Framing()
     times_s: tuple[float, ...] = Field(description="times of the frames, up to 20 s", examples=[(0.0, 0.02)])
     counted_s: Interval = Field(description="interval in which movement counts for fitness", examples=[(0.5, 3.0)])
@@ -139,7 +135,7 @@ class Replay(Frozen):
     reality: ReplayWorld | None = Field(
         description="null: reality's parameters are unknown here, or reality is hardware, which no replay moves"
     )
-    readings: ReplayReadings | None = Field(default=None, description="null: the robot has no sensors")
+    readings: ReplayReadings | None = Field(None, description="null: the robot has no sensors")
 
 
 class Prediction(Frozen):
@@ -167,6 +163,45 @@ class Predictions(Frozen):
     items: tuple[Prediction, ...]
     pending: int = Field(description="number of samples whose predictions are not computed yet")
     left_out: int = Field(
-        default=0,
+        0,
         description="number of samples of the last repetitions that are never predicted, because the memory is limited",
+    )
+
+
+class ToySample(Frozen):
+    """A gene that was measured in reality."""
+
+    iteration: int
+    gene: float
+    fitness: float | None = Field(description="null: the measurement failed")
+
+
+class ToyTransfer(Frozen):
+    """The fittest gene in the best simulator, with its fitness in simulation and reality."""
+
+    gene: float
+    simulated: float | None
+    real: float | None = Field(description="null: not measured yet, or failed")
+
+
+class ToyIteration(Frozen):
+    """The toy function of the paper's Fig. 3 in one iteration of one repetition."""
+
+    experiment: str
+    name: str
+    repetition: int
+    iteration: int
+    unit: str = Field(description="unit of fitness")
+    genes: tuple[float, ...] = Field(description="genes at which the functions are evaluated")
+    truth: tuple[float | None, ...] | None = Field(description="the true function; null while it is hidden")
+    approximations: tuple[tuple[float | None, ...], ...] = Field(
+        description="the simulators of the iteration, best first"
+    )
+    squared_error: float | None = Field(description="what tuning minimised, of the best simulator; null: no samples")
+    squares: bool = Field(description="whether that is a sum of squares")
+    error: float | None = Field(description="error per sample that tuning saw, of the best simulator; null: none")
+    samples: tuple[ToySample, ...] = Field(description="samples up to this iteration")
+    transfer: ToyTransfer | None
+    limits: tuple[float, float] = Field(
+        description="range of all fitnesses of the repetition, for the axis of a figure"
     )

@@ -8,8 +8,8 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from gaplab.schemas.base import Count, Label, Real, Seed
+from gaplab.schemas.measurements import Beyond, LimitsSpec
 from gaplab.schemas.plugin import PluginRef, TunableRef
-from gaplab.schemas.safety import Beyond, LimitsSpec
 from gaplab.schemas.spec import (
     BudgetName,
     BudgetSpec,

@@ -13,12 +13,10 @@ class CellError(Frozen):
     """One error in a table."""
 
     line: int = Field(description="line of the file, from 1; the header is line 1", examples=[4])
-    column: str | None = Field(
-        default=None, description="name of the column; null for the whole line", examples=["gene_2"]
-    )
-    value: str | None = Field(default=None, description="the cell as it is in the file", examples=["1,5"])
+    column: str | None = Field(None, description="name of the column; null for the whole line", examples=["gene_2"])
+    value: str | None = Field(None, description="the cell as it is in the file", examples=["1,5"])
     message: str = Field(examples=["'1,5' is not a number; decimals have a point"])
-    permitted: str | None = Field(default=None, examples=["0 to 1"])
+    permitted: str | None = Field(None, examples=["0 to 1"])
 
 
 class InvalidSamples(ValueError):
@@ -46,7 +44,7 @@ class SamplesRead(Frozen):
 
     samples: tuple[KnownSample, ...]
     errors: tuple[CellError, ...] = Field(description="everything that is wrong, in the order of lines")
-    more: int = Field(default=0, description="number of further errors that are left out")
+    more: int = Field(0, description="number of further errors that are left out")
 
     def checked(self, file: Path) -> list[dict[str, Any]]:
         """Return the samples as `reality.samples` of a spec takes them.

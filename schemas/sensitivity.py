@@ -35,10 +35,10 @@ class SensitivitySpec(SharedSettings):
     }
 
     points: Annotated[Count, Field(ge=5, le=1_001)] = Field(
-        default=POINTS, description="number of values of each tunable; eight controllers are simulated at each"
+        POINTS, description="number of values of each tunable; eight controllers are simulated at each"
     )
     evaluations: Annotated[Count, Field(ge=20, le=100_000)] = Field(
-        default=EVALUATIONS, description="evaluations of the short evolution of four of these controllers"
+        EVALUATIONS, description="evaluations of the short evolution of four of these controllers"
     )
 
 
@@ -47,8 +47,8 @@ class Checked(Frozen):
 
     robot: PluginRef = Field(examples=["quadruped"])
     engine: PluginRef = Field(examples=["pybullet"])
-    controller: PluginRef | None = Field(default=None, description="null: the robot's own", examples=["square_pulses"])
-    task: PluginRef | None = Field(default=None, description="null: the robot's own", examples=["walk"])
+    controller: PluginRef | None = Field(None, description="null: the robot's own", examples=["square_pulses"])
+    task: PluginRef | None = Field(None, description="null: the robot's own", examples=["walk"])
     tunables: tuple[ResolvedTunable, ...] = Field(examples=[("restitution",)])
     points: int = POINTS
     evaluations: int = EVALUATIONS
@@ -84,12 +84,10 @@ class SensitivityRead(Frozen):
     spec: Checked
     rollouts: int = Field(description="upper bound on the rollouts of the check")
     unit: Unit = Field(description="unit of fitness")
-    tunables: tuple[Sensitivity, ...] = Field(default=(), description="results, once the check is COMPLETED")
+    tunables: tuple[Sensitivity, ...] = Field((), description="results, once the check is COMPLETED")
     warnings: tuple[str, ...] = ()
     reason: str | None = Field(
-        default=None,
-        description="reason of failure, or of the last return to the queue",
-        examples=["no heartbeat for 30 s"],
+        None, description="reason of failure, or of the last return to the queue", examples=["no heartbeat for 30 s"]
     )
     created_at: Moment
     started_at: Moment | None = None

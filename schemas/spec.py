@@ -9,10 +9,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, Discriminator, Field, Tag, model_validator
 
-from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Seed, from_name
-from gaplab.schemas.measurements import KnownSample
+from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Repetitions, Seed, from_name
+from gaplab.schemas.measurements import Beyond, KnownSample, LimitsSpec
 from gaplab.schemas.plugin import PluginRef, TunableRef
-from gaplab.schemas.safety import Beyond, LimitsSpec
 
 BudgetName = Literal["smoke", "desk", "paper", "lean", "as_published"]
 
@@ -25,20 +24,18 @@ class BudgetSpec(Frozen):
     """
 
     preset: BudgetName = Field(
-        default="paper",
+        "paper",
         description="`as_published` is `paper` with the formulas as the paper prints them: options that a strategy "
         "leaves out are those of its plain formula. `lean` is `paper` at a tenth of its rollouts: it also sets the "
         "optimizer of controllers, and options of the strategy and the tuner, where a spec leaves them out",
     )
     controller_evaluations: Count | None = Field(
-        default=None, description="evaluations of the search for the transferred controller"
+        None, description="evaluations of the search for the transferred controller"
     )
-    selection_evaluations: Count | None = Field(
-        default=None, description="evaluations of the search for the next sample"
-    )
-    simulator_evaluations: Count | None = Field(default=None, description="evaluations of the search for a simulator")
+    selection_evaluations: Count | None = Field(None, description="evaluations of the search for the next sample")
+    simulator_evaluations: Count | None = Field(None, description="evaluations of the search for a simulator")
     reuse_transfer: bool = Field(
-        default=False,
+        False,
         strict=True,
         description="true: `simulated_fit` tries the controller that was just transferred, without another search. It "
         "is the best of `controller_evaluations`, while other strategies select from `selection_evaluations`, so it "
@@ -67,35 +64,34 @@ class RealitySpec(Frozen):
     repetition waits for each without a core or a process.
     """
 
-    kind: RealityKind = Field(default="simulated", description="`physical`: a robot on a bench; measurements come in")
-    engine: PluginRef | None = Field(default=None, description="of a simulated reality; default: the simulators'")
+    kind: RealityKind = Field("simulated", description="`physical`: a robot on a bench; measurements come in")
+    engine: PluginRef | None = Field(None, description="of a simulated reality; default: the simulators'")
     parameters: dict[str, Real] = Field(default_factory=dict, description="hidden; of a simulated reality")
     bench: Label | None = Field(
-        default=None,
+        None,
         description="name of the physical robot; default: the robot's. The requests of one bench are taken one at a "
         "time, whatever experiment they are of",
     )
     repeats: Repeats = Field(
-        default=1,
-        description="values of each physical measurement; their mean is the fitness, and their spread is the noise",
+        1, description="values of each physical measurement; their mean is the fitness, and their spread is the noise"
     )
     samples: KnownSamples = Field(
-        default=(),
+        (),
         description="controllers of the physical robot that were measured before; the first simulators are tuned on "
         "them",
     )
     probes: Probes | None = Field(
-        default=None,
+        None,
         description="which transferred controllers are measured: of `each` iteration (default), of the `last` (default "
         "of a physical reality, where each costs), or `never`. Without a probe, the curve has the best sample so far",
     )
     limits: LimitsSpec | None = Field(
-        default=None,
+        None,
         description="limits of the physical robot; before a controller is offered, the latest simulators forecast "
         "whether it keeps them",
     )
     beyond: Beyond = Field(
-        default="warn",
+        "warn",
         description="`warn`: a controller that is expected to exceed a limit is offered with a warning. `refuse`: it "
         "is not offered; it counts as tried and failed, and simulators are not tuned on it",
     )
@@ -105,45 +101,39 @@ class SharedSettings(Frozen):
     """Settings that all experiments of a study share."""
 
     iterations: Annotated[int, Field(strict=True, ge=0, le=1_000)] | None = Field(
-        default=None,
+        None,
         description="real-world evaluations of each repetition; the paper: 10. 0: tune on the samples from before, and "
         "measure nothing",
     )
-    repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
-        default=None, description="repetitions of each experiment; the paper: 40"
-    )
+    repetitions: Repetitions | None = Field(None, description="repetitions of each experiment; the paper: 40")
     robot: PluginRef = PluginRef(name="quadruped")
     controller: PluginRef | None = Field(
-        default=None, description="how a genome drives the actuators; default: the robot's own"
+        None, description="how a genome drives the actuators; default: the robot's own"
     )
     task: PluginRef | None = Field(
-        default=None, description="how long a rollout lasts, and what is fit in it; default: the robot's own"
+        None, description="how long a rollout lasts, and what is fit in it; default: the robot's own"
     )
     engine: PluginRef | None = Field(
-        default=None,
+        None,
         description="engine of the simulators; default: the robot's, PyBullet for the quadruped (MuJoCo on Python 3.12 "
         "and later, for which PyBullet has no wheels)",
     )
     optimizer: PluginRef = PluginRef(name="steady_state")
     controller_optimizer: PluginRef | None = Field(
-        default=None,
+        None,
         description="optimizer that searches for controllers; default: `optimizer`, which searches for simulators; "
         "with the budget `lean`: `cma_es`",
     )
     tunables: tuple[TunableRef, ...] = Field(
-        default=(
-            TunableRef(name="static_friction"),
-            TunableRef(name="dynamic_friction"),
-            TunableRef(name="restitution"),
-        ),
+        (TunableRef(name="static_friction"), TunableRef(name="dynamic_friction"), TunableRef(name="restitution")),
         min_length=1,
     )
     discrepancy: PluginRef = Field(
-        default=PluginRef(name="squared_fitness"), description="what tuning minimises, summed over the samples"
+        PluginRef(name="squared_fitness"), description="what tuning minimises, summed over the samples"
     )
-    tuner: PluginRef = Field(default=PluginRef(name="search"), description="how simulators are found")
+    tuner: PluginRef = Field(PluginRef(name="search"), description="how simulators are found")
     held_out: HeldOut = Field(
-        default=0.0,
+        0.0,
         description="share of the samples that no tuning sees; the error of tuned simulators on them is reported. 0.2: "
         "each fifth sample",
     )
@@ -155,9 +145,9 @@ class SharedSettings(Frozen):
 class Schedule(Frozen):
     """Schedule of an experiment. It changes no number, so it is not part of the stored spec."""
 
-    priority: Priority = Field(default=0, description="the highest priority is computed first")
-    max_parallel: Annotated[Count, Field(le=10_000)] | None = Field(
-        default=None, description="largest number of repetitions of an experiment at once; null: no limit"
+    priority: Priority = Field(0, description="the highest priority is computed first")
+    max_parallel: Repetitions | None = Field(
+        None, description="largest number of repetitions of an experiment at once; null: no limit"
     )
 
 
@@ -211,7 +201,7 @@ class StudySpec(SharedSettings, Schedule):
 
     name: Label | None = None
     strategies: tuple[PluginRef, ...] = Field(
-        default=(
+        (
             PluginRef(name="simulated_fit"),
             PluginRef(name="simulated_fit_and_unique"),
             PluginRef(name="informative"),
@@ -223,9 +213,7 @@ class StudySpec(SharedSettings, Schedule):
         min_length=1,
         max_length=100,
     )
-    direct_repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
-        default=None, description="repetitions of `direct`; default: `repetitions`"
-    )
+    direct_repetitions: Repetitions | None = Field(None, description="repetitions of `direct`; default: `repetitions`")
 
 
 def kind_of(spec: object) -> Literal["experiment", "study"]:
@@ -247,5 +235,5 @@ class SpecRead(Frozen):
         description="the shortest spec that gives the same; null if no single spec gives all experiments",
         examples=[{"strategies": ["simulated_fit", "random"], "engine": "mujoco", "budget": "smoke"}],
     )
-    resolved: tuple[dict[str, Any], ...] = Field(default=(), description="the complete spec of each experiment")
-    remarks: tuple[str, ...] = Field(default=(), description="what the spec lacks, in words")
+    resolved: tuple[dict[str, Any], ...] = Field((), description="the complete spec of each experiment")
+    remarks: tuple[str, ...] = Field((), description="what the spec lacks, in words")

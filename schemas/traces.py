@@ -48,11 +48,11 @@ class TraceRead(Frozen):
     attachment: str = Field(description="hash of the attachment", examples=["ab" * 32])
     lag_s: float = Field(description="time on the clock of the trace at which the motion began, s", examples=[2.015])
     match: Statistic = Field(
-        default=None,
+        None,
         description="correlation with the motion that the best simulator expects, at most 1; null: the lag was given, "
         "or the expected motion does not change",
     )
-    after_rest: bool = Field(default=False, description="whether the rest before the motion shows when it began")
+    after_rest: bool = Field(False, description="whether the rest before the motion shows when it began")
 
 
 class AlignedTrace(TraceRead):
@@ -62,9 +62,9 @@ class AlignedTrace(TraceRead):
     heights_m: tuple[float, ...] = Field(description="height of the base", examples=[(0.17, 0.171)])
     distances_m: tuple[float, ...] = Field(description="distance over ground from the start", examples=[(0.0, 0.004)])
     expected_heights_m: tuple[float, ...] | None = Field(
-        default=None, description="as the simulator expects; null: physics failed", examples=[(0.17, 0.172)]
+        None, description="as the simulator expects; null: physics failed", examples=[(0.17, 0.172)]
     )
-    expected_distances_m: tuple[float, ...] | None = Field(default=None, examples=[(0.0, 0.005)])
+    expected_distances_m: tuple[float, ...] | None = Field(None, examples=[(0.0, 0.005)])
 
 
 class TracesRead(Frozen):
@@ -73,13 +73,13 @@ class TracesRead(Frozen):
     values: tuple[float, ...] = Field(description="fitness of each repeat", examples=[(0.41, 0.44)])
     unit: Unit
     readings: tuple[tuple[tuple[float | None, ...], ...], ...] | None = Field(
-        default=None,
+        None,
         description="readings of the sensors in each repeat, computed from its trace; null: the robot has none",
         examples=[[[[0.02, None]]]],
     )
     traces: tuple[AlignedTrace, ...]
     doubts: tuple[str, ...] = Field(
-        default=(),
+        (),
         description="what is unlikely about the traces; an answer with them is refused unless it is `confirmed`",
         examples=[("trace 1: there is no pose from 1.5 to 3.5 s",)],
     )

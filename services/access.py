@@ -14,7 +14,7 @@ from secrets import token_hex
 
 from sqlalchemy import func, select, update
 
-from gaplab.schemas.keeping import Role, TokenRead
+from gaplab.schemas.access import Role, TokenRead
 from gaplab.services.core.errors import Forbidden, GaplabError, NotFound
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import TokenRow

@@ -1,8 +1,8 @@
 """Curves and figures for the tests of figures."""
 
+from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.replays import Prediction
-from gaplab.schemas.results import Curve, CurvePoint
 from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_figure
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.random import default_rng
 
 from gaplab import MeasurementFailed
-from gaplab.api.clients.motions import DriverMotion
+from gaplab.api.clients.driving import DriverMotion
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import frozen
 from gaplab.services.specs.assembly import engine_of

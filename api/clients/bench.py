@@ -10,8 +10,9 @@ from gaplab.api.clients.connection import Connection, Of, segment
 from gaplab.api.clients.driving import Driving, TakenRequest
 from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.mcap_traces import mcap_to_csv
-from gaplab.api.clients.records import Records
-from gaplab.schemas.measurements import AnswerRead, AttachmentRead, BranchRead, Consequences, DoubtsRead, RequestRead
+from gaplab.api.clients.studies import Studies
+from gaplab.schemas.corrections import BranchRead, Consequences
+from gaplab.schemas.measurements import AnswerRead, AttachmentRead, DoubtsRead, RequestRead
 from gaplab.schemas.records import Page
 from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.traces import TracesRead
@@ -38,8 +39,8 @@ class Details(TypedDict, total=False):
 class Bench:
     """A robot on a bench: what is to be measured, and what was."""
 
-    def __init__(self, connection: Connection, records: Records) -> None:
-        self._connection, self._records = connection, records
+    def __init__(self, connection: Connection, studies: Studies) -> None:
+        self._connection, self._studies = connection, studies
 
     def requests(
         self,
@@ -66,7 +67,7 @@ class Bench:
             journal: file that keeps each answer until the service has it; answers of an earlier run are sent first.
         """
         with Journal(journal) as kept:
-            driving = Driving(self._connection, self._records, kept, lease_s, operator)
+            driving = Driving(self._connection, self._studies, kept, lease_s, operator)
             yield from driving.tasks(experiment, bench)
 
     def pending(

@@ -14,30 +14,22 @@ from typing import Self
 
 import httpx2
 
-from gaplab.api.clients.archives import Archives
 from gaplab.api.clients.bench import Bench
 from gaplab.api.clients.connection import PAUSES_S, Connection, segment
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.clients.events import EventLog
 from gaplab.api.clients.figures import Figures
-from gaplab.api.clients.keeping import Keeping
-from gaplab.api.clients.records import Records
-from gaplab.api.clients.replays import Replays
-from gaplab.api.clients.reports import Reports
-from gaplab.api.clients.results import Results
-from gaplab.api.clients.submission import Submission
-from gaplab.api.clients.tables import Tables
+from gaplab.api.clients.files import Files
 from gaplab.api.clients.watcher import Watcher
 from gaplab.schemas.plugin import Catalogue
 from gaplab.schemas.robots import RobotRead
 
 
-class Client:
+class Client(Watcher, Figures, Files, EventLog):
     """A client of the service.
 
-    Its methods belong to its parts, which share one connection: `client.figure` is short for `client.figures.draw`,
-    `client.samples` for `client.tables.samples`. A study or an experiment may be given in place of its id. Every method
-    that sends a request raises ServiceError with the service's problem, or ServiceUnreachable.
+    A study or an experiment may be given in place of its id. `client.bench` has what concerns a robot on a bench. Every
+    method that sends a request raises ServiceError with the service's problem, or ServiceUnreachable.
 
     Args:
         url: address of the service; left out: GAPLAB_URL, or this machine.
@@ -56,36 +48,9 @@ class Client:
         transport: httpx2.BaseTransport | None = None,
         pauses_s: Sequence[float] = PAUSES_S,
     ) -> None:
-        connection = Connection(url, token=token, timeout_s=timeout_s, transport=transport, pauses_s=pauses_s)
-        self.url, self._connection = connection.url, connection
-        self.submission = submission = Submission(connection)
-        self.records = records = Records(connection)
-        self.keeping = keeping = Keeping(connection, records)
-        self.results = results = Results(connection)
-        self.tables = tables = Tables(connection, results)
-        self.figures, self.archives = figures, archives = Figures(connection), Archives(connection)
-        self.reports, self.replays = reports, replays = Reports(connection), Replays(connection)
-        self.event_log, self.watcher = event_log, watcher = EventLog(connection), Watcher(records, results)
-        self.bench = bench = Bench(connection, records)
-
-        self.submit, self.estimate, self.check = submission.submit, submission.estimate, submission.check
-        self.study, self.experiment, self.studies = records.study, records.experiment, records.studies
-        self.edit, self.spec, self.repetitions = records.edit, records.spec, records.repetitions
-        self.attempts, self.provenance, self.retry = records.attempts, records.provenance, records.retry
-        self.pause, self.resume, self.stop = records.pause, records.resume, records.stop
-        self.cancel, self.extend, self.schedule = records.cancel, records.extend, records.schedule
-        self.accept_versions, self.notify = records.accept_versions, keeping.notify
-        self.tag, self.untag = keeping.tag, keeping.untag
-        self.archive, self.unarchive, self.delete = keeping.archive, keeping.unarchive, keeping.delete
-        self.views, self.save_view, self.delete_view = keeping.views, keeping.save_view, keeping.delete_view
-        self.curves, self.curves_csv = results.curves, results.curves_csv
-        self.compare, self.diff, self.curve, self.samples = results.compare, results.diff, tables.curve, tables.samples
-        self.misfit, self.misfit_csv, self.figure_kinds = results.misfit, results.misfit_csv, figures.kinds
-        self.simulators, self.predictions, self.readings = tables.simulators, tables.predictions, tables.readings
-        self.figure, self.verdict, self.events = figures.draw, reports.verdict, event_log.events
-        self.report, self.take_home, self.replay = reports.save, reports.take_home, replays.replay
-        self.export, self.import_, self.requests = archives.export, archives.import_, bench.requests
-        self.watch, self.wait = watcher.watch, watcher.wait
+        self._connection = Connection(url, token=token, timeout_s=timeout_s, transport=transport, pauses_s=pauses_s)
+        self.url, self.bench = self._connection.url, Bench(self._connection, self)
+        self.requests = self.bench.requests
 
     def __enter__(self) -> Self:
         return self

@@ -201,6 +201,12 @@ class Connection:
             return answer.read()
 
 
+class Connected:
+    """What sends its requests over one connection."""
+
+    _connection: Connection
+
+
 def _configured_url() -> str:
     """Return the address of the environment's settings.
 

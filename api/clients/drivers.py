@@ -16,10 +16,8 @@ from threading import Thread
 from typing import Any, Protocol
 
 from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
-from gaplab.api.clients.driving import TakenRequest
+from gaplab.api.clients.driving import DriverMotion, Take, TakeLost, TakenRequest
 from gaplab.api.clients.errors import ServiceError
-from gaplab.api.clients.motions import DriverMotion
-from gaplab.api.clients.takes import Take, TakeLost
 from gaplab.schemas.records import SensorsRead
 
 POLL_S = 0.1

@@ -69,11 +69,7 @@ class WrongSuffix(ValueError):
 
 
 def format_of(file: str | Path, formats: Sequence[str]) -> str:
-    """Return the format that the suffix of a file names.
-
-    Raises:
-        WrongSuffix: it is not one of these formats.
-    """
+    """Return the format that the suffix of a file names; raise WrongSuffix if it is not one of these formats."""
     suffix = Path(file).suffix.removeprefix(".").lower()
     if suffix not in formats:
         raise WrongSuffix(f"{file} has another suffix; permitted: {', '.join(f'.{each}' for each in formats)}")
@@ -81,11 +77,7 @@ def format_of(file: str | Path, formats: Sequence[str]) -> str:
 
 
 def library(name: str, extra: str) -> Any:  # noqa: ANN401 - a module that may be missing
-    """Return a library of an optional extra.
-
-    Raises:
-        ExtraMissing: it is not installed.
-    """
+    """Return a library of an optional extra; raise ExtraMissing if it is not installed."""
     try:
         return import_module(name)
     except ImportError as error:

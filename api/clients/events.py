@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 
-from gaplab.api.clients.connection import Connection, Parameter, Plain, plain
+from gaplab.api.clients.connection import Connected, Parameter, Plain, plain
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
 from gaplab.schemas.events import EventPage, EventRead
 
@@ -14,19 +14,11 @@ SILENCE_S = 45.0
 """Longest silence of a stream that works: the service sends a comment every 15 s."""
 
 
-class EventLog:
+class EventLog(Connected):
     """The events that the service has stored, and those to come."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
     def events(
-        self,
-        *,
-        follow: bool = True,
-        patience_s: float = 60.0,
-        retry_s: float = RETRY_S,
-        **filters: Parameter,
+        self, *, follow: bool = True, patience_s: float = 60.0, retry_s: float = RETRY_S, **filters: Parameter
     ) -> Iterator[EventRead]:
         """Yield events in their order, each once.
 

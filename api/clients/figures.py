@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from gaplab.api.clients.connection import Connection, Of, id_of, written
+from gaplab.api.clients.connection import Connected, Of, id_of, written
 from gaplab.api.clients.errors import format_of, library
 
 _FIGURES = "/figures/"
@@ -59,13 +59,10 @@ class Figure:
         return {"image/svg+xml": self.content("svg").decode(), "text/plain": repr(self)}
 
 
-class Figures:
+class Figures(Connected):
     """Figures that the service draws."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
-    def draw(self, /, *what: Of, of: str = "curves", **options: str | float | bool | None) -> Figure:
+    def figure(self, /, *what: Of, of: str = "curves", **options: str | float | bool | None) -> Figure:
         """Return a figure of studies; the service draws it when it is shown or saved, and refuses what is unknown then.
 
         Args:
@@ -87,7 +84,7 @@ class Figures:
 
         return Figure(of, ids, draw)
 
-    def kinds(self) -> tuple[str, ...]:
+    def figure_kinds(self) -> tuple[str, ...]:
         """Return the kinds of figures that the service draws."""
         paths = self._connection.get(_Paths, "/openapi.json").paths
         return tuple(path.removeprefix(_FIGURES) for path in paths if path.startswith(_FIGURES))

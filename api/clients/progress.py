@@ -16,9 +16,9 @@ from rich.markup import escape
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from gaplab.schemas.curves import Curve, from_before
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead, Progress, RepetitionRead, StudyRead
-from gaplab.schemas.results import Curve, from_before
 
 Record: TypeAlias = StudyRead | ExperimentRead
 

@@ -1,16 +1,27 @@
-"""Results of experiments: curves, comparisons and misfit."""
+"""Results of experiments: curves, comparisons, misfit and replays, and as pandas frames.
 
-from collections.abc import Iterator, Sequence
-from typing import TypeAlias
+Frames have a row for each observation, and are complete however many pages the service sends.
+"""
+
+import time
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 from pydantic import BaseModel
 
-from gaplab.api.clients.comparisons import Comparisons
-from gaplab.api.clients.connection import Connection, Of, Parameter, id_of, segment
-from gaplab.schemas.comparisons import Comparison
+from gaplab.api.clients.connection import Connected, Of, Parameter, id_of, segment
+from gaplab.api.clients.errors import library
+from gaplab.schemas.comparisons import COLUMNS, TEXTS, Comparison, row
+from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.differences import SpecDiff
-from gaplab.schemas.records import Page
-from gaplab.schemas.results import Curve, MisfitRead, SimulatorRead
+from gaplab.schemas.misfit import MisfitRead
+from gaplab.schemas.records import ExperimentRead, Page, SampleRead, SensorsRead, SimulatorRead
+from gaplab.schemas.replays import Prediction, Predictions, Replay
+from gaplab.services.csv_tables import csv_text
+from gaplab.services.findings.tables import comparison, latex
+
+if TYPE_CHECKING:
+    import pandas
 
 Several: TypeAlias = Of | Sequence[Of]
 
@@ -20,17 +31,40 @@ PAGE = 5_000
 MOST_CURVES = 100
 """Ids of one request: the most that the service permits."""
 
+NAMED = ("experiment", "name", "strategy")
+STATISTICS = ("evaluations", "n", "mean", "sd", "lower", "upper")
 
-class Results:
-    """Results of experiments, from the service's records of steps."""
+WHOLE = {"repetition", "iteration", "rank", "evaluations", "n", "repeats"}
+WHOLE |= {"from_evaluations", "to_evaluations", "n_first", "n_second", "n_paired"}
+"""Columns of whole numbers, in whatever table; they are never null."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
+
+class Comparisons(tuple[Comparison, ...]):
+    """The pairs of a comparison, as a tuple that also has tables."""
+
+    def frame(self) -> "pandas.DataFrame":
+        """Return a row for each pair, with a column for each number, named as in CSV; an undefined number is nan.
+
+        Raises:
+            ExtraMissing: pandas is not installed.
+        """
+        return frame(map(row, self), COLUMNS, TEXTS | {"shared_streams"})
+
+    def csv(self) -> str:
+        """Return the same rows as CSV."""
+        return csv_text(COLUMNS, map(row, self))
+
+    def latex(self) -> str:
+        """Return tables for a paper, with p before and after Holm's correction; LaTeX needs the package booktabs."""
+        return latex(comparison(self))
+
+
+class Results(Connected):
+    """Results of experiments. Methods that return frames raise ExtraMissing without pandas."""
 
     def best_simulator(self, of: Of) -> SimulatorRead | None:
         """Return the tuned simulator of the latest iteration with the smallest error; None if there is none yet."""
-        simulators = self._connection.items(Page[SimulatorRead], f"/experiments/{segment(of)}/simulators", limit=PAGE)
-        best = [each for each in simulators if each.rank == 0 and each.error is not None]
+        best = [each for each in self._simulators(of) if each.rank == 0 and each.error is not None]
         latest = max((each.iteration for each in best), default=0)
         return min(
             (each for each in best if each.iteration == latest),
@@ -97,6 +131,127 @@ class Results:
         """Return the misfit of an experiment as CSV: a line for each iteration and each number over repetitions."""
         return self._connection.get_bytes(f"/experiments/{segment(of)}/misfit", format="csv").decode()
 
+    def replay(self, of: Of, /, **choice: int | str | None) -> Replay:
+        """Return the motion of a controller of an experiment in its simulator and in reality.
+
+        Its choice, as in the API: repetition, iteration (left out: the last that was measured), kind ("transfer" or
+        "sample") and simulator.
+        """
+        return self._connection.get(Replay, f"/experiments/{segment(of)}/replay", **choice)
+
+    def curve(self, *of: Of, each: bool = False) -> "pandas.DataFrame":
+        """Return curves: fitness in reality against the number of real-world evaluations.
+
+        Args:
+            of: studies, for all of their experiments, and single experiments.
+            each: one row per repetition, instead of one with their mean, SD, n and 95 % interval.
+        """
+        numbers = ("repetition", "evaluations", "fitness") if each else STATISTICS
+        rows = [
+            (curve.experiment, curve.name, curve.strategy, *row)
+            for curve in self.curves(of)
+            for point in curve.points
+            for row in _rows(point, each=each)
+        ]
+        return frame(rows, (*NAMED, *numbers), NAMED)
+
+    def samples(self, of: Of, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
+        """Return the real-world evaluations of an experiment, with a column for each gene.
+
+        `repeats` is the number of values whose mean is the fitness, 0 if the measurement failed. `standard_error` is
+        nan without repeats. Without evaluations there are no columns of genes. With a `repetition` or a `kind`,
+        "sample" (learned from) or "probe" (only recorded), the table has only those.
+        """
+        samples = self._samples(of, repetition, kind)
+        columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at", "standard_error")
+        rows = [[*(getattr(sample, name) for name in columns), _repeats(sample)] for sample in samples]
+        others = {"kind": str, "measured_by": str, "measured_at": "datetime64[us, UTC]"}
+        table = frame(rows, (*columns, "repeats"), others).astype(others)
+        genes = library("pandas", "notebook").DataFrame([sample.genome for sample in samples], index=table.index)
+        return table.join(genes.rename(columns=lambda gene: f"gene_{gene}"))
+
+    def readings(self, of: Of, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
+        """Return what the sensors said in the real-world evaluations of an experiment, with a column for each sensor.
+
+        A row is one time of one evaluation; choose them as for `samples`. Values are in the sensors' units, nan where a
+        sensor failed. The table is empty if the robot has no sensors.
+
+        Raises:
+            LookupError: the robot or its task is not installed in the service, so the sensors are unknown.
+        """
+        sensors = self._connection.get(ExperimentRead, f"/experiments/{segment(of)}").sensors
+        if sensors is None:
+            raise LookupError(
+                f"the sensors of {id_of(of)} are unknown: its robot or task is not installed in the service"
+            )
+        names = [f"{name}_{unit}" for name, unit in zip(sensors.names, sensors.units, strict=True)]
+        rows = [
+            (sample.repetition, sample.iteration, str(sample.kind), time_s, *values)
+            for sample in self._samples(of, repetition, kind)
+            if sample.readings is not None
+            for time_s, *values in _values(sample.readings, sensors)
+        ]
+        columns = ("repetition", "iteration", "kind", "time_s", *names)
+        return frame(rows, columns, {"kind"}).astype({"kind": str})
+
+    def simulators(self, of: Of, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
+        """Return the tuned simulators of an experiment, with a column for each tunable; rank 0 is an iteration's best.
+
+        `squared_error` is a sum over samples and grows with them; `error` is per sample, in the unit of the
+        discrepancy; by default the root mean square. A tuner that gives 95 % intervals has the columns `NAME_lower` and
+        `NAME_upper` of each tunable, and one that gives shares of the posterior probability the column `weight`.
+        Without simulators there are no columns of tunables. With a `repetition` or an `iteration`, 0 for the untuned
+        start, the table has only those.
+        """
+        simulators = self._simulators(of, repetition=repetition, iteration=iteration)
+        columns = ("repetition", "iteration", "rank", "squared_error", "error")
+        table = frame([[getattr(row, name) for name in columns] for row in simulators], columns)
+        return table.join(
+            library("pandas", "notebook").DataFrame([_tuned(row) for row in simulators], index=table.index)
+        )
+
+    def predictions(self, of: Of, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":
+        """Return the fitness of each sample in reality, and in simulation before and after it was measured.
+
+        The service computes predictions at the first request, and this method waits for it. If there are very many
+        samples, the table has those of the first repetitions. It asks every `every_s` seconds.
+
+        Raises:
+            TimeoutError: it takes longer than `timeout_s`; computed predictions are kept, so ask again.
+        """
+        library("pandas", "notebook")
+        deadline, path = time.monotonic() + timeout_s, f"/experiments/{segment(of)}/predictions"
+        while (predictions := self._connection.get(Predictions, path)).pending:
+            if time.monotonic() > deadline:
+                msg = f"{predictions.pending} predictions of {id_of(of)} are not computed after {timeout_s:g} s"
+                raise TimeoutError(f"{msg}; ask again")
+            time.sleep(every_s)
+        columns = tuple(Prediction.model_fields)
+        return frame([[getattr(item, name) for name in columns] for item in predictions.items], columns)
+
+    def _simulators(self, of: Of, **filters: int | None) -> list[SimulatorRead]:
+        path = f"/experiments/{segment(of)}/simulators"
+        return list(self._connection.items(Page[SimulatorRead], path, limit=PAGE, **filters))
+
+    def _samples(self, of: Of, repetition: int | None, kind: str | None) -> list[SampleRead]:
+        path = f"/experiments/{segment(of)}/samples"
+        return list(self._connection.items(Page[SampleRead], path, limit=PAGE, repetition=repetition, kind=kind))
+
+
+def frame(rows: Iterable[Sequence[object]], columns: Sequence[str], others: Collection[str] = ()) -> "pandas.DataFrame":
+    """Return a frame whose columns have the same types with and without rows.
+
+    Args:
+        rows: values by column.
+        columns: names of the columns: of numbers, with nan for null.
+        others: those of them that are not numbers.
+
+    Raises:
+        ExtraMissing: pandas is not installed.
+    """
+    made = library("pandas", "notebook").DataFrame(list(rows), columns=list(columns))
+    return made.astype({name: "int64" if name in WHOLE else "float64" for name in columns if name not in others})
+
 
 def _ids(of: Several) -> list[str]:
     """Return the ids of studies and experiments; a single one, which may be a sequence of letters, is one of them."""
@@ -108,3 +263,29 @@ def _parts(of: Several) -> Iterator[list[str]]:
     ids = _ids(of)
     for start in range(0, len(ids) or 1, MOST_CURVES):
         yield ids[start : start + MOST_CURVES]
+
+
+def _repeats(sample: SampleRead) -> int:
+    """Return the number of values whose mean is the fitness; a measurement without repeats has one."""
+    return 0 if sample.fitness is None else len(sample.repeats or (sample.fitness,))
+
+
+def _tuned(simulator: SimulatorRead) -> dict[str, float]:
+    found = dict(simulator.parameters)
+    for name, (lower, upper) in (simulator.intervals or {}).items():
+        found |= {f"{name}_lower": lower, f"{name}_upper": upper}
+    return found if simulator.weight is None else found | {"weight": simulator.weight}
+
+
+def _values(readings: Sequence[float | None], sensors: SensorsRead) -> Iterator[tuple[float | None, ...]]:
+    """Yield each time of one evaluation with the values of all sensors, in their units."""
+    size = len(sensors.noises)
+    for start, time_s in zip(range(0, len(readings), size or 1), sensors.times_s, strict=True):
+        of_time = zip(readings[start : start + size], sensors.noises, strict=True)
+        yield time_s, *(None if reading is None else reading * noise for reading, noise in of_time)
+
+
+def _rows(point: CurvePoint, *, each: bool) -> list[tuple[float | None, ...]]:
+    if each:
+        return [(repetition, point.evaluations, fitness) for repetition, fitness in enumerate(point.values)]
+    return [tuple(getattr(point, name) for name in STATISTICS)]

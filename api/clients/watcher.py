@@ -11,19 +11,15 @@ from rich.console import Console
 from gaplab.api.clients.connection import Of
 from gaplab.api.clients.errors import ExperimentFailed, ServiceError, ServiceUnreachable, is_final
 from gaplab.api.clients.progress import RecordProgress, Snapshot, in_notebook, show
-from gaplab.api.clients.records import Records
 from gaplab.api.clients.results import Results
 from gaplab.api.clients.screen import console
+from gaplab.api.clients.studies import Studies
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
 
 
-class Watcher:
+class Watcher(Studies, Results):
     """Requests that wait for studies, and show their progress."""
-
-    def __init__(self, records: Records, results: Results) -> None:
-        self._records = records
-        self._results = results
 
     def watch(self, of: Of, *, every_s: float = 1.0, patience_s: float = 60.0) -> Iterator[StudyRead]:
         """Yield a study every `every_s` seconds, until it has ended.
@@ -84,13 +80,13 @@ class Watcher:
         While the service is away, snapshots say so; see `watch`.
         """
         details = dict[str, RecordProgress]()
-        snapshot = self._snapshot(self._records.study(of), details, curves=curves)
+        snapshot = self._snapshot(self.study(of), details, curves=curves)
         yield snapshot
         answered_at = time.monotonic()
         while not snapshot.study.state.ended:
             time.sleep(every_s)
             try:
-                snapshot = self._snapshot(self._records.study(of), details, curves=curves)
+                snapshot = self._snapshot(self.study(of), details, curves=curves)
             except (ServiceError, ServiceUnreachable) as error:
                 away_s = time.monotonic() - answered_at
                 if is_final(error) or away_s > patience_s:
@@ -108,8 +104,8 @@ class Watcher:
             for id, each in experiments.items()
             if not each.state.ended or id not in details or details[id].record != each
         ]
-        for curve in self._results.curves(moving) if curves and moving else ():
-            id, repetitions = curve.experiment, self._records.repetitions(curve.experiment)
+        for curve in self.curves(moving) if curves and moving else ():
+            id, repetitions = curve.experiment, self.repetitions(curve.experiment)
             details[id] = RecordProgress(experiments[id], curve, repetitions)
         rows = [details.get(id) or RecordProgress(each) for id, each in experiments.items()]
         return Snapshot(study, (*([RecordProgress(study)] if len(rows) > 1 else []), *rows))

@@ -8,102 +8,85 @@ from typing import IO, Annotated
 import typer
 from rich.markup import escape
 
+from gaplab.api.clients.client import Client
 from gaplab.api.clients.screen import console
-from gaplab.api.commands.app import KEEPING, AsJson, Id, Url, app, connect
+from gaplab.api.commands.app import KEEPING, Answer, AsJson, Id, Yes, command
 from gaplab.api.commands.exit_codes import Exit
-from gaplab.api.commands.json_output import echo, print_json, print_result
+from gaplab.api.commands.json_output import print_json
 from gaplab.api.commands.submission import submit_confirmed
 from gaplab.schemas.archives import MOST_BYTES_OF_IMPORT, RepetitionRerun, RerunRead
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.settings import Settings
 from gaplab.services.store.atomic_files import PRIVATE, appearing
 
-Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")]
 
-
-@app.command(rich_help_panel=KEEPING)
+@command(KEEPING)
 def export(
-    id: Id,
-    to: Annotated[Path | None, typer.Option(help="new file; left out: gaplab-ID.zip", show_default=False)] = None,
-    as_json: AsJson = False,
-    url: Url = None,
-) -> None:
+    client: Client, id: Id, to: Annotated[Path | None, typer.Option(help="new file; left out: gaplab-ID.zip")] = None
+) -> Answer:
     """Export a study, perhaps with one of its experiments alone, into one archive: a zipped SQLite database."""
-    with connect(url) as client:
-        file = to or Path(f"gaplab-{client.study(id).id}.zip")  # the service's id, never a path that was typed
-        with appearing(file, PRIVATE) as part, part.open("wb") as target:
-            client.export(id, target)
+    file = to or Path(f"gaplab-{client.study(id).id}.zip")  # the service's id, never a path that was typed
+    with appearing(file, PRIVATE) as part, part.open("wb") as target:
+        client.export(id, target)
     size = file.stat().st_size
-    print_result({"file": str(file), "bytes": size}, f"Wrote {file}.", as_json=as_json)
-    if size > MOST_BYTES_OF_IMPORT:
-        most = f"{size:,} bytes; gaplab import takes {MOST_BYTES_OF_IMPORT:,}. gaplab backup copies any size"
-        echo(f"{file} has {most}", err=True)
+    most = f"{size:,} bytes; gaplab import takes {MOST_BYTES_OF_IMPORT:,}. gaplab backup copies any size"
+    notes = [f"{file} has {most}"] if size > MOST_BYTES_OF_IMPORT else []
+    return Answer({"file": str(file), "bytes": size}, f"Wrote {file}.", notes=notes)
 
 
-@app.command("import", rich_help_panel=KEEPING)
+@command(KEEPING, "import")
 def import_(
-    file: Annotated[Path, typer.Argument(help="an archive")], yes: Yes = False, as_json: AsJson = False, url: Url = None
-) -> None:
+    client: Client, file: Annotated[Path, typer.Argument(help="an archive")], yes: Yes = False, as_json: AsJson = False
+) -> Answer:
     """Store the content of an archive; nothing in it is run."""
-    with connect(url) as client, file.open("rb") as source:
+    with file.open("rb") as source:
         stored = client.import_(source, yes=yes)
-    if as_json:
-        print_json(stored)
-        return
-    echo(stored.study)
-    for old, new in stored.renamed.items():
-        echo(f"{old} is taken here; its new id is {new}", err=True)
-    for cancelled in stored.called_off:
-        echo(f"{cancelled} had not ended; it is cancelled here", err=True)
+    notes = [f"{old} is taken here; its new id is {new}" for old, new in stored.renamed.items()]
+    notes += [f"{cancelled} had not ended; it is cancelled here" for cancelled in stored.called_off]
+    return Answer(stored, stored.study, notes=[] if as_json else notes)
 
 
-@app.command(rich_help_panel=KEEPING)
-def backup(file: Annotated[Path, typer.Argument(help="new file for the copy")], as_json: AsJson = False) -> None:
+@command(KEEPING)
+def backup(file: Annotated[Path, typer.Argument(help="new file for the copy")]) -> Answer:
     """Copy the SQLite database of GAPLAB_DATABASE_URL into a file, even while the service writes to it."""
     from gaplab.services.store.backup import backup as copy
 
     size = copy(Settings.from_environment().database_url, file)
-    print_result({"file": str(file), "bytes": size}, f"Wrote {file}: {size:,} bytes, checked.", as_json=as_json)
+    return Answer({"file": str(file), "bytes": size}, f"Wrote {file}: {size:,} bytes, checked.")
 
 
-@app.command(rich_help_panel=KEEPING)
-def restore(
-    file: Annotated[Path, typer.Argument(help="a backup, which stays as it is")], as_json: AsJson = False
-) -> None:
+@command(KEEPING)
+def restore(file: Annotated[Path, typer.Argument(help="a backup, which stays as it is")]) -> Answer:
     """Put a backup in the place of the SQLite database of GAPLAB_DATABASE_URL, which is kept under another name."""
     from gaplab.services.store.restore import restore as put_back
 
     done = put_back(Settings.from_environment().database_url, file)
     kept = f" The former database is now {done.kept}." if done.kept else ""
     found = {"file": str(done.file), "kept": str(done.kept) if done.kept else None, "revision": done.revision}
-    print_result(found, f"Restored {file} to {done.file}, checked.{kept}", as_json=as_json)
+    return Answer(found, f"Restored {file} to {done.file}, checked.{kept}")
 
 
 COLORS = {"same": "green", "different": "bold red", "not computed": "yellow"}
 
 
-@app.command(rich_help_panel=KEEPING)
+@command(KEEPING)
 def rerun(  # noqa: PLR0913, PLR0917 - each is an option of the command
+    client: Client,
     file: Annotated[Path, typer.Argument(metavar="ARCHIVE", help="an archive of `gaplab export`")],
     verify: Annotated[
         bool, typer.Option("--verify", help="compute it on this machine, without a service, and compare every bit")
     ] = False,
-    repetitions: Annotated[
-        int | None, typer.Option(min=1, help="of each experiment to verify; left out: all", show_default=False)
-    ] = None,
-    experiment: Annotated[
-        str | None, typer.Option(help="name or id of the only experiment to verify", show_default=False)
-    ] = None,
+    repetitions: Annotated[int | None, typer.Option(min=1, help="of each experiment to verify; left out: all")] = None,
+    experiment: Annotated[str | None, typer.Option(help="name or id of the only experiment to verify")] = None,
     repetition: Annotated[
-        int | None, typer.Option(min=0, help="number of the only repetition to verify, from 0", show_default=False)
+        int | None, typer.Option(min=0, help="number of the only repetition to verify, from 0")
     ] = None,
     minutes: Annotated[
-        float | None, typer.Option(min=0.01, help="verify the first steps, until this time is over", show_default=False)
+        float | None, typer.Option(min=0.01, help="verify the first steps, until this time is over")
     ] = None,
     yes: Yes = False,
     as_json: AsJson = False,
-    url: Url = None,
-) -> None:
+) -> Answer | None:
     """Submit the spec of an archive again, or verify its results on this machine."""
     from gaplab.services.plugins import folders
 
@@ -113,14 +96,13 @@ def rerun(  # noqa: PLR0913, PLR0917 - each is an option of the command
     folders.load(warn=True)
     if verify:
         _verify(file, (repetitions, experiment, repetition, minutes), as_json=as_json)
-        return
+        return None
     from gaplab.services.archives.rerunning import submitted_spec
 
     with _opened(file) as source:
         spec = submitted_spec(source)
-    with connect(url) as client:
-        record = submit_confirmed(client, spec, yes=yes)
-    print_result(record, record.id, as_json=as_json)
+    study = submit_confirmed(client, spec, yes=yes)
+    return Answer(study, study.id)
 
 
 def _verify(file: Path, part: tuple[int | None, str | None, int | None, float | None], *, as_json: bool) -> None:

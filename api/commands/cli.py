@@ -2,6 +2,9 @@
 
 import sys
 from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import typer
 
 from gaplab.api.clients.confirmation import NotSubmitted
 from gaplab.api.clients.errors import (
@@ -15,16 +18,31 @@ from gaplab.api.clients.errors import (
 
 # the order of the commands in `gaplab --help`, and of its groups
 # isort: off
-from gaplab.api.commands import service, submission, events, records, keeping, differences, figures  # noqa: F401
-from gaplab.api.commands import reports, tuned, comparisons, life_cycle, bench, driving  # noqa: F401
-from gaplab.api.commands import archives, plugins, robots, tokens, help  # noqa: A004, F401
+from gaplab.api.commands import service, submission, studies, results, tuned  # noqa: F401
+from gaplab.api.commands import bench, archives, plugins, robots, tokens  # noqa: F401
 
 # isort: on
+from gaplab.api.commands.app import OTHERS, Answer, AsJson, command
 from gaplab.api.commands.app import app as app
 from gaplab.api.commands.exit_codes import CommandError, Exit, code_of
 from gaplab.api.commands.json_output import echo
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.plugins.threads import leave_threads
+
+
+@command(OTHERS, "help")
+def help_(
+    context: typer.Context,
+    topic: Annotated[Literal["exit-codes"] | None, typer.Argument(help="left out: the commands")] = None,
+    as_json: AsJson = False,
+) -> Answer | None:
+    """Explain the exit codes, or list the commands."""
+    if topic or as_json:
+        codes = {str(code.value): {"name": code.name, "meaning": code.meaning} for code in Exit}
+        return Answer(codes, *(f"{code.value:>4}  {code.meaning}" for code in Exit))
+    assert context.parent is not None
+    typer.echo(context.parent.get_help())
+    return None
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

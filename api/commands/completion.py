@@ -10,17 +10,7 @@ PATIENCE_S = 1.5
 """Longest wait for an answer; a shell that waits longer seems to hang."""
 
 MOST = 50
-KINDS = (
-    "strategies",
-    "robots",
-    "controllers",
-    "tasks",
-    "engines",
-    "tunables",
-    "optimizers",
-    "discrepancies",
-    "tuners",
-)
+KINDS = ("strategies", "robots", "controllers", "tasks", "engines", "tunables", "optimizers", "discrepancies", "tuners")
 
 
 def ids(incomplete: str) -> list[tuple[str, str]]:
@@ -40,7 +30,7 @@ def plugins(incomplete: str) -> list[tuple[str, str]]:
 
 def figures(incomplete: str) -> list[str]:
     """Return the kinds of figures."""
-    kinds = _completions(incomplete, lambda client: [(kind, "") for kind in client.figures.kinds()])
+    kinds = _completions(incomplete, lambda client: [(kind, "") for kind in client.figure_kinds()])
     return [kind for kind, _ in kinds]
 
 

@@ -112,7 +112,7 @@ def _run_study(name: str, spec: dict[str, Any], client: Client, folder: Path, co
         notes = _notes(folder) | {name: {"study": study.id, "spec": spec}}
         (folder / "demo.json").write_text(json.dumps(notes), "utf-8")
         console.print(f"\n[bold]{name}[/]: POST /studies → 202, study {study.id}")
-    client.watcher.show(study.id, console, every_s=0.5)
+    client.show(study.id, console, every_s=0.5)
     study = client.study(study.id)
     if study.state is not State.COMPLETED:
         reasons = sorted({reason for experiment in study.experiments for reason in experiment.reasons})

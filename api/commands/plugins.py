@@ -7,26 +7,26 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.markup import escape
 
+from gaplab.api.clients.client import Client
 from gaplab.api.clients.screen import console
 from gaplab.api.commands import completion, tables
-from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
+from gaplab.api.commands.app import PLUGINS, Answer, AsJson, app, command
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import print_json
 from gaplab.services.core.errors import unknown_name
 
 
-@app.command(rich_help_panel=PLUGINS)
+@command(PLUGINS)
 def catalogue(
+    client: Client,
     name: Annotated[
         str | None,
         typer.Argument(metavar="[NAME]", help="a plug-in, to show its options", autocompletion=completion.plugins),
     ] = None,
     as_json: AsJson = False,
-    url: Url = None,
 ) -> None:
     """List the plug-ins of each kind, or show one plug-in."""
-    with connect(url) as client:
-        found = client.catalogue()
+    found = client.catalogue()
     plugins = {plugin.name: plugin for kind in completion.KINDS for plugin in getattr(found, kind)}
     if name is not None and name not in plugins:
         raise CommandError(unknown_name("", "plug-in", name, list(plugins)).message, Exit.NOT_FOUND)
@@ -47,16 +47,14 @@ plugin = typer.Typer(help="Write your own plug-ins, and check them.", no_args_is
 app.add_typer(plugin, name="plugin", rich_help_panel=PLUGINS)
 
 
-@plugin.command()
+@command(of=plugin)
 def new(
     kind: Annotated[Kind, typer.Argument(help="kind of the plug-in")],
     name: Annotated[str, typer.Argument(metavar="NAME", help="name in specs, and of the file")],
     folder: Annotated[
-        Path | None,
-        typer.Option(help="folder of the file; left out: the first of GAPLAB_PLUGINS, or plugins", show_default=False),
+        Path | None, typer.Option(help="folder of the file; left out: the first of GAPLAB_PLUGINS, or plugins")
     ] = None,
-    as_json: AsJson = False,
-) -> None:
+) -> Answer:
     """Write a plug-in that runs, to change into your own."""
     from gaplab.services.contract.checks import write_skeleton
     from gaplab.services.plugins import folders
@@ -66,10 +64,10 @@ def new(
     file = write_skeleton(kind, name, folder or (named[0] if named else Path("plugins")))
     is_found = file.absolute().parent in named
     start = "" if is_found else f"\nLet the service find it: export GAPLAB_PLUGINS={file.absolute().parent}"
-    print_result({"file": str(file)}, f"Wrote {file}. Check it: gaplab plugin check {file}{start}", as_json=as_json)
+    return Answer({"file": str(file)}, f"Wrote {file}. Check it: gaplab plugin check {file}{start}")
 
 
-@plugin.command()
+@command(of=plugin)
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="a Python file, or the folder of a package")],
     as_json: AsJson = False,

@@ -46,11 +46,7 @@ def confirmed(doubts: Sequence[str]) -> bool:
 
 
 def demand_yes(what: str) -> None:
-    """Ask whether to delete it for good.
-
-    Raises:
-        CommandError: the answer is not yes, or there is no terminal.
-    """
+    """Ask whether to delete it for good; raise CommandError if the answer is not yes, or there is no terminal."""
     with keyboard() as ask:
         if ask is None:
             raise CommandError(f"to delete {what} for good without a terminal, add --yes", Exit.USAGE)

@@ -10,10 +10,11 @@ from pydantic import ValidationError
 from rich.markup import escape
 from rich.table import Table
 
+from gaplab.api.clients.client import Client
 from gaplab.api.clients.screen import console
-from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
+from gaplab.api.commands.app import PLUGINS, Answer, AsJson, app, command
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.json_output import print_json
 from gaplab.api.commands.tables import minute, table
 from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.robots import RobotRead
@@ -35,18 +36,15 @@ robot = typer.Typer(help="Import robots from URDF and MJCF, and store them.", no
 app.add_typer(robot, name="robot", rich_help_panel=PLUGINS)
 
 
-@robot.command("import")
+@command(name="import", of=robot)
 def import_file(  # noqa: PLR0913, PLR0917 - each is an option of the command
     file: Annotated[Path, typer.Argument(metavar="FILE", help="a URDF or an MJCF")],
     name: Annotated[str | None, typer.Option(help="name of the robot; left out: that in the file")] = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="file to write; left out: NAME.json", show_default=False)
-    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="file to write; left out: NAME.json")] = None,
     fixed: Annotated[bool, typer.Option("--fixed", help="the base never moves, like that of an arm")] = False,
     mend: Annotated[bool, typer.Option("--mend", help="replace masses and inertias that no rigid body has")] = False,
     motor: Annotated[
-        str | None,
-        typer.Option(help=f"motor of the joints: {MOTORS}; left out: the file's, position for a URDF"),
+        str | None, typer.Option(help=f"motor of the joints: {MOTORS}; left out: the file's, position for a URDF")
     ] = None,
     time_step: Annotated[float | None, typer.Option(help="time step, s; left out: the file's, or 1/240")] = None,
     start: Annotated[
@@ -162,18 +160,16 @@ def _mass_table(imported: "ImportedFile") -> Table:
     return table(columns, ((*words, f"{before:.6g}", f"{after:.6g}") for *words, before, after in rows))
 
 
-@robot.command()
+@command(of=robot)
 def add(
+    client: Client,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="a robot file, as `gaplab robot import` writes it")],
-    as_json: AsJson = False,
-    url: Url = None,
-) -> None:
+) -> Answer:
     """Store a robot file in the service, so that specs can name its robot."""
     _check_that_it_is_json(file)
-    with connect(url) as client:
-        found = client.add_robot(file)
-    text = f"Stored the robot {found.name}, sha256 {found.sha256}. A spec names it: {json.dumps({'robot': found.name})}"
-    print_result(found, text, as_json=as_json)
+    found = client.add_robot(file)
+    named = json.dumps({"robot": found.name})
+    return Answer(found, f"Stored the robot {found.name}, sha256 {found.sha256}. A spec names it: {named}")
 
 
 def _check_that_it_is_json(file: Path) -> None:
@@ -192,14 +188,13 @@ def _check_that_it_is_json(file: Path) -> None:
         raise CommandError(f"{file} {reason}", Exit.FILE) from error
 
 
-@robot.command("list")
-def list_(as_json: AsJson = False, url: Url = None) -> None:
+@command(name="list", of=robot)
+def list_(client: Client) -> Answer:
     """List the robots from files that the service has, the newest of a name first."""
-    with connect(url) as client:
-        found = client.robots()
+    found = client.robots()
     columns = ("name", "sha256", "bodies", "actuators", "kg", "file", "stored")
     shown = table(columns, map(_row, found)) if found else "No robot is stored; `gaplab robot add FILE` stores one."
-    print_result(found, shown, as_json=as_json)
+    return Answer(found, shown)
 
 
 def _row(found: RobotRead) -> tuple[str, ...]:

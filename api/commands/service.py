@@ -12,8 +12,8 @@ from gaplab.services.settings import Settings
 
 @app.command(rich_help_panel=RUNNING)
 def serve(
-    port: Annotated[int | None, typer.Option(help="left out: GAPLAB_PORT, or 8000", show_default=False)] = None,
-    host: Annotated[str | None, typer.Option(help="left out: GAPLAB_HOST, or loopback", show_default=False)] = None,
+    port: Annotated[int | None, typer.Option(help="left out: GAPLAB_PORT, or 8000")] = None,
+    host: Annotated[str | None, typer.Option(help="left out: GAPLAB_HOST, or loopback")] = None,
     workers: Annotated[
         bool, typer.Option("--workers/--no-workers", help="run experiments, or only accept and show them")
     ] = True,

@@ -1,4 +1,4 @@
-"""Commands that submit a spec, and the one that shows the progress of what runs."""
+"""Commands that submit a spec, and those that show what becomes of it."""
 
 import json
 import sys
@@ -7,17 +7,19 @@ from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
+from rich.markup import escape
 
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.confirmation import confirm, sentence
 from gaplab.api.clients.progress import state_text
 from gaplab.api.clients.screen import console
-from gaplab.api.commands import tables
-from gaplab.api.commands.app import SPECS, AsJson, Id, Url, app, connect, print_warnings
+from gaplab.api.commands import completion, tables
+from gaplab.api.commands.app import SPECS, AsJson, Id, Yes, command, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import echo, print_json, print_result
 from gaplab.api.commands.questions import keyboard
 from gaplab.schemas.estimates import EstimateRead
+from gaplab.schemas.events import EventKind, EventRead
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
 from gaplab.services.findings.tables import sensitivity as effects
@@ -25,31 +27,30 @@ from gaplab.services.findings.tables import sensitivity as effects
 SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - for standard input")]
 
 
-@app.command(rich_help_panel=SPECS)
+@command(SPECS)
 def submit(
+    client: Client,
     spec: SpecFile,
     watch: Annotated[bool, typer.Option("--watch", help="show the progress until it ends")] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, whatever it costs")] = False,
+    yes: Yes = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="print the complete spec and the estimated cost; submit nothing")
     ] = False,
     as_json: AsJson = False,
-    url: Url = None,
 ) -> None:
     """Submit a study; a spec that names one strategy is that of a single experiment.
 
     The estimated cost is shown first, on standard error. Above an hour, a person at a terminal is asked.
     """
     content = read_spec(spec)
-    with connect(url) as client:
-        if dry_run:
-            _print_estimate(client.estimate(content), as_json=as_json)
-            return
-        record = submit_confirmed(client, content, yes=yes)
-        if not (as_json and watch):
-            print_result(record, record.id, as_json=as_json)
-        if watch:
-            _watch(client, record.id, as_json=as_json)
+    if dry_run:
+        _print_estimate(client.estimate(content), as_json=as_json)
+        return
+    record = submit_confirmed(client, content, yes=yes)
+    if not (as_json and watch):
+        print_result(record, record.id, as_json=as_json)
+    if watch:
+        _watch(client, record.id, as_json=as_json)
 
 
 def submit_confirmed(client: Client, spec: Mapping[str, Any], *, yes: bool) -> StudyRead:
@@ -60,7 +61,7 @@ def submit_confirmed(client: Client, spec: Mapping[str, Any], *, yes: bool) -> S
     """
     with keyboard() as ask:
         agreed = confirm(client.estimate(spec), None if yes else ask)
-    return client.submission.send(spec, confirm_cost=yes or agreed)
+    return client.send(spec, confirm_cost=yes or agreed)
 
 
 def _print_estimate(estimate: EstimateRead, *, as_json: bool) -> None:
@@ -71,24 +72,22 @@ def _print_estimate(estimate: EstimateRead, *, as_json: bool) -> None:
     echo(f"{sentence(estimate)}. Nothing was submitted.", err=True)
 
 
-@app.command(rich_help_panel=SPECS)
+@command(SPECS)
 def watch(
+    client: Client,
     id: Id,
     every: Annotated[float, typer.Option(min=0.1, max=3600, help="seconds between requests")] = 1.0,
     patience: Annotated[float, typer.Option(min=0, help="longest time in seconds without a service")] = 600.0,
     as_json: AsJson = False,
-    url: Url = None,
 ) -> None:
     """Watch a study until it ends: live curves and repetitions in a terminal, lines in a log."""
-    with connect(url) as client:
-        _watch(client, id, as_json=as_json, curves=True, every_s=every, patience_s=patience)
+    _watch(client, id, as_json=as_json, curves=True, every_s=every, patience_s=patience)
 
 
-@app.command(rich_help_panel=SPECS)
-def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> None:
+@command(SPECS)
+def sensitivity(client: Client, spec: SpecFile, as_json: AsJson = False) -> None:
     """Check the tunables of a spec: whether they change fitness, how much, and how smoothly."""
-    with connect(url) as client:
-        check = client.check(read_spec(spec))
+    check = client.check(read_spec(spec))
     if as_json or check.state is State.COMPLETED:
         print_result(check, *tables.shown(effects(check, check.spec.robot.name)), *check.warnings, as_json=as_json)
     if check.state is not State.COMPLETED:
@@ -98,7 +97,7 @@ def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> Non
 def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  # noqa: ANN401 - those of `show`
     """Show the progress until the end, then the result; exit with an error if an experiment did not complete."""
     try:
-        record = client.watcher.show(id, console(stderr=as_json), **options)
+        record = client.show(id, console(stderr=as_json), **options)
     except KeyboardInterrupt:
         msg = f"the service continues with it; `gaplab watch {id}` shows the progress again"
         raise CommandError(msg, Exit.INTERRUPTED) from None
@@ -130,3 +129,34 @@ def read_spec(name: str) -> dict[str, Any]:
 
 def _refuse(constant: str) -> NoReturn:
     raise ValueError(f"JSON has no {constant}; use a number or null")
+
+
+@command(SPECS)
+def events(
+    client: Client,
+    id: Annotated[
+        str | None, typer.Argument(metavar="[ID]", help="a study or an experiment", autocompletion=completion.ids)
+    ] = None,
+    follow: Annotated[bool, typer.Option("--follow", help="continue forever with new events")] = False,
+    kind: Annotated[list[EventKind] | None, typer.Option(help="only this kind; repeatable")] = None,
+    after: Annotated[int, typer.Option(min=0, help="number of the last event that is already known")] = 0,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print one JSON document; with --follow, one on each line")
+    ] = False,
+) -> None:
+    """Print the events of a study, or of the whole service, one on each line."""
+    found = client.events(follow=follow, study=id, kind=[each.value for each in kind or []], after=after)
+    if as_json and not follow:
+        print_json(found)
+        return
+    screen = console()
+    for event in found:
+        if as_json:
+            print_json(event, line=True)
+        else:
+            screen.print(_line(event), soft_wrap=True)
+
+
+def _line(event: EventRead) -> str:
+    when = event.at.astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    return f"{event.number:>7} {when} {event.experiment} {escape(event.sentence)}"

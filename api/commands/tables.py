@@ -11,10 +11,10 @@ from rich.text import Text
 
 from gaplab.api.clients.progress import Record, colored, left, percent, standing
 from gaplab.api.commands.completion import KINDS
+from gaplab.schemas.curves import Curve, CurvePoint, from_before
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.plugin import Catalogue, PluginRead
 from gaplab.schemas.records import ExperimentRead, RepetitionRead, StudyRead
-from gaplab.schemas.results import Curve, CurvePoint, from_before
 from gaplab.services.figures.words import titled
 from gaplab.services.findings.tables import Grid
 

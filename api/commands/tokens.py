@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from gaplab.api.commands.app import OTHERS, AsJson, app
-from gaplab.api.commands.json_output import echo, print_result
+from gaplab.api.commands.app import OTHERS, Answer, AsJson, app, command
+from gaplab.api.commands.json_output import echo
 from gaplab.api.commands.tables import minute, table
-from gaplab.schemas.keeping import Role, TokenRead
+from gaplab.schemas.access import Role, TokenRead
 from gaplab.services.settings import Settings
 
 if TYPE_CHECKING:
@@ -24,12 +24,12 @@ tokens = typer.Typer(
 app.add_typer(tokens, name="token", rich_help_panel=OTHERS)
 
 
-@tokens.command()
+@command(of=tokens)
 def create(
     role: Annotated[Role, typer.Option(help="permissions: reader reads; runner also runs; admin also reveals reality")],
-    name: Annotated[str | None, typer.Option(help="name of the user", show_default=False)] = None,
+    name: Annotated[str | None, typer.Option(help="name of the user")] = None,
     as_json: AsJson = False,
-) -> None:
+) -> Answer:
     """Create a token, and print it this once: only its digest is stored. A new database gets its tables first."""
     from gaplab.api.process.service import migrate
     from gaplab.services import access
@@ -39,11 +39,11 @@ def create(
         made = access.create_token(store, role, name)
     if not as_json:
         echo(f"{made.token.id} ({made.token.name}, {role.value}); this is shown once, for GAPLAB_TOKEN:", err=True)
-    print_result({"token": made.token, "secret": made.secret}, made.secret, as_json=as_json)
+    return Answer({"token": made.token, "secret": made.secret}, made.secret)
 
 
-@tokens.command("list")
-def list_(as_json: AsJson = False) -> None:
+@command(name="list", of=tokens)
+def list_() -> Answer:
     """List the tokens, without their secrets."""
     from gaplab.services import access
 
@@ -51,20 +51,18 @@ def list_(as_json: AsJson = False) -> None:
         found = access.list_tokens(store)
     columns = ("id", "name", "role", "created", "last used", "revoked")
     shown = table(columns, map(_row, found)) if found else "No tokens yet; `gaplab token create` makes one."
-    print_result(found, shown, as_json=as_json)
+    return Answer(found, shown)
 
 
-@tokens.command()
-def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="id of the token")], as_json: AsJson = False) -> None:
+@command(of=tokens)
+def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="id of the token")]) -> Answer:
     """Revoke a token; the service refuses it from the next request on."""
     from gaplab.services import access
 
     with _store() as store:
         access.revoke_token(store, id)
         left = [token for token in access.list_tokens(store) if token.revoked_at is None]
-    print_result({"id": id, "revoked": True}, f"Revoked {id}.", as_json=as_json)
-    if not left:
-        echo(NONE_LEFT, err=True)
+    return Answer({"id": id, "revoked": True}, f"Revoked {id}.", notes=[] if left else [NONE_LEFT])
 
 
 @contextmanager

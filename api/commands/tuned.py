@@ -11,11 +11,11 @@ import typer
 
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, lines_of
-from gaplab.api.commands.app import RESULTS, AsJson, ExperimentId, Url, app, connect
+from gaplab.api.commands.app import RESULTS, Answer, ExperimentId, command
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.commands.json_output import echo, print_result
+from gaplab.api.commands.json_output import echo
+from gaplab.schemas.records import SimulatorRead
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.results import SimulatorRead
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.findings.wording import interval
 
@@ -29,19 +29,18 @@ FURTHER = ("slope", "max_torque", "kp", "motor_gain", "delay", "mass", "joint_da
 """Labels of tunables that models often lack."""
 
 
-@app.command(rich_help_panel=RESULTS)
+@command(RESULTS)
 def simulator(
+    client: Client,
     id: ExperimentId,
     output: Annotated[Path, typer.Option("--output", "-o", help="file to write: .json, or .urdf or .xml with --from")],
     original: Annotated[
-        Path | None, typer.Option("--from", help="URDF or MJCF that the robot was imported from", show_default=False)
+        Path | None, typer.Option("--from", help="URDF or MJCF that the robot was imported from")
     ] = None,
     partial: Annotated[
         bool, typer.Option("--partial", help="leave out values that the format has no place for; they become comments")
     ] = False,
-    as_json: AsJson = False,
-    url: Url = None,
-) -> None:
+) -> Answer:
     """Write the best tuned simulator as a robot file, or into the robot's URDF or MJCF, if its rollouts are the same.
 
     A .xml without --from is an MJCF of the simulator for MuJoCo alone, which has one friction and no restitution.
@@ -51,10 +50,9 @@ def simulator(
     from gaplab.services.world import robot_library
 
     folders.load()
-    with connect(url) as client:
-        best, spec = client.results.best_simulator(id), spec_of(client.spec(id).resolved[0])
-        if spec.robot.name == robot_library.IMPORTED:
-            robot_library.learn([client.robot_file(spec.robot.options["sha256"]).decode()])
+    best, spec = client.best_simulator(id), spec_of(client.spec(id).resolved[0])
+    if spec.robot.name == robot_library.IMPORTED:
+        robot_library.learn([client.robot_file(spec.robot.options["sha256"]).decode()])
     if best is None:
         raise CommandError(f"{id} has no tuned simulators yet", Exit.CONFLICT)
     try:
@@ -62,16 +60,11 @@ def simulator(
     except InvalidRobot as error:
         raise CommandError("\n  - ".join([f"{output} was not written:", *error.reasons]), Exit.INVALID) from error
     found = output, best, written, distances_m
-    print_result(_facts(*found), *_lines(*found), as_json=as_json)
+    return Answer(_facts(*found), *_lines(*found))
 
 
 def _written(
-    id: str,
-    spec: ResolvedSpec,
-    best: SimulatorRead,
-    files: tuple[Path, Path | None],
-    *,
-    partial: bool,
+    id: str, spec: ResolvedSpec, best: SimulatorRead, files: tuple[Path, Path | None], *, partial: bool
 ) -> tuple["WrittenFile", float, float | None]:
     """Write the file; return what is in it, and the largest distances in rollouts, here and in MuJoCo alone."""
     from gaplab.services.core.arrays import frozen
@@ -159,23 +152,21 @@ def _lines(
         yield f"MuJoCo alone, with one friction and no restitution, differs by up to {plain:.2g} m within a second."
 
 
-@app.command(rich_help_panel=RESULTS)
+@command(RESULTS)
 def try_tunables(
+    client: Client,
     id: ExperimentId,
     further: Annotated[
         list[str] | None, typer.Argument(metavar="TUNABLE", help=f"default: {', '.join(FURTHER)}")
     ] = None,
-    as_json: AsJson = False,
-    url: Url = None,
-) -> None:
+) -> Answer:
     """Search for simulators on an experiment's samples with each of further tunables, and print which errors are left.
 
     Each search is an experiment without real-world evaluations. The first ones add nothing, by its tuner and `search`.
     """
-    with connect(url) as client:
-        tried = list(_tried(client, id, further or FURTHER))
+    tried = list(_tried(client, id, further or FURTHER))
     line = "{:.3g} {unit} with {added}, by {tuner}: {experiment}"
-    print_result(tried, *(line.format(each["error"] or nan, **each) for each in tried), as_json=as_json)
+    return Answer(tried, *(line.format(each["error"] or nan, **each) for each in tried))
 
 
 def _tried(client: Client, id: str, further: Sequence[str]) -> Iterator[dict[str, Any]]:
@@ -191,7 +182,7 @@ def _tried(client: Client, id: str, further: Sequence[str]) -> Iterator[dict[str
         asked = {"name": f"with {added}", "tunables": [*spec["tunables"], *({added} - {"nothing"})]}
         by = {} if tuner == spec["tuner"]["name"] else {"tuner": tuner}
         try:
-            sent.append((added, tuner, client.submission.send(again | asked | by, confirm_cost=True).id))
+            sent.append((added, tuner, client.send(again | asked | by, confirm_cost=True).id))
         except ServiceError as refused:
             echo(f"{added} is not tried: {lines_of(refused.problem)[0]}", err=True)
     for added, tuner, made in sent:

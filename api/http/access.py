@@ -14,7 +14,7 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from gaplab.api.http import problems
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.services.access import ANYONE, Caller, authenticate, demand, is_loopback
 from gaplab.services.core.errors import Forbidden, GaplabError
 from gaplab.services.settings import Settings

@@ -86,11 +86,7 @@ def modules_of(folder: Path, script: str) -> tuple[str, ...]:
     """Return the paths of a script and of what it imports statically, directly or not.
 
     A browser learns what a module imports only when it has the module, so each level of imports would wait for the
-    level above.
-
-    Args:
-        folder: folder of the scripts.
-        script: path in the folder, with slashes, as are those returned.
+    level above. Paths are in the folder, with slashes.
     """
     found: dict[str, None] = {}
     waiting = [script]

@@ -8,19 +8,16 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
-from fastapi import Depends, Header, Request, Response
+from fastapi import Depends, Header, Query, Request
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
-from starlette.datastructures import URLPath
 
 from gaplab.api.http.access import ASKING, READING
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import Streams
 from gaplab.api.http.violations import wrong_parameters
-from gaplab.schemas.base import Frozen
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.services.access import Caller, demand
 from gaplab.services.core.errors import InvalidSpec, NotFound
-from gaplab.services.experiments.idempotency import Once
 from gaplab.services.experiments.limits import Admission
 from gaplab.services.nesting import refuse_too_deep
 from gaplab.services.replay.process import RolloutProcess
@@ -28,7 +25,7 @@ from gaplab.services.settings import Limits
 from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.session import Store
 
-R = TypeVar("R", bound=Frozen)
+T = TypeVar("T")
 
 WRITERS = 12
 """Requests that may write at once: with three waiting lines, they leave a thread of the service free."""
@@ -96,6 +93,11 @@ StreamsDep = Annotated[Streams, of_app("streams")]
 LimitedDep = Annotated[Admission, Depends(_limited)]
 AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
+Number = Annotated[int, Field(ge=0, le=1_000_000)]
+"""The number of a repetition or an iteration, from 0."""
+
+Asked = Annotated[T, Query()]
+"""The query parameters of an operation, as a model."""
 
 
 async def refuse_malformed(request: Request) -> None:
@@ -141,15 +143,15 @@ class Parameters(BaseModel):
 class Paging(Parameters):
     """The part of a list to return."""
 
-    limit: int = Field(default=50, ge=1, le=500, description="most items to return")
-    cursor: str | None = Field(default=None, max_length=2_000, description="`next` of the previous part")
+    limit: int = Field(50, ge=1, le=500, description="most items to return")
+    cursor: str | None = Field(None, max_length=2_000, description="`next` of the previous part")
 
 
 class Confirmation(Parameters):
     """Confirmation of a high cost, or of an unlikely name."""
 
     confirm_cost: bool = Field(
-        default=False,
+        False,
         description="confirm a cost above `GAPLAB_MAX_UNCONFIRMED_CORE_HOURS`, or a bench whose name is nearly that of "
         "another; without it, such a request is refused",
     )
@@ -159,34 +161,19 @@ class Confirmation(Parameters):
         return replace(admitted, cost_known=self.confirm_cost)
 
 
+Confirming = Asked[Confirmation]
+
+
 class Revealing(Parameters):
     """Whether to show reality's parameters before the experiment ends."""
 
     reveal: bool = Field(
-        default=False,
-        description="show reality's parameters before the experiment has ended; requires an admin's token",
+        False, description="show reality's parameters before the experiment has ended; requires an admin's token"
     )
 
     def permitted(self, caller: Caller) -> bool:
-        """Return `reveal`, if the caller may reveal reality.
-
-        Raises:
-            Forbidden: the caller may not reveal reality.
-        """
+        """Return `reveal`; raise Forbidden if the caller may not reveal reality."""
         if self.reveal:
             demand(caller, Role.ADMIN, "to reveal reality's parameters")
             logger.warning("reality is revealed to token %s", caller.token)
         return self.reveal
-
-
-def created(once: Once[R], response: Response, location: URLPath) -> R:
-    """Return the answer to a submission; headers say where it is, and whether an earlier request submitted it."""
-    response.headers["Location"] = str(location)
-    return once_answered(once, response)
-
-
-def once_answered(once: Once[R], response: Response) -> R:
-    """Return the answer; a header says whether an earlier request had it."""
-    if once.replayed:
-        response.headers["Idempotent-Replayed"] = "true"
-    return once.answer

@@ -7,7 +7,8 @@ from fastapi import Response
 from pydantic import Field
 
 from gaplab.api.http.dependencies import Parameters
-from gaplab.api.http.problems import Responses, documented
+from gaplab.api.http.documentation import sent
+from gaplab.api.http.problems import documented
 from gaplab.api.http.security_headers import page
 from gaplab.schemas.figures import Chart, FigureRead, TableRead
 from gaplab.services.figures.marks import FigureDefinition
@@ -33,25 +34,29 @@ _DRAWING = WaitingLine("figures")
 _FORMATS = "a self-contained page, JSON for Plotly, or a file for a paper"
 
 
+SENT = sent(
+    {
+        "text/html": "<!doctype html><html lang='en'>…",
+        "image/svg+xml": "<svg xmlns='http://www.w3.org/2000/svg'>…",
+        "image/png": "PNG…",
+        "application/pdf": "%PDF…",
+    },
+    _FORMATS.capitalize(),
+) | documented(429)
+"""The documented answers of a figure's endpoint."""
+
+
 class FigureQuery(Parameters):
     """How to draw a figure; each kind of figure adds what to draw."""
 
-    format: Literal["html", "json", "svg", "png", "pdf"] = Field(default="html", description=_FORMATS)
-    title: str | None = Field(
-        default=None, max_length=TITLE, description="text above the figure; left out: what it shows"
-    )
-    width: float = Field(
-        default=3.5, ge=2.5, le=20, description="width of a file in inches; a column has 3.5, a page 7.2"
-    )
-    caption: bool = Field(default=True, description="whether a file has the caption below the figure")
+    format: Literal["html", "json", "svg", "png", "pdf"] = Field("html", description=_FORMATS)
+    title: str | None = Field(None, max_length=TITLE, description="text above the figure; left out: what it shows")
+    width: float = Field(3.5, ge=2.5, le=20, description="width of a file in inches; a column has 3.5, a page 7.2")
+    caption: bool = Field(True, description="whether a file has the caption below the figure")
 
 
 def answer(figure: FigureDefinition, query: FigureQuery) -> Response:
-    """Return the figure in the requested format.
-
-    Raises:
-        LimitReached: too many files are being drawn.
-    """
+    """Return the figure in the requested format; raise LimitReached if too many files are being drawn."""
     if query.format == "html":
         return page(render_html(figure))
     media_type = MEDIA_TYPES[query.format]
@@ -75,24 +80,5 @@ def in_turn(draw: Callable[[], T]) -> T:
 
 def read(figure: FigureDefinition) -> FigureRead:
     """Return the figure as the schema of the API."""
-    table = figure.table and TableRead(head=figure.table.head, rows=figure.table.rows)
-    return FigureRead(
-        figure=Chart.model_validate(chart(figure)),
-        title=figure.title,
-        caption=figure.caption,
-        alt=figure.alt,
-        empty=figure.empty,
-        table=table,
-    )
-
-
-def responses(*statuses: int) -> Responses:
-    """Return the documented responses of a figure's endpoint; `statuses` are its problems besides 404, 422 and 429."""
-    text, binary = {"type": "string"}, {"type": "string", "format": "binary"}
-    content = {
-        "text/html": {"schema": text, "example": "<!doctype html><html lang='en'>…"},
-        "image/svg+xml": {"schema": text, "example": "<svg xmlns='http://www.w3.org/2000/svg'>…"},
-        "image/png": {"schema": binary, "example": "PNG…"},
-        "application/pdf": {"schema": binary, "example": "%PDF…"},
-    }
-    return {200: {"description": _FORMATS.capitalize(), "content": content}, **documented(404, 422, 429, *statuses)}
+    table = figure.table and TableRead.filled_from(figure.table)
+    return FigureRead.filled_from(figure, figure=Chart.model_validate(chart(figure)), table=table)

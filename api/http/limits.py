@@ -102,12 +102,7 @@ def busy(detail: str) -> Response:
 
 
 def most_requests(limits: Limits, files: int | None = None) -> int:
-    """Return the most requests to serve at once: the limit, or what half of the files that may be open permit.
-
-    Args:
-        limits: of the service.
-        files: that may be open; left out: as this process may.
-    """
+    """Return the most requests to serve at once: the limit, or what half of the files that may be open permit."""
     files = resource.getrlimit(resource.RLIMIT_NOFILE)[0] if files is None else files
     return limits.requests if files == resource.RLIM_INFINITY else min(limits.requests, max(1, files // 2 - SPARE))
 

@@ -130,14 +130,9 @@ def _headers(request: Request, error: GaplabError, status: int) -> dict[str, str
 
 
 def _spec_error(violation: Violation) -> SpecError:
-    permitted = violation.permitted
-    return SpecError(
-        pointer=violation.pointer,
-        value=finite(violation.value),
-        message=brief(violation.message),
-        permitted=permitted if isinstance(permitted, str | None) else tuple(permitted),
-        nearest=violation.nearest,
-    )
+    permitted = violation.permitted if isinstance(violation.permitted, str | None) else tuple(violation.permitted)
+    message = brief(violation.message)
+    return SpecError.filled_from(violation, value=finite(violation.value), message=message, permitted=permitted)
 
 
 def _of_validation(request: Request, error: Exception) -> Response:
@@ -146,7 +141,7 @@ def _of_validation(request: Request, error: Exception) -> Response:
     if found[0]["type"] == "json_invalid":
         where, what = found[0]["loc"][-1], found[0]["ctx"]["error"]
         return response(problem(*FRAMEWORK[400], f"The body is not JSON: {what} at character {where}."))
-    errors = [explain(each, error.body, request) for each in found[:MOST_ERRORS]]
+    errors = [_spec_error(explain(each, error.body, request)) for each in found[:MOST_ERRORS]]
     kind = INVALID_SPEC if all(each["loc"][0] == "body" for each in found) else INVALID_REQUEST
     if any(each["loc"] == ("body",) and isinstance(each["input"], bytes) for each in found):
         kind = FRAMEWORK[415]  # FastAPI did not parse it

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from itertools import islice
 from types import UnionType
@@ -10,7 +11,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from fastapi import Request
 from pydantic import BaseModel
 
-from gaplab.schemas.mistakes import SpecError, permitted_by, pointer_to, sentence
+from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
 from gaplab.services.core.errors import Violation, unknown_name
 
 MOST_ERRORS = 50
@@ -23,7 +24,7 @@ def without_consequences(errors: Sequence[Mapping[str, Any]]) -> list[Mapping[st
     return [error for error in errors if error["type"] != "too_short" or error["loc"] not in parents]
 
 
-def explain(error: Mapping[str, Any], body: object, request: Request) -> SpecError:
+def explain(error: Mapping[str, Any], body: object, request: Request) -> Violation:
     """Return an error of pydantic in the words of the API.
 
     Args:
@@ -39,18 +40,14 @@ def explain(error: Mapping[str, Any], body: object, request: Request) -> SpecErr
     path = path[: _depth(body, path)] if place == "body" else path
     if error["type"] == "extra_forbidden":
         fields = _fields(kinds, path[:-1]) if place == "body" else tuple(_parameters(request))
-        return _unknown_field(str(place), path, error["input"], fields)
+        kind, name = "field" if place == "body" else "parameter", _text(path[-1])
+        return replace(unknown_name(_pointer(str(place), path), kind, name, fields), value=error["input"])
     permitted, message = permitted_by(error), str(finite(sentence(error, path)))
     if error["type"] == "model_attributes_type" and isinstance(error["input"], bytes):
         message = "send the body as JSON, with the header `Content-Type: application/json`"
     absent = error["type"] == "missing" or isinstance(error["input"], bytes)
-    return SpecError(
-        pointer=_pointer(str(place), path),
-        value=None if absent else finite(error["input"]),
-        message=message,
-        permitted=permitted,
-        nearest=_nearest(error["input"], permitted),
-    )
+    value, nearest = None if absent else error["input"], _nearest(error["input"], permitted)
+    return Violation(_pointer(str(place), path), value, message, permitted, nearest)
 
 
 def finite(value: object, depth: int = 6) -> object:
@@ -96,18 +93,6 @@ def _nearest(value: object, permitted: tuple[str, ...] | str | None) -> str | No
     if not isinstance(value, str) or not isinstance(permitted, tuple):
         return None
     return next(iter(get_close_matches(value, permitted, n=1, cutoff=0.5)), None)
-
-
-def _unknown_field(place: str, path: Sequence[str | int], value: object, fields: tuple[str, ...]) -> SpecError:
-    name = _text(path[-1])
-    found = unknown_name(_pointer(place, path), "field" if place == "body" else "parameter", name, fields)
-    return SpecError(
-        pointer=found.pointer,
-        value=finite(value),
-        message=found.message,
-        permitted=fields,
-        nearest=found.nearest,
-    )
 
 
 def _fields(models: Sequence[type[BaseModel]], path: Sequence[str | int]) -> tuple[str, ...]:

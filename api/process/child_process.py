@@ -24,12 +24,8 @@ def start(
 ) -> "subprocess.Popen[bytes]":
     """Start a Python module in a separate process and session, which gets SIGTERM if the calling thread ends.
 
-    Args:
-        module: name of the module, as in `python -m`.
-        arguments: arguments of the module.
-        environment: variables to add to the caller's.
-        log: receives the output; left out: the caller's output.
-        keep_open: descriptors that the process inherits.
+    It has the environment of the caller and these variables, its output unless there is a log, and inherits these
+    descriptors.
     """
     command = [sys.executable, "-m", "gaplab.api.process.child_process", str(os.getpid()), module, *arguments]
     return subprocess.Popen(  # noqa: S603 - our own modules

@@ -51,17 +51,7 @@ def local_service(folder: str | Path = "results/local", *, plugins: str | Path |
 def start_service(
     database_url: str, log: Path, *, workers: bool = True, plugins: str | Path | None = None
 ) -> LocalService:
-    """Start a service in a process of its own and return its client.
-
-    Args:
-        database_url: its database; a service without workers does not migrate it.
-        log: receives the output of the service; a large one is renamed first.
-        workers: whether it also runs experiments.
-        plugins: a folder with your own plug-ins; left out: GAPLAB_PLUGINS.
-
-    Raises:
-        CommandError: the service does not start; the message says why.
-    """
+    """Start a service as `local_service` does; without workers, it runs no experiments and migrates nothing."""
     port = _free_port()
     url = f"http://127.0.0.1:{port}"
     environment = {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}

@@ -162,12 +162,7 @@ def serve_api(
 ) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP, then finish the requests under way.
 
-    Args:
-        settings: of the service.
-        listener: where requests come in.
-        supervisor: that this process keeps, whose troubles `/readyz` tells.
-        limits: left out: those of the environment.
-        notify: settings of notifications; left out: those of the environment.
+    `/readyz` tells the troubles of the supervisor. Limits and notifications that are left out are the environment's.
 
     Raises:
         Unauthenticated: other machines can reach the host, and no token exists.
@@ -186,12 +181,7 @@ def serve_api(
 
 
 def require_token(settings: Settings) -> None:
-    """Check that a token exists if other machines can reach the host.
-
-    Raises:
-        Unauthenticated: none does; the message has the command that creates one.
-        StoreUnavailable: the database does not answer.
-    """
+    """Raise Unauthenticated, with the command that creates one, if other machines reach the host without a token."""
     with Store(settings.database_url) as store:
         demand_token_beyond_loopback(store, settings.host)
 

@@ -29,11 +29,7 @@ log = logging.getLogger("gaplab.service")
 
 
 def serve(settings: Settings, *, workers: bool = True) -> None:
-    """Serve until SIGINT, SIGTERM or SIGHUP, then end in order.
-
-    Args:
-        settings: settings of the API and the supervisor.
-        workers: whether to run experiments, or only accept and show them.
+    """Serve until SIGINT, SIGTERM or SIGHUP, then end in order; without workers, only accept and show experiments.
 
     Raises:
         CommandError: the address is invalid or taken.
@@ -59,14 +55,7 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
 
 
 def serve_again_after_edits(settings: Settings, *, workers: bool = True) -> int:
-    """Serve in another process, and start that again whenever a plug-in file changes.
-
-    Args:
-        settings: settings of the API and the supervisor.
-        workers: whether to run experiments.
-
-    Returns:
-        exit code of a service that ended by itself.
+    """Serve in another process, and start that again when a plug-in file changes; return the code with which it ends.
 
     Raises:
         CommandError: there is no folder to watch.
@@ -120,12 +109,5 @@ def warn_of_readers(database_url: str) -> None:
 
 def environment_of(settings: Settings) -> dict[str, str]:
     """Return the settings as environment variables for a child process."""
-    values = {
-        "GAPLAB_DATABASE_URL": settings.database_url,
-        "GAPLAB_RAY_ADDRESS": settings.ray_address,
-        "GAPLAB_WORKERS": settings.workers,
-        "GAPLAB_LEASE_S": settings.lease_s,
-        "GAPLAB_HOST": settings.host,
-        "GAPLAB_PORT": settings.port,
-    }
-    return {name: str(value) for name, value in values.items() if value is not None}
+    given = settings.model_dump(exclude={"url", "token"}, exclude_none=True)
+    return {f"GAPLAB_{name.upper()}": str(value) for name, value in given.items()}

@@ -1,32 +1,34 @@
-"""The plug-ins that a spec may name, and the shapes of the robots among them."""
+"""The plug-ins that a spec may name, and robots from files."""
 
-from typing import Annotated
+import json
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Body, Path, Request, Response
 
-from gaplab.api.http import conditional
+from gaplab.api.http.answers import CACHED, tagged
 from gaplab.api.http.dependencies import StoreDep
+from gaplab.api.http.documentation import sent
 from gaplab.api.http.problems import documented
 from gaplab.schemas.plugin import Catalogue
 from gaplab.schemas.replays import RobotShapes
-from gaplab.services.experiments.stored_robots import catalogued, list_robots
+from gaplab.schemas.robots import EXAMPLE, RobotRead
+from gaplab.services.experiments import stored_robots
+from gaplab.services.experiments.stored_robots import catalogued
 from gaplab.services.plugins.catalogue import catalogue
 from gaplab.services.replay.replays import robot_shapes
 
 router = APIRouter(tags=["catalogue"])
 
+_EXAMPLES: dict[str, Any] = {"hopper": {"summary": "A trunk on one leg", "value": EXAMPLE}}
+
 RobotInPath = Annotated[str, Path(max_length=100, description="name of a robot", examples=["quadruped"])]
+Named = Annotated[str, Path(description="hash or name of the robot", max_length=100)]
 
 
-@router.get(
-    "/catalogue",
-    summary="List the plug-ins",
-    response_model=Catalogue,
-    responses=conditional.CACHED | documented(),
-)
+@router.get("/catalogue", summary="List the plug-ins", response_model=Catalogue, responses=CACHED)
 def read_catalogue(request: Request, store: StoreDep) -> Response:
     """Return every plug-in and every stored robot, with its source and the schema of its options."""
-    return conditional.tagged(request, catalogue(catalogued(list_robots(store))))
+    return tagged(request, catalogue(catalogued(stored_robots.list_robots(store))))
 
 
 @router.get(
@@ -34,8 +36,35 @@ def read_catalogue(request: Request, store: StoreDep) -> Response:
     summary="Read the shapes of a robot",
     response_model=RobotShapes,
     response_description="The robot as it stands at the start",
-    responses=conditional.CACHED | documented(404, 422),
+    responses=CACHED | documented(404),
 )
 def read_robot_shapes(request: Request, name: RobotInPath, store: StoreDep) -> Response:
     """Return the shapes of a robot of the catalogue with its default options; a robot without bodies has none."""
-    return conditional.tagged(request, robot_shapes(store, name))
+    return tagged(request, robot_shapes(store, name))
+
+
+@router.post("/robots", status_code=201, summary="Add a robot")
+def add_robot(file: Annotated[dict[str, Any], Body(openapi_examples=_EXAMPLES)], store: StoreDep) -> RobotRead:
+    """Store a robot file under its hash. `gaplab robot import` writes such a file from URDF or MJCF.
+
+    A file is data: its world, and the names of its usual controller and task. Specs name the robot by its name; of
+    several with one name, the one that was added last is meant.
+    """
+    return stored_robots.add_robot(store, json.dumps(file, separators=(",", ":"), ensure_ascii=False))
+
+
+@router.get("/robots", summary="List the stored robots")
+def list_robots(store: StoreDep) -> tuple[RobotRead, ...]:
+    """Return all robots from files, by name, the newest of a name first."""
+    return stored_robots.list_robots(store)
+
+
+@router.get(
+    "/robots/{robot}",
+    summary="Read a robot file",
+    response_class=Response,
+    responses=sent({"application/json": EXAMPLE}, "the robot file") | documented(404),
+)
+def read_robot(robot: Named, store: StoreDep) -> Response:
+    """Return the canonical text of a robot file."""
+    return Response(stored_robots.robot_text(store, robot), media_type="application/json")

@@ -4,12 +4,13 @@ from collections.abc import AsyncIterator
 from typing import Annotated
 
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, Depends, Header, Query
+from fastapi import APIRouter, Depends, Header
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import Field
 
-from gaplab.api.http.dependencies import CallerDep, FeedDep, Id, Parameters, StoreDep, StreamsDep
-from gaplab.api.http.problems import Responses, documented
+from gaplab.api.http.dependencies import Asked, CallerDep, FeedDep, Id, Parameters, StoreDep, StreamsDep
+from gaplab.api.http.documentation import sent
+from gaplab.api.http.problems import documented
 from gaplab.schemas.events import EventKind, EventPage
 from gaplab.services import events
 from gaplab.services.events import WantedEvents
@@ -21,14 +22,13 @@ After = Annotated[int, Field(ge=0, lt=2**53, description="number of the last eve
 _EXAMPLE = (
     'event: probed\ndata: {"number":412,"kind":"probed","experiment":"01f2e3d4c5b6","repetition":3,…}\nid: 412\n\n'
 )
-_STREAM: Responses = {200: {"content": {"text/event-stream": {"schema": {"type": "string"}, "example": _EXAMPLE}}}}
 
 
 class EventFilter(Parameters):
     """The events to return."""
 
-    study: Id | None = Field(default=None, description="only events of this study, or of this experiment")
-    kind: list[EventKind] = Field(default=[], max_length=50, description="only events of these kinds; repeat for more")
+    study: Id | None = Field(None, description="only events of this study, or of this experiment")
+    kind: list[EventKind] = Field([], max_length=50, description="only events of these kinds; repeat for more")
     after: After = 0
 
     def which(self) -> WantedEvents:
@@ -39,8 +39,8 @@ class EventFilter(Parameters):
 class EventPaging(EventFilter):
     """The events to return, how many, and how long to wait for the first."""
 
-    limit: int = Field(default=100, ge=1, le=1_000, description="most events to return")
-    wait_s: float = Field(default=0.0, ge=0.0, le=60.0, description="seconds to wait for an event if there is none")
+    limit: int = Field(100, ge=1, le=1_000, description="most events to return")
+    wait_s: float = Field(0.0, ge=0.0, le=60.0, description="seconds to wait for an event if there is none")
 
 
 async def _count_stream(streams: StreamsDep, caller: CallerDep) -> AsyncIterator[None]:
@@ -51,7 +51,7 @@ async def _count_stream(streams: StreamsDep, caller: CallerDep) -> AsyncIterator
 
 def _after(
     store: StoreDep,
-    query: Annotated[EventFilter, Query()],
+    query: Asked[EventFilter],
     last_event_id: Annotated[After | None, Header(description="like `after`, which it overrides")] = None,
 ) -> int:
     """Return the number to stream after; check the query before the stream begins, while a problem can be answered."""
@@ -65,11 +65,11 @@ def _after(
     response_class=EventSourceResponse,
     summary="Stream events",
     response_description="Server-sent events: `id` is the number, `event` the kind, `data` the whole event",
-    responses=_STREAM | documented(404, 409, 422, 429),
+    responses=sent({"text/event-stream": _EXAMPLE}) | documented(409, 429),
     dependencies=[Depends(_count_stream)],
 )
 async def stream_events(
-    query: Annotated[EventFilter, Query()], after: Annotated[int, Depends(_after)], feed: FeedDep
+    query: Asked[EventFilter], after: Annotated[int, Depends(_after)], feed: FeedDep
 ) -> AsyncIterator[ServerSentEvent]:
     """Stream every event after `Last-Event-ID` or `after`, then each new one; a comment keeps the stream open.
 
@@ -81,18 +81,9 @@ async def stream_events(
         yield ServerSentEvent(raw_data=event.model_dump_json(), event=event.kind.value, id=str(event.number))
 
 
-@router.get(
-    "/page",
-    summary="List events",
-    response_description="By number",
-    responses=documented(404, 409, 422, 429),
-)
+@router.get("/page", summary="List events", response_description="By number", responses=documented(409, 429))
 async def list_events(
-    store: StoreDep,
-    query: Annotated[EventPaging, Query()],
-    feed: FeedDep,
-    streams: StreamsDep,
-    caller: CallerDep,
+    store: StoreDep, query: Asked[EventPaging], feed: FeedDep, streams: StreamsDep, caller: CallerDep
 ) -> EventPage:
     """List events after a number; pass `last` as `after` for the next page, with `wait_s` to wait for it.
 

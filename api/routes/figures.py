@@ -1,27 +1,36 @@
-"""Figures of studies and experiments, for the browser, for notebooks and for papers."""
+"""Figures of studies, experiments and controllers, for the browser, for notebooks and for papers."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Literal, TypeVar
 
-from fastapi import APIRouter, FastAPI, Query, Request, Response
+from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import Field
 
-from gaplab.api.commands.tables import curves
-from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
-from gaplab.api.http.figures import FigureQuery, answer, responses
+from gaplab.api.http.dependencies import Asked, Id, Number, RolloutProcessDep, StoreDep
+from gaplab.api.http.figures import SENT, FigureQuery, answer
+from gaplab.api.http.problems import documented
 from gaplab.api.routes.curves import Ids
+from gaplab.api.routes.replays import ReplayQuery
+from gaplab.schemas.curves import Fitness
 from gaplab.schemas.figures import FigureRead
-from gaplab.schemas.results import Fitness
+from gaplab.schemas.replays import Replay
 from gaplab.services.core.errors import NotFound
 from gaplab.services.experiments import reading
 from gaplab.services.figures.kinds.curves import Band, curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
+from gaplab.services.figures.kinds.replays import gait_figure, readings_figure
 from gaplab.services.figures.kinds.simulators import simulators_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
+from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import TITLE, titled
 from gaplab.services.replay.predictions import predictions
+from gaplab.services.replay.process import RolloutProcess
+from gaplab.services.replay.replays import replay
+from gaplab.services.results import curves
 from gaplab.services.results.curves import cost_axis
+from gaplab.services.results.toy import toy_iterations
 from gaplab.services.results.tuned_simulators import setting_coordinates, simulator_coordinates, tuned_simulators
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.specs.stored_specs import spec_of
@@ -29,7 +38,9 @@ from gaplab.services.store.session import Store
 
 router = APIRouter(prefix="/figures", tags=["figures"])
 
-EACH: bool = Field(default=False, description="whether to draw each repetition's line behind the mean or median")
+Endpoint = TypeVar("Endpoint", bound=Callable[..., Response])
+
+EACH: bool = Field(False, description="whether to draw each repetition's line behind the mean or median")
 
 NARROW_IN = 5.0
 """A file narrower than this has two panels in a row, else three."""
@@ -49,16 +60,15 @@ class CurvesDrawing(CoordinatesDrawing):
     """The curves to draw, and how."""
 
     band: Band | None = Field(
-        default=None,
-        description="around each curve: 95 % interval of the mean, or SD; left out: SD below five repetitions",
+        None, description="around each curve: 95 % interval of the mean, or SD; left out: SD below five repetitions"
     )
     x: Literal["evaluations", "rollouts", "time"] = Field(
-        default="evaluations", description="real-world evaluations, or the rollouts or the time that they took"
+        "evaluations", description="real-world evaluations, or the rollouts or the time that they took"
     )
-    cost_s: float = Field(default=0.0, ge=0, le=1e9, description="seconds per real-world evaluation, if x is time")
+    cost_s: float = Field(0.0, ge=0, le=1e9, description="seconds per real-world evaluation, if x is time")
     each: bool = EACH
     fitness: Fitness | None = Field(
-        default=None, description="as of curves; left out: recorded, with thin lines for transferred controllers alone"
+        None, description="as of curves; left out: recorded, with thin lines for transferred controllers alone"
     )
 
 
@@ -77,17 +87,36 @@ class ErrorDrawing(ExperimentDrawing):
 class SimulatorsDrawing(ExperimentDrawing):
     """The experiment whose simulators to draw, and how."""
 
-    columns: int | None = Field(default=None, ge=1, le=6, description="most panels in a row")
+    columns: int | None = Field(None, ge=1, le=6, description="most panels in a row")
 
 
-@router.get("/curves", summary="Draw curves", response_model=FigureRead, responses=responses())
-def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Response:
+class ReplayDrawing(FigureQuery, ReplayQuery):
+    """The controller whose motion to draw, and how."""
+
+    experiment: Id
+
+
+class ToyDrawing(FigureQuery):
+    """The iterations to draw, and how."""
+
+    experiment: Id
+    repetition: Number = Field(0, description="number of the repetition, from 0")
+    iteration: list[Number] = Field([], max_length=12, description="repeat for more panels; left out: the last")
+
+
+def _figure(path: str, summary: str, *statuses: int) -> Callable[[Endpoint], Endpoint]:
+    """Return what makes a function the endpoint of a figure, with problems besides those of all figures."""
+    return router.get(path, summary=summary, response_model=FigureRead, responses=SENT | documented(*statuses))
+
+
+@_figure("/curves", "Draw curves")
+def draw_curves(store: StoreDep, query: Asked[CurvesDrawing]) -> Response:
     """Draw the paper's Fig. 4 for any studies: curves and levels with bands."""
     return answer(_curves(store, query), query)
 
 
-@router.get("/squared-error", summary="Draw the squared error", response_model=FigureRead, responses=responses())
-def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()]) -> Response:
+@_figure("/squared-error", "Draw the squared error")
+def draw_squared_error(store: StoreDep, query: Asked[ErrorDrawing]) -> Response:
     """Draw the error of an experiment's best simulator by iteration, per sample and summed: median and quartiles."""
     tuned = tuned_simulators(store, query.experiment)
     title, samples = _title(store, query), tuned.samples
@@ -95,8 +124,8 @@ def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()])
     return answer(_explained(store, query, figure), query)
 
 
-@router.get("/simulators", summary="Draw tuned simulators", response_model=FigureRead, responses=responses())
-def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()]) -> Response:
+@_figure("/simulators", "Draw tuned simulators")
+def draw_simulators(store: StoreDep, query: Asked[SimulatorsDrawing]) -> Response:
     """Draw an experiment's best simulators in the space of its tunables, with reality once its study has ended."""
     tuned, title = tuned_simulators(store, query.experiment), _title(store, query)
     narrow = query.format not in {"html", "json"} and query.width < NARROW_IN
@@ -112,8 +141,8 @@ def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()
     return answer(_explained(store, query, figure), query)
 
 
-@router.get("/coordinates", summary="Draw parallel coordinates", response_model=FigureRead, responses=responses())
-def draw_coordinates(store: StoreDep, query: Annotated[CoordinatesDrawing, Query()]) -> Response:
+@_figure("/coordinates", "Draw parallel coordinates")
+def draw_coordinates(store: StoreDep, query: Asked[CoordinatesDrawing]) -> Response:
     """Draw parallel coordinates: the simulators of one experiment, or the settings that differ between experiments.
 
     Of one experiment, each line is the best simulator of an iteration: its tunables, its error per sample, and the
@@ -126,15 +155,8 @@ def draw_coordinates(store: StoreDep, query: Annotated[CoordinatesDrawing, Query
     return answer(setting_coordinates(store, query.study, title=_names(store, query)), query)
 
 
-@router.get(
-    "/predictions",
-    summary="Draw what simulators predicted",
-    response_model=FigureRead,
-    responses=responses(),
-)
-def draw_predictions(
-    store: StoreDep, process: RolloutProcessDep, query: Annotated[ExperimentDrawing, Query()]
-) -> Response:
+@_figure("/predictions", "Draw what simulators predicted")
+def draw_predictions(store: StoreDep, process: RolloutProcessDep, query: Asked[ExperimentDrawing]) -> Response:
     """Draw the simulated fitness of an experiment's samples, before and after tuning on them, against reality.
 
     Each request computes for about two seconds; repeat it while some samples are pending, as the caption says.
@@ -143,6 +165,33 @@ def draw_predictions(
     counts = {"pending": found.pending, "left_out": found.left_out}
     figure = predictions_figure(found.items, unit=found.unit, **counts, title=_title(store, query))
     return answer(_explained(store, query, figure), query)
+
+
+@_figure("/gait", "Draw a gait", 409)
+def draw_gait(store: StoreDep, process: RolloutProcessDep, query: Asked[ReplayDrawing]) -> Response:
+    """Draw a controller's footfalls, height and speed over time, in its simulator and in reality.
+
+    Like a replay, it shows reality for controllers that were measured there; before, the answer is 409.
+    """
+    return answer(gait_figure(_replay(store, process, query), title=query.title), query)
+
+
+@router.get(
+    "/readings", summary="Draw the readings of sensors", response_model=FigureRead, responses=SENT | documented(409)
+)
+def draw_readings(store: StoreDep, process: RolloutProcessDep, query: Asked[ReplayDrawing]) -> Response:
+    """Draw what the robot's sensors said in reality, and what they say in a tuned simulator."""
+    return answer(readings_figure(_replay(store, process, query), title=query.title), query)
+
+
+@_figure("/toy", "Draw the toy function")
+def draw_toy(store: StoreDep, query: Asked[ToyDrawing]) -> Response:
+    """Draw the paper's Fig. 3: the true function, its tuned approximations, the samples and the transfer.
+
+    The true function is drawn once every experiment of the study has ended.
+    """
+    iterations = toy_iterations(store, query.experiment, query.repetition, query.iteration)
+    return answer(toy_figure(iterations, title=query.title), query)
 
 
 def install(app: FastAPI) -> None:
@@ -187,3 +236,7 @@ def _curves(store: Store, query: CurvesDrawing) -> FigureDefinition:
     return curves_figure(
         drawn, title=_names(store, query), band=query.band, against=against, each=query.each, beside=beside
     )
+
+
+def _replay(store: Store, process: RolloutProcess, query: ReplayDrawing) -> Replay:
+    return replay(store, process, query.experiment, query.choice())

@@ -9,7 +9,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import Field
 
 from gaplab.api.http.dependencies import WRITERS
-from gaplab.api.http.problems import Responses, documented
+from gaplab.api.http.documentation import sent
 from gaplab.schemas.base import Frozen
 from gaplab.services import health
 from gaplab.services.core.errors import GaplabError
@@ -55,10 +55,7 @@ async def live() -> Alive:
 
 
 @router.get(
-    "/readyz",
-    summary="Check that requests are served and experiments run",
-    responses=documented(),
-    response_model_exclude_defaults=True,
+    "/readyz", summary="Check that requests are served and experiments run", response_model_exclude_defaults=True
 )
 async def ready(request: Request) -> Health:
     """Answer if the database can be used, has the schema of this version, and the supervisor of `gaplab serve` runs.
@@ -84,7 +81,6 @@ async def ready(request: Request) -> Health:
 
 
 _EXAMPLE = '# TYPE gaplab_repetitions gauge\ngaplab_repetitions{state="RUNNING"} 2.0\n'
-_TEXT: Responses = {200: {"content": {"text/plain": {"schema": {"type": "string"}, "example": _EXAMPLE}}}}
 
 
 @router.get(
@@ -92,7 +88,7 @@ _TEXT: Responses = {200: {"content": {"text/plain": {"schema": {"type": "string"
     summary="Read metrics",
     response_class=Response,
     response_description="In the text format of Prometheus",
-    responses=_TEXT | documented(),
+    responses=sent({"text/plain": _EXAMPLE}),
 )
 def read_metrics(request: Request) -> Response:
     """Return request counts and latency, stored experiments by state, open streams, and the supervisors' heartbeats."""

@@ -1,11 +1,9 @@
 """Replays and predictions: physics that is computed on request."""
 
-from typing import Annotated
-
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Response
 from pydantic import Field
 
-from gaplab.api.http.dependencies import Id, Parameters, RolloutProcessDep, StoreDep
+from gaplab.api.http.dependencies import Asked, Id, Number, Parameters, RolloutProcessDep, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.replays import ControllerKind, Predictions, Replay
 from gaplab.services.replay import predictions, replays
@@ -17,18 +15,13 @@ router = APIRouter(prefix="/experiments", tags=["replays"])
 class ReplayQuery(Parameters):
     """The controller to replay, and the simulator to replay it in."""
 
-    repetition: int = Field(default=0, ge=0, le=1_000_000, description="number of the repetition, from 0")
-    iteration: int | None = Field(
-        default=None,
-        ge=0,
-        le=1_000_000,
-        description="iteration that tried or transferred the controller; left out: the last that was measured",
+    repetition: Number = Field(0, description="number of the repetition, from 0")
+    iteration: Number | None = Field(
+        None, description="iteration that tried or transferred the controller; left out: the last that was measured"
     )
     kind: ControllerKind = ControllerKind.TRANSFER
-    simulator: int | None = Field(
-        default=None,
-        ge=0,
-        le=1_000_000,
+    simulator: Number | None = Field(
+        None,
         description="iteration whose best simulator replays the controller; left out: the same iteration for a "
         "transferred controller, the one before for a sample",
     )
@@ -44,11 +37,9 @@ class ReplayQuery(Parameters):
     summary="Replay a controller",
     response_model=Replay,
     response_description="Shapes, and their motion in simulation and in reality",
-    responses=documented(404, 409, 422, 429),
+    responses=documented(409, 429),
 )
-def read_replay(
-    id: Id, store: StoreDep, process: RolloutProcessDep, query: Annotated[ReplayQuery, Query()]
-) -> Response:
+def read_replay(id: Id, store: StoreDep, process: RolloutProcessDep, query: Asked[ReplayQuery]) -> Response:
     """Compute the motion of a sample or a transferred controller in its simulator and in reality, from the same start.
 
     Reality is shown for controllers that were measured there, because their motion does not reveal its parameters.
@@ -62,7 +53,7 @@ def read_replay(
     "/{id}/predictions",
     summary="Read what simulators predicted",
     response_description="By repetition and iteration",
-    responses=documented(404, 422, 429),
+    responses=documented(429),
 )
 def read_predictions(id: Id, store: StoreDep, process: RolloutProcessDep) -> Predictions:
     """Return the fitness of each sample in the best simulator before its measurement, and after tuning on it.

@@ -2,17 +2,18 @@
 
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Response
 from pydantic import Field
 
-from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
+from gaplab.api.http.dependencies import Asked, Id, RolloutProcessDep, StoreDep
+from gaplab.api.http.documentation import sent
 from gaplab.api.http.figures import in_turn
-from gaplab.api.http.problems import Responses, documented
+from gaplab.api.http.problems import documented
 from gaplab.api.http.security_headers import page
-from gaplab.api.routes.comparisons import MarginQuery
-from gaplab.schemas.comparisons import VerdictRead
+from gaplab.api.routes.curves import MarginQuery
+from gaplab.schemas.reports import VerdictRead
 from gaplab.services.experiments import reading
 from gaplab.services.reports.blocks import render_html
 from gaplab.services.reports.content import facts_of, verdict_on
@@ -22,24 +23,21 @@ from gaplab.services.reports.takehome import takehome_zip
 router = APIRouter(tags=["reports"])
 
 _FORMATS = "one HTML file without scripts, to read and to print; or JSON with the verdict alone"
-_CONTENT = {"text/html": {"schema": {"type": "string"}, "example": "<!doctype html><html lang='en'>…"}}
-_RESPONSES: Responses = {
-    200: {"description": _FORMATS.capitalize(), "content": _CONTENT},
-    **documented(404, 422, 429),
-}
 
 
 class ReportQuery(MarginQuery):
     """The format of a report, and the margin of its verdict."""
 
-    format: Literal["html", "json"] = Field(default="html", description=_FORMATS)
+    format: Literal["html", "json"] = Field("html", description=_FORMATS)
 
 
-_ZIP = {"application/zip": {"schema": {"type": "string", "format": "binary"}, "example": "PK…"}}
-
-
-@router.get("/studies/{id}/report", summary="Report on a study", response_model=VerdictRead, responses=_RESPONSES)
-def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]) -> VerdictRead | Response:
+@router.get(
+    "/studies/{id}/report",
+    summary="Report on a study",
+    response_model=VerdictRead,
+    responses=sent({"text/html": "<!doctype html><html lang='en'>…"}, _FORMATS.capitalize()) | documented(429),
+)
+def report_study(id: Id, store: StoreDep, query: Asked[ReportQuery]) -> VerdictRead | Response:
     """Return verdict, curves, tests, simulators, sensitivity, cost, settings and provenance in one document.
 
     The verdict follows from rules that the report states: which strategies differ, and whether each curve still rises,
@@ -60,7 +58,7 @@ def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]
     summary="Take home what an experiment found",
     response_class=Response,
     response_description="Files for programs, and the report",
-    responses={200: {"content": _ZIP}, **documented(404, 409, 422, 429)},
+    responses=sent({"application/zip": "PK…"}) | documented(409, 429),
 )
 def take_home(id: Id, store: StoreDep, process: RolloutProcessDep) -> Response:
     """Return the report, the best measured controller, the tuned simulator with its intervals, samples and provenance.

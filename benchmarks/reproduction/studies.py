@@ -9,15 +9,14 @@ import numpy as np
 
 from benchmarks.findings import Found, found, import_file
 from benchmarks.reproduction.paper import ITERATIONS, STRATEGIES
-from gaplab.api.commands.tables import curves
+from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.records import ExperimentRead, MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.results import Curve, Fitness
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments import reading
 from gaplab.services.findings.statistics import finite
-from gaplab.services.results.curves import values_of
+from gaplab.services.results.curves import curves, values_of
 from gaplab.services.running import provenance
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries import experiments, results

@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 from pydantic import ValidationError
 
-from gaplab.schemas.keeping import Edit
+from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import SPEC_VERSION, ResolvedSpec
 from gaplab.schemas.spec import Schedule

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
-from gaplab.schemas.results import CurvePoint
+from gaplab.schemas.curves import CurvePoint
 from gaplab.services.core.arrays import FloatArray, known
 
 CONFIDENCE = 0.95

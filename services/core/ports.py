@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeAlias
 
-from gaplab.schemas.safety import Safety
+from gaplab.schemas.measurements import Safety
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.types import Outcome

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from sqlalchemy import delete as delete_from
 from sqlalchemy import or_, select
 
+from gaplab.schemas.editing import DeletionRead
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.keeping import DeletionRead
 from gaplab.services.core.errors import Conflict, Forbidden
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import (

@@ -5,8 +5,8 @@ from typing import Any
 
 from sqlalchemy import update
 
+from gaplab.schemas.editing import MOST_TAGS, Edit
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.keeping import MOST_TAGS, Edit
 from gaplab.schemas.records import StudyRead
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.experiments.views import view

@@ -14,7 +14,7 @@ from markdown_it.renderer import RendererHTML
 from markdown_it.token import Token
 from markdown_it.utils import OptionsDict
 
-from gaplab.schemas.keeping import NotesRead
+from gaplab.schemas.editing import NotesRead
 from gaplab.services.store.queries.experiments import whole
 from gaplab.services.store.session import Session, snapshot
 

@@ -2,7 +2,7 @@
 
 from sqlalchemy import delete, func, select, update
 
-from gaplab.schemas.keeping import ViewRead, ViewSpec
+from gaplab.schemas.editing import ViewRead, ViewSpec
 from gaplab.services.core.errors import InvalidSpec, LimitReached, NotFound
 from gaplab.services.experiments.query.conditions import conditions
 from gaplab.services.store.clock import moment

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from math import isfinite
 
-from gaplab.schemas.results import from_before
+from gaplab.schemas.curves import from_before
 
 LONGEST = 60  # characters of a name in a figure
 TITLE = 200  # characters of a title, which may have several lines

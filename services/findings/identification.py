@@ -10,7 +10,7 @@ Source: gaplab.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from gaplab.schemas.results import Identification, MisfitPoint, TunableDistribution, TunableVerdict
+from gaplab.schemas.misfit import Identification, MisfitPoint, TunableDistribution, TunableVerdict
 from gaplab.services.findings import simulator_sentences as told
 from gaplab.services.findings.misfit import OFTEN, Doubt
 from gaplab.services.findings.wording import listed, share

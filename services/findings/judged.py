@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaplab.schemas.comparisons import Trend
+from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.records import ExperimentRead
-from gaplab.schemas.results import Curve, CurvePoint
+from gaplab.schemas.reports import Trend
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import curve_point
 from gaplab.services.figures.words import distinct_names

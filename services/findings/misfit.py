@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gaplab.schemas.results import Distribution, MisfitPoint, TunableDistribution
+from gaplab.schemas.misfit import Distribution, MisfitPoint, TunableDistribution
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.fitness import SquaredFitness

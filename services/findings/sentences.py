@@ -3,10 +3,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 
-from gaplab.schemas.comparisons import Comparison, EquivalenceVerdict, Trend, TrendRead, VerdictRead
+from gaplab.schemas.comparisons import Comparison, EquivalenceVerdict
+from gaplab.schemas.curves import Curve
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead, common_count
-from gaplab.schemas.results import Curve
+from gaplab.schemas.reports import Trend, TrendRead, VerdictRead
 from gaplab.services.figures.words import evaluations, number_of
 from gaplab.services.findings.judged import (
     FEWEST_EVALUATIONS,

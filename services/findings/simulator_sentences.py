@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gaplab.schemas.results import Identification, MisfitPoint, TunableDistribution, from_before
+from gaplab.schemas.curves import from_before
+from gaplab.schemas.misfit import Identification, MisfitPoint, TunableDistribution
 from gaplab.services.core.linear_models import SURPRISING
 from gaplab.services.findings.misfit import OFTEN, Doubt, SensorError, Tuning, sensor_errors, surprise
 from gaplab.services.findings.wording import many, number, share, spread

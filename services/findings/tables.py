@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from gaplab.schemas.comparisons import NAMES, UNPAIRED, Comparison, Groups, shown_tests
 from gaplab.schemas.differences import SpecDiff
-from gaplab.schemas.results import MisfitPoint
+from gaplab.schemas.misfit import MisfitPoint
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.figures.words import spoken
 from gaplab.services.findings.wording import MISSING, number, share

@@ -2,15 +2,9 @@
 
 from collections.abc import Callable
 
+from gaplab.schemas.corrections import ConflictSpec, Consequences, CorrectionSpec, VoidSpec
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.measurements import (
-    AnswerState,
-    ConflictSpec,
-    Consequences,
-    CorrectionSpec,
-    MeasurementSpec,
-    VoidSpec,
-)
+from gaplab.schemas.measurements import AnswerState, MeasurementSpec
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import Admission

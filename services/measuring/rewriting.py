@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 from sqlalchemy import func, insert, select, update
 
+from gaplab.schemas.corrections import BranchRead, Consequences
 from gaplab.schemas.lifecycle import Ending, State
-from gaplab.schemas.measurements import BranchRead, Consequences, RequestState
+from gaplab.schemas.measurements import RequestState
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.types import History, Measured, Probed, recorded_fitness
 from gaplab.services.experiments.archiving import show_again

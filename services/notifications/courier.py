@@ -11,7 +11,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gaplab.schemas.keeping import Channel
+from gaplab.schemas.notifications import Channel
 from gaplab.services.notifications import outbox
 from gaplab.services.notifications.delivery import deliver
 from gaplab.services.settings import Notify

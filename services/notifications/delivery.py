@@ -11,7 +11,7 @@ from hashlib import sha256
 
 import httpx2
 
-from gaplab.schemas.keeping import Channel, Notification
+from gaplab.schemas.notifications import Channel, Notification
 from gaplab.services.notifications.webhooks import refusal
 from gaplab.services.settings import Notify
 

@@ -11,7 +11,7 @@ from datetime import datetime, timedelta
 from sqlalchemy import func, select
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.keeping import Channel, EndedExperiment, Notification
+from gaplab.schemas.notifications import Channel, EndedExperiment, Notification
 from gaplab.services.experiments.views import state_of
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import (

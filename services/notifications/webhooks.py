@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from urllib.parse import SplitResult, urlsplit
 
-from gaplab.schemas.keeping import WebhookRead, WebhookSpec
+from gaplab.schemas.notifications import WebhookRead, WebhookSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.store.queries.experiments import lock, whole
 from gaplab.services.store.session import Session, snapshot, transaction

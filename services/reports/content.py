@@ -5,17 +5,19 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 
-from gaplab.api.commands.tables import curves as results
-from gaplab.schemas.comparisons import Comparison, VerdictRead
+from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.differences import SpecDiff
+from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import ExperimentRead, SampleRead, SimulatorRead, StudyRead, common_count
-from gaplab.schemas.results import Curve, Fitness, MisfitRead
+from gaplab.schemas.reports import VerdictRead
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.errors import NotFound
 from gaplab.services.experiments import checks
 from gaplab.services.findings.judged import Judged, judged_curves
 from gaplab.services.findings.sentences import judge
+from gaplab.services.results import curves as results
 from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import TunedSimulators, tuned_simulators

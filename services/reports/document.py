@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from gaplab.schemas.comparisons import Comparison
-from gaplab.schemas.results import from_before
+from gaplab.schemas.curves import from_before
 from gaplab.schemas.spec import SpecRead
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.curves import Fitness
 from gaplab.schemas.records import common_count
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.results import Fitness
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.experiments.fitness import fitness_of

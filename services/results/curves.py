@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.records import MeasurementKind
-from gaplab.schemas.results import Curve, Fitness
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import best_of_searches, curve_points
 from gaplab.services.csv_tables import csv_text

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from gaplab.schemas.misfit import MisfitPoint, MisfitRead
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.results import MisfitPoint, MisfitRead
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy

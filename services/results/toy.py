@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaplab.schemas.figures import ToyIteration, ToySample, ToyTransfer
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
+from gaplab.schemas.replays import ToyIteration, ToySample, ToyTransfer
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from gaplab.schemas.measurements import KnownSample, Table
+from gaplab.schemas.records import SensorsRead
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.results import SensorsRead
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Readings, frozen, nearest
 from gaplab.services.core.discrepancies.base import Discrepancy

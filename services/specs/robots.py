@@ -5,8 +5,8 @@ from functools import lru_cache
 from typing import TypeAlias
 
 from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.records import SensorsRead
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.results import SensorsRead
 from gaplab.schemas.sensitivity import Checked
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, gather

@@ -7,8 +7,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from gaplab.schemas.measurements import Safety
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.safety import Safety
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.engines.base import Engine

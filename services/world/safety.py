@@ -7,7 +7,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from gaplab.schemas.safety import LimitsSpec, Safety
+from gaplab.schemas.measurements import LimitsSpec, Safety
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.world.controllers.parts import follows_angle
 from gaplab.services.world.kinematics import clearances_m, from_start

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     __version__: str
 
     from gaplab.api.clients.client import Client as Client
-    from gaplab.api.clients.comparisons import Comparisons as Comparisons
     from gaplab.api.clients.confirmation import NotSubmitted as NotSubmitted
     from gaplab.api.clients.drivers import MeasurementFailed as MeasurementFailed
+    from gaplab.api.clients.driving import DriverMotion as DriverMotion
     from gaplab.api.clients.errors import ExperimentFailed as ExperimentFailed
     from gaplab.api.clients.errors import ExtraMissing as ExtraMissing
     from gaplab.api.clients.errors import ServiceError as ServiceError
     from gaplab.api.clients.errors import ServiceUnreachable as ServiceUnreachable
     from gaplab.api.clients.figures import Figure as Figure
-    from gaplab.api.clients.motions import DriverMotion as DriverMotion
+    from gaplab.api.clients.results import Comparisons as Comparisons
     from gaplab.api.process.errors import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
     from gaplab.samples import read_samples as read_samples
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "Client": "gaplab.api.clients.client",
-    "Comparisons": "gaplab.api.clients.comparisons",
+    "Comparisons": "gaplab.api.clients.results",
     "CommandError": "gaplab.api.process.errors",
-    "DriverMotion": "gaplab.api.clients.motions",
+    "DriverMotion": "gaplab.api.clients.driving",
     "ExperimentFailed": "gaplab.api.clients.errors",
     "ExtraMissing": "gaplab.api.clients.errors",
     "Figure": "gaplab.api.clients.figures",

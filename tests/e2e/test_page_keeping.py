@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-from gaplab.schemas.keeping import Edit
+from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import Verb
 from gaplab.services.experiments import editing, lifecycle
 from tests.e2e.browser import axe, fits, screenshot

@@ -7,7 +7,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.services.access import create_token
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api

@@ -15,7 +15,7 @@ from sqlalchemy import select, update
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.services import access
 from gaplab.services.access import Unauthenticated, authenticate, create_token, is_loopback
 from gaplab.services.core.errors import Forbidden, NotFound

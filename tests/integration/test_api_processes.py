@@ -24,7 +24,7 @@ from gaplab.api.process.local_service import start_service
 from gaplab.api.process.server import listen, require_token
 from gaplab.api.process.service import environment_of, migrate
 from gaplab.api.process.supervisor_process import SupervisorProcess
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.services.access import Unauthenticated, create_token, revoke_token
 from gaplab.services.settings import Settings
 from gaplab.services.store.database_errors import StoreUnavailable
@@ -357,6 +357,8 @@ def test_children_read_the_same_settings() -> None:
         "GAPLAB_RAY_ADDRESS": "auto",
         "GAPLAB_WORKERS": "3",
         "GAPLAB_LEASE_S": "30",
+        "GAPLAB_ROLLOUT_LIMIT_S": "60",
+        "GAPLAB_STEP_LIMIT_S": "604800",
         "GAPLAB_HOST": "0.0.0.0",
         "GAPLAB_PORT": "99",
     }

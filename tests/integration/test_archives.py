@@ -21,7 +21,6 @@ from hypothesis import strategies as st
 from sqlalchemy import insert
 
 from gaplab import migrations
-from gaplab.api.commands.tables import curves
 from gaplab.schemas.lifecycle import Ending, ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export, import_archive
@@ -32,6 +31,7 @@ from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
 from gaplab.services.experiments import extension, lifecycle, reading, submission
+from gaplab.services.results import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting

@@ -10,7 +10,6 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.api.clients.archives import Archives
 from gaplab.api.clients.client import Client
 from gaplab.api.commands import archives as archive_commands
 from gaplab.services.running import execution
@@ -115,13 +114,13 @@ def test_an_archive_that_is_being_written_has_not_its_name_yet(
     gaplab: Gaplab, submitted: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     meanwhile: list[str] = []
-    export = Archives.export
+    export = Client.export
 
-    def watched(self: Archives, id: str, file: IO[bytes]) -> None:
+    def watched(self: Client, id: str, file: IO[bytes]) -> None:
         export(self, id, file)
         meanwhile.extend(each.name for each in tmp_path.iterdir())
 
-    monkeypatch.setattr(Archives, "export", watched)
+    monkeypatch.setattr(Client, "export", watched)
     written = gaplab("export", submitted, "--to", str(tmp_path / "archive.zip"))
 
     assert written.code == 0, written.err

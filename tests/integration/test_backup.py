@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from gaplab.api.commands.tables import curves
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import listing
+from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store import backup as backing_up

@@ -13,16 +13,9 @@ from fastapi.testclient import TestClient
 from sqlalchemy import func, select, update
 
 from gaplab.api.app import create_app
+from gaplab.schemas.corrections import ConflictSpec, CorrectionSpec, VoidSpec
 from gaplab.schemas.lifecycle import State, Verb
-from gaplab.schemas.measurements import (
-    ConflictSpec,
-    CorrectionSpec,
-    HolderSpec,
-    MeasurementSpec,
-    ReleaseSpec,
-    TakeSpec,
-    VoidSpec,
-)
+from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, ReleaseSpec, TakeSpec
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec

@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from gaplab.schemas.measurements import ConflictSpec, MeasurementSpec, ReleaseSpec, TakeSpec
+from gaplab.schemas.corrections import ConflictSpec
+from gaplab.schemas.measurements import MeasurementSpec, ReleaseSpec, TakeSpec
 from gaplab.schemas.traces import TracesRead, TracesSpec
 from gaplab.services.core.errors import LimitReached
 from gaplab.services.experiments.limits import FREELY

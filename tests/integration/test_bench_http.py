@@ -14,9 +14,9 @@ from httpx2 import MockTransport, Request, Response
 import gaplab
 from gaplab import Client, InvalidSamples, ServiceError, ServiceUnreachable
 from gaplab.api.clients import driving
+from gaplab.api.clients.driving import TakeLost
 from gaplab.api.clients.journal import Journal
-from gaplab.api.clients.takes import TakeLost
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.schemas.measurements import RequestRead, TakeSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services import access
@@ -179,7 +179,7 @@ def test_an_answer_in_the_journal_that_is_refused_holds_no_other_back(
 def test_a_driver_finds_an_open_request_behind_a_page_of_those_of_a_busy_bench(
     client: Client, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr(driving, "time")  # a pause of the driver is an error here
+    monkeypatch.setattr(driving, "PAUSE_S", -1.0)  # a pause of the driver is an error here
     walking = SPEC | {"robot": "quadruped", "engine": "mujoco"}
     many = client.submit(walking | {"repetitions": 52, "reality": REALITY | {"bench": "a"}})
     for _ in range(52):

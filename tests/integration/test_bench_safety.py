@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaplab.schemas.corrections import VoidSpec
 from gaplab.schemas.lifecycle import Verb
-from gaplab.schemas.measurements import AnswerState, MeasurementSpec, VoidSpec
+from gaplab.schemas.measurements import AnswerState, MeasurementSpec
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.archives import export
 from gaplab.services.core.arrays import frozen

@@ -20,9 +20,9 @@ from fastapi.testclient import TestClient
 import gaplab
 from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable
 from gaplab.api.app import create_app
-from gaplab.api.clients import results, tables
+from gaplab.api.clients import results
+from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind, EventRead
-from gaplab.schemas.keeping import Role
 from gaplab.services import access
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Measured
@@ -124,7 +124,7 @@ def test_samples_come_whole_however_many_pages_they_are(
     experiment = client.submit(SMALL)
     finish()
     whole = client.samples(experiment.id)
-    monkeypatch.setattr(tables, "PAGE", 2)
+    monkeypatch.setattr(results, "PAGE", 2)
     network.asked.clear()
 
     by_twos = client.samples(experiment.id)
@@ -185,7 +185,7 @@ def test_readings_have_the_sensors_and_times_of_the_spec(
     client.add_robot(file)
     id, readings = measured_by(client, sqlite_store, robot)
 
-    found = client.tables.readings(id)
+    found = client.readings(id)
 
     values = readings.reshape(12, 5) * [0.02, 0.02, 0.005, 0.005, 0.005]
     assert list(found) == [*TIMES, "roll_rad", "pitch_rad", "height_m", "x_m", "y_m"]
@@ -204,10 +204,10 @@ def test_readings_of_an_unknown_robot_are_refused_and_never_cut(client: Client, 
 
     now_with(task={"name": "walk", "options": {"counted_s": 1.0}})  # as by a plug-in that was edited since
     with pytest.raises(ValueError, match="zip"):
-        client.tables.readings(id)
+        client.readings(id)
     now_with(task={"name": "gone", "options": {}})
     with pytest.raises(LookupError, match=f"the sensors of {id} are unknown: its robot or task is not installed"):
-        client.tables.readings(id)
+        client.readings(id)
 
 
 def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(

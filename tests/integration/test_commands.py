@@ -387,7 +387,7 @@ def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: s
         yield from snapshots
 
     with Client(url) as client:
-        snapshots = client.watcher.snapshots(study, curves=True, every_s=0.1)
+        snapshots = client.snapshots(study, curves=True, every_s=0.1)
         ended = show(finishing(snapshots), screen, keep=True)
 
     shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown_on.getvalue())
@@ -422,7 +422,7 @@ def test_the_view_survives_a_service_that_is_away_and_says_so(url: str, study: s
     screen = Console(force_terminal=True, width=140, file=shown_on, highlight=False)
 
     with Client(url, transport=Shaky(2, finish)) as client:
-        ended = client.watcher.show(study, screen, curves=True, every_s=0.1, patience_s=60)
+        ended = client.show(study, screen, curves=True, every_s=0.1, patience_s=60)
 
     assert ended.state == "COMPLETED"
     assert "the service has not answered for" in shown_on.getvalue()

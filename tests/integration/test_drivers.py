@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from fastapi import FastAPI
 
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.measurements import MeasurementSpec, TakeSpec
 from gaplab.services import access

@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from gaplab.api.commands.tables import curves
 from gaplab.services.experiments.reading import read, read_experiment
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.reports.content import verdict_on
 from gaplab.services.results.comparisons import compare
+from gaplab.services.results.curves import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.store.session import Store

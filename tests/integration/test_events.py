@@ -26,10 +26,13 @@ from gaplab.api.http import access as http_access
 from gaplab.api.http import event_feed as feeding
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.server import Server, listen
+from gaplab.schemas.access import Role
+from gaplab.schemas.corrections import ConflictSpec, CorrectionSpec, VoidSpec
+from gaplab.schemas.editing import Edit
 from gaplab.schemas.events import EventKind, EventPage, EventRead
-from gaplab.schemas.keeping import Channel, Edit, Role
 from gaplab.schemas.lifecycle import ExtensionSpec, Verb
-from gaplab.schemas.measurements import ConflictSpec, CorrectionSpec, ReleaseSpec, TakeSpec, VoidSpec
+from gaplab.schemas.measurements import ReleaseSpec, TakeSpec
+from gaplab.schemas.notifications import Channel
 from gaplab.services import access, archives, events
 from gaplab.services.core.errors import NotFound
 from gaplab.services.events import WantedEvents

@@ -7,7 +7,6 @@ from warnings import catch_warnings
 
 import pytest
 
-from gaplab.api.commands.tables import curves
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
 from gaplab.services.core.types import Tuned as TunedStep
@@ -18,6 +17,7 @@ from gaplab.services.figures.kinds.squared_error import ErrorKind, squared_error
 from gaplab.services.figures.marks import Diagonal, FigureDefinition, Label, Level, Line, Mark, Points, Polylines
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
+from gaplab.services.results import curves
 from gaplab.services.results.curves import cost_axis
 from gaplab.services.results.tuned_simulators import setting_coordinates, tuned_simulators
 from gaplab.services.running import execution

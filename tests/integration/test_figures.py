@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from gaplab.schemas.results import CurvePoint
+from gaplab.schemas.curves import CurvePoint
 from gaplab.services.core.strategies import strategies
 from gaplab.services.figures.kinds.curves import CostAxis, curves_figure
 from gaplab.services.figures.marks import Arrow, Axis, Bars, FigureDefinition, Label, Level, Line, Points

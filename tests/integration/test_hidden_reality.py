@@ -14,7 +14,8 @@ from fastapi.testclient import TestClient
 from httpx2 import Response
 
 from gaplab.api.app import create_app
-from gaplab.schemas.keeping import Role, ViewSpec
+from gaplab.schemas.access import Role
+from gaplab.schemas.editing import ViewSpec
 from gaplab.schemas.robots import EXAMPLE
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.access import create_token

@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import func, select, update
 
 from gaplab.api.app import create_app
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.access import create_token
 from gaplab.services.core.errors import InvalidSpec

@@ -12,8 +12,9 @@ from fastapi.testclient import TestClient
 from sqlalchemy import func, select, update
 
 from gaplab.api.app import create_app
+from gaplab.schemas.access import Role
+from gaplab.schemas.editing import DeletionRead, ViewSpec
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.keeping import DeletionRead, Role, ViewSpec
 from gaplab.schemas.lifecycle import ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services import access, events

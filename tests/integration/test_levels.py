@@ -10,7 +10,6 @@ from rich.console import Console
 
 from gaplab.api.app import create_app
 from gaplab.api.commands import tables
-from gaplab.api.commands.tables import curves
 from gaplab.schemas.lifecycle import ExtensionSpec
 from gaplab.schemas.records import common_count
 from gaplab.schemas.spec import StudySpec
@@ -21,7 +20,7 @@ from gaplab.services.experiments import estimates, extension, listing, reading, 
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.marks import Level
 from gaplab.services.reports.content import facts_of
-from gaplab.services.results import comparisons
+from gaplab.services.results import comparisons, curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.running import execution

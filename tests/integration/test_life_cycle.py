@@ -4,12 +4,12 @@ from typing import Any
 
 import pytest
 
-from gaplab.api.commands.tables import curves
 from gaplab.schemas.lifecycle import PERMITTED, Ending, ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import extension, lifecycle, reading, submission
+from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.running.execution import TimedStep
 from gaplab.services.specs.assembly import setting

@@ -18,7 +18,7 @@ from starlette.types import Message, Receive, Scope, Send
 
 from gaplab.api.app import create_app
 from gaplab.api.http.limits import BodyLimit, Streams
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.services.access import create_token
 from gaplab.services.core.errors import LimitReached
 from gaplab.services.experiments import reading

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 from sqlalchemy import event
 
-from gaplab.api.commands.tables import curves
 from gaplab.schemas.lifecycle import State
 from gaplab.services.archives import export, import_archive
 from gaplab.services.experiments import listing, reading
 from gaplab.services.experiments.listing import ListFilter
+from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.store.models import Base
 from gaplab.services.store.session import Store

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.schemas.results import Identification
+from gaplab.schemas.misfit import Identification
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Sample, Selected, Simulator, Transferred, Tuned

@@ -20,8 +20,8 @@ from sqlalchemy import select, update
 
 from gaplab.api.app import create_app
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.keeping import Notification, WebhookSpec
 from gaplab.schemas.lifecycle import ExtensionSpec, State, Verb
+from gaplab.schemas.notifications import Notification, WebhookSpec
 from gaplab.schemas.spec import StudySpec
 from gaplab.services import events
 from gaplab.services.core.errors import InvalidSpec

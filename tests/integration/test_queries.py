@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from gaplab.schemas.keeping import Edit
+from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec

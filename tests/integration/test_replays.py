@@ -405,7 +405,7 @@ def test_an_experiment_without_iterations_shows_what_samples_from_before_gave(
     found = predictions(sqlite_store, app.state.rollout_process, experiment, seconds=LONGEST_S)
     forward = httpx2.MockTransport(lambda asked: httpx2.Response(200, json=api.get(asked.url.raw_path.decode()).json()))
     with Client("http://127.0.0.1:1", transport=forward) as client:
-        best = client.results.best_simulator(experiment)
+        best = client.best_simulator(experiment)
 
     assert best is not None
     assert best.iteration == 0

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from gaplab.api.commands.tables import curves
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.experiments import submission
+from gaplab.services.results import curves
 from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store

@@ -127,7 +127,7 @@ def test_a_person_is_asked_before_hours_even_if_the_spec_comes_through_a_pipe(
 
 
 def test_the_client_asks_a_person_too(url: str, monkeypatch: pytest.MonkeyPatch, sqlite_store: Store) -> None:
-    monkeypatch.setattr("gaplab.api.clients.submission.can_ask", lambda: True)
+    monkeypatch.setattr("gaplab.api.clients.studies.can_ask", lambda: True)
     monkeypatch.setattr("builtins.input", lambda _: "no")
     with Client(url) as client:
         with pytest.raises(NotSubmitted, match="nothing was submitted"):

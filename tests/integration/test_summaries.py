@@ -7,11 +7,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.api.commands.tables import curves
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.types import Probed
 from gaplab.services.experiments import lifecycle, listing, reading, submission
+from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Claim
 from gaplab.services.specs.resolution import resolve

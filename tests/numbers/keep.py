@@ -13,10 +13,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from gaplab import migrations
-from gaplab.api.commands.tables import curves
 from gaplab.services.archives import export
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import submission
+from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint, TimedStep
 from gaplab.services.specs.assembly import setting

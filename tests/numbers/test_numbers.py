@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.api.commands.tables import curves
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives import export, import_archive
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import reading
+from gaplab.services.results import curves
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve
 from gaplab.services.store.queries.logs import columns_of

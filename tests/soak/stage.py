@@ -19,7 +19,7 @@ from typing import Any
 import httpx2
 
 from gaplab import migrations
-from gaplab.schemas.keeping import Role
+from gaplab.schemas.access import Role
 from gaplab.services import access
 from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.session import Store

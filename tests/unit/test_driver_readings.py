@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gaplab.api.clients.drivers import DriverBroken, Robot, measure
+from gaplab.api.clients.driving import TakeLost
 from gaplab.api.clients.journal import Journal
-from gaplab.api.clients.takes import TakeLost
 from gaplab.schemas.records import SensorsRead
 
 SENSORS = SensorsRead(names=("roll", "height"), units=("rad", "m"), noises=(0.02, 0.005), times_s=(0.5, 1.0, 1.5))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.schemas.results import Identification, MisfitPoint
+from gaplab.schemas.misfit import Identification, MisfitPoint
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.abc_smc import _moved

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.schemas.results import Identification
+from gaplab.schemas.misfit import Identification
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import NO_READINGS, frozen
 from gaplab.services.core.discrepancies.fitness import SquaredFitness

@@ -43,4 +43,4 @@ def test_the_command_prints_through_one_place_alone() -> None:
         file.name for file in folder.rglob("*.py") if re.search(r"typer\.s?echo|[^(]Console\(", file.read_text())
     }
 
-    assert printing == {"json_output.py", "help.py", "progress.py"}  # `help` prints its own texts, `progress` HTML
+    assert printing == {"json_output.py", "cli.py", "progress.py"}  # `help` prints its own texts, `progress` HTML

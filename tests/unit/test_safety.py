@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.schemas.safety import LimitsSpec, Safety
+from gaplab.schemas.measurements import LimitsSpec, Safety
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.engines import engines

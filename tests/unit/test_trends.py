@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gaplab.schemas.comparisons import Trend
+from gaplab.schemas.reports import Trend
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.findings.judged import FEWEST_REPETITIONS, curve_end
 

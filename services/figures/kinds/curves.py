@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from gaplab.schemas.results import Curve, CurvePoint, Fitness, from_before
+from gaplab.schemas.curves import Curve, CurvePoint, Fitness, from_before
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Line, Mark, Panel, Table, faint_lines
 from gaplab.services.figures.style import INK, Dash, Style, strategy_styles
 from gaplab.services.figures.words import distinct_names, drawable, heading, limits, number, number_of, with_unit

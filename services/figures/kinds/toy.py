@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from gaplab.schemas.figures import ToyIteration
+from gaplab.schemas.replays import ToyIteration
 from gaplab.services.figures.kinds.squared_error import summed
 from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Line, Mark, Panel, Points, Table
 from gaplab.services.figures.style import COLORS, INK, Style

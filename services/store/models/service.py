@@ -6,8 +6,8 @@ from typing import Any
 from sqlalchemy import BigInteger, Index, Integer, String, Text
 from sqlalchemy.orm import Mapped, mapped_column
 
+from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.keeping import Role
 from gaplab.services.store.clock import now
 from gaplab.services.store.models.base import Base, Reason, words
 

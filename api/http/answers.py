@@ -1,20 +1,26 @@
-"""Entity tags, so that clients neither load the same answer twice nor overwrite an edit that they have not seen.
+"""Answers that are more than a body: with an entity tag, as a file to save, or of a request that may be repeated.
 
-A tag is `"EDITS.DIGEST"`: the number of edits by people, and a digest of the whole answer. `If-None-Match` compares the
-whole tag. `If-Match` compares the edits alone, so that the progress of an experiment refuses no edit.
+By tags, clients neither load the same answer twice nor overwrite an edit that they have not seen. A tag is
+`"EDITS.DIGEST"`: the number of edits by people, and a digest of the whole answer. `If-None-Match` compares the whole
+tag. `If-Match` compares the edits alone, so that the progress of an experiment refuses no edit.
 """
 
 import re
 from collections.abc import Collection
 from hashlib import sha256
-from typing import Annotated
+from typing import Annotated, TypeVar
+from urllib.parse import quote
 
 from fastapi import Header, Request, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel
 
 from gaplab.api.http.problems import Responses
+from gaplab.schemas.base import Frozen
 from gaplab.services.core.errors import GaplabError
+from gaplab.services.experiments.idempotency import Once
+
+R = TypeVar("R", bound=Frozen)
 
 IfMatch = Annotated[
     str | None,
@@ -35,11 +41,7 @@ class ConditionMissing(GaplabError):
 
 def tagged(request: Request, answer: BaseModel, edits: int = 0) -> Response:
     """Return the answer with its tag, or 304 without a body if `If-None-Match` has that tag or `*`."""
-    return tagged_response(request, JSONResponse(answer.model_dump(mode="json")), edits)
-
-
-def tagged_response(request: Request, response: Response, edits: int = 0) -> Response:
-    """Return a response with its tag, as `tagged` does."""
+    response = JSONResponse(answer.model_dump(mode="json"))
     tag = f'"{edits}.{sha256(response.body).hexdigest()[:16]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
     known = _listed(request.headers.get("if-none-match", "")) if request.method == "GET" else []
@@ -64,3 +66,31 @@ def starting_from(if_match: str | None) -> Collection[int] | None:
 
 def _listed(tags: str) -> list[str]:
     return [tag.strip().removeprefix("W/") for tag in tags.split(",")]
+
+
+def attachment(text: str, media_type: str, name: str) -> Response:
+    """Return a text as a file of this name."""
+    return Response(text, media_type=media_type, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+
+
+def saved_as(name: str) -> str:
+    """Return the Content-Disposition of a file that a browser saves under this name, in any script.
+
+    Source: RFC 6266, section 4.3, and RFC 8187: `filename` is ASCII, for what does not know `filename*`.
+    """
+    clean = "".join(sign if sign.isprintable() and sign not in "/\\" else "_" for sign in name)
+    plain = "".join(sign if sign.isascii() and (sign.isalnum() or sign in "._-") else "_" for sign in clean)
+    return f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(clean, safe='')}"
+
+
+def created(once: Once[R], response: Response, location: str) -> R:
+    """Return the answer to a submission; headers say where it is, and whether an earlier request submitted it."""
+    response.headers["Location"] = location
+    return once_answered(once, response)
+
+
+def once_answered(once: Once[R], response: Response) -> R:
+    """Return the answer; a header says whether an earlier request had it."""
+    if once.replayed:
+        response.headers["Idempotent-Replayed"] = "true"
+    return once.answer
