@@ -232,7 +232,8 @@ class SpecRead(Frozen):
     """The spec of a study: what a person would submit, and what was stored."""
 
     spec: dict[str, Any] | None = Field(
-        description="the shortest spec that gives the same; null if no single spec gives all experiments",
+        description="as it was submitted, or with every field if that is not known; null if no single spec gives all "
+        "experiments",
         examples=[{"strategies": ["simulated_fit", "random"], "engine": "mujoco", "budget": "smoke"}],
     )
     resolved: tuple[dict[str, Any], ...] = Field((), description="the complete spec of each experiment")

@@ -15,12 +15,12 @@ from secrets import token_hex
 from sqlalchemy import func, select, update
 
 from gaplab.schemas.access import Role, TokenRead
-from gaplab.services.core.errors import Forbidden, GaplabError, NotFound
+from gaplab.services.core.errors import Forbidden, GaplabError
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import TokenRow
 from gaplab.services.store.queries.experiments import new_id
 from gaplab.services.store.session import Session, Store, snapshot, transaction
-from gaplab.services.store.statements import storable
+from gaplab.services.store.statements import existing, storable
 
 MAKE_ONE = "`gaplab token create --role admin` makes one"
 
@@ -95,9 +95,7 @@ def revoke_token(session: Session, token_id: str) -> TokenRead:
     """
     row, id_ = TokenRow, storable(token_id)
     session.execute(update(row).where(row.id == id_).values(revoked_at=func.coalesce(row.revoked_at, now())))
-    if (token := session.get(row, id_, populate_existing=True)) is None:
-        raise NotFound(f"there is no token {token_id!r}")
-    return _view(token)
+    return _view(existing(session, row, token_id, "token", populate_existing=True))
 
 
 def authenticate(store: Store, shown: str | None, *, required: bool) -> Caller:

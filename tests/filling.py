@@ -12,16 +12,8 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.specs.rollouts import expected_rollouts
-from gaplab.services.store.models import (
-    Base,
-    ExperimentRow,
-    RepetitionRow,
-    StepKind,
-    StepRow,
-    StudyRow,
-)
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
+from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, StepKind, StepRow, StudyRow
 from gaplab.services.store.queries.logs import columns_of
 from gaplab.services.store.session import Store
 

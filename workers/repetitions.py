@@ -12,7 +12,7 @@ from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.lease_ends import Silences
 from gaplab.services.running import execution
 from gaplab.services.specs.blame import describe
-from gaplab.services.specs.rollouts import hardware_of
+from gaplab.services.specs.resolution import hardware_of
 from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store

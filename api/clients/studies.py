@@ -71,7 +71,7 @@ class Studies(Connected):
         return self._connection.get(ExperimentRead, f"/experiments/{segment(of)}", **shown)
 
     def spec(self, of: Of) -> SpecRead:
-        """Return the spec of a study: the shortest one that gives the same, and the complete ones."""
+        """Return the spec of a study, as it was submitted, to submit it again; and the complete ones."""
         return self._connection.get(SpecRead, f"/studies/{segment(of)}/spec")
 
     def studies(self, *, query: str | None = None, **filters: str | int | None) -> Page[StudyRead]:

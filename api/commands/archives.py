@@ -17,7 +17,7 @@ from gaplab.api.commands.submission import submit_confirmed
 from gaplab.schemas.archives import MOST_BYTES_OF_IMPORT, RepetitionRerun, RerunRead
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.settings import Settings
-from gaplab.services.store.atomic_files import PRIVATE, appearing
+from gaplab.services.store.atomic_files import appearing
 
 
 @command(KEEPING)
@@ -26,7 +26,7 @@ def export(
 ) -> Answer:
     """Export a study, perhaps with one of its experiments alone, into one archive: a zipped SQLite database."""
     file = to or Path(f"gaplab-{client.study(id).id}.zip")  # the service's id, never a path that was typed
-    with appearing(file, PRIVATE) as part, part.open("wb") as target:
+    with appearing(file) as part, part.open("wb") as target:
         client.export(id, target)
     size = file.stat().st_size
     most = f"{size:,} bytes; gaplab import takes {MOST_BYTES_OF_IMPORT:,}. gaplab backup copies any size"
@@ -58,7 +58,7 @@ def backup(file: Annotated[Path, typer.Argument(help="new file for the copy")]) 
 @command(KEEPING)
 def restore(file: Annotated[Path, typer.Argument(help="a backup, which stays as it is")]) -> Answer:
     """Put a backup in the place of the SQLite database of GAPLAB_DATABASE_URL, which is kept under another name."""
-    from gaplab.services.store.restore import restore as put_back
+    from gaplab.services.store.backup import restore as put_back
 
     done = put_back(Settings.from_environment().database_url, file)
     kept = f" The former database is now {done.kept}." if done.kept else ""

@@ -15,7 +15,7 @@ from gaplab.api.app import create_app
 from gaplab.api.process.errors import CommandError
 from gaplab.api.process.supervisor_process import SupervisorProcess
 from gaplab.services.access import demand_token_beyond_loopback
-from gaplab.services.notifications.courier import courier
+from gaplab.services.notifications.delivery import Courier
 from gaplab.services.plugins import folders
 from gaplab.services.settings import Limits, Notify, Settings
 from gaplab.services.store.session import Store
@@ -176,7 +176,7 @@ def serve_api(
     with Store(settings.database_url) as store, in_use(store.file):
         app = create_app(store, settings, limits, notify)
         app.state.supervisor, app.state.lease_s = supervisor, settings.lease_s
-        with courier(store, notify, settings.url):
+        with Courier(store, notify, settings.url):
             Server(app).run([listener])
 
 

@@ -15,8 +15,8 @@ from gaplab.schemas.editing import DeletionRead, NotesRead, ViewName, ViewRead, 
 from gaplab.schemas.notifications import WebhookRead, WebhookSpec
 from gaplab.schemas.records import StudyRead
 from gaplab.services import archives
-from gaplab.services.experiments import archiving, deletion, notes, saved_views
-from gaplab.services.experiments.deletion import Deleter
+from gaplab.services.experiments import editing, listing
+from gaplab.services.experiments.editing import Deleter
 from gaplab.services.notifications import webhooks
 from gaplab.services.settings import Notify
 from gaplab.services.waiting_line import WaitingLine
@@ -43,7 +43,7 @@ DeleterDep = Annotated[Deleter, Depends(_deleter)]
 @router.get("/notes", summary="Read a study's notes as HTML", responses=documented(409))
 def read_notes(id: Id, store: StoreDep) -> NotesRead:
     """Return the notes as HTML that is safe on a page: rendered Markdown, without scripts, images or its own HTML."""
-    return notes.read(store, id)
+    return editing.read_notes(store, id)
 
 
 @router.get("/webhook", summary="Read a study's webhook", responses=documented(409))
@@ -69,7 +69,7 @@ def drop_webhook(id: Id, store: StoreDep, notify: NotifyDep) -> WebhookRead:
 )
 def archive_study(id: Id, store: StoreDep) -> StudyRead:
     """Leave a study whose experiments have all ended out of lists. Its address, curves and comparisons stay."""
-    return archiving.archive(store, id)
+    return editing.archive(store, id)
 
 
 @router.post(
@@ -77,7 +77,7 @@ def archive_study(id: Id, store: StoreDep) -> StudyRead:
 )
 def unarchive_study(id: Id, store: StoreDep) -> StudyRead:
     """List an archived study again."""
-    return archiving.archive(store, id, archived=False)
+    return editing.archive(store, id, archived=False)
 
 
 @router.delete(
@@ -91,7 +91,7 @@ def delete_study(id: Id, store: StoreDep, deleter: DeleterDep) -> DeletionRead:
 
     Its events stay, and the last of each experiment says so. Only the token that submitted it may do so, or an admin's.
     """
-    return deletion.delete(store, id, deleter)
+    return editing.delete(store, id, deleter)
 
 
 @archive_router.get(
@@ -142,19 +142,19 @@ def import_archive(
 @view_router.get("", summary="List the saved views", response_description="By name")
 def list_views(store: StoreDep) -> tuple[ViewRead, ...]:
     """List the saved views."""
-    return saved_views.list_views(store)
+    return listing.list_views(store)
 
 
 @view_router.get("/{name}", summary="Read a saved view", responses=documented(404))
 def read_view(name: ViewName, store: StoreDep) -> ViewRead:
     """Return a saved view: pass its query as `q`, and its `sort`, to the list that it shows."""
-    return saved_views.read_view(store, name)
+    return listing.read_view(store, name)
 
 
 @view_router.put("/{name}", summary="Save a view", response_description="As it is saved", responses=documented(429))
 def save_view(name: ViewName, spec: ViewSpec, store: StoreDep) -> ViewRead:
     """Save a view under this name, in place of the one that has it. Every runner may replace and delete every view."""
-    return saved_views.save_view(store, name, spec)
+    return listing.save_view(store, name, spec)
 
 
 @view_router.delete(
@@ -162,4 +162,4 @@ def save_view(name: ViewName, spec: ViewSpec, store: StoreDep) -> ViewRead:
 )
 def delete_view(name: ViewName, store: StoreDep) -> ViewRead:
     """Delete a saved view; nothing that it lists is touched."""
-    return saved_views.delete_view(store, name)
+    return listing.delete_view(store, name)

@@ -29,7 +29,7 @@ from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import ExtensionSpec, ScheduleChange, State, Verb
 from gaplab.schemas.records import Page, StudyRead
 from gaplab.schemas.spec import AnySpec, SpecRead
-from gaplab.services.experiments import editing, estimates, extension, lifecycle, listing, reading, submission
+from gaplab.services.experiments import editing, estimates, lifecycle, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.running import provenance
 
@@ -129,7 +129,7 @@ def edit_study(id: Id, edit: Edit, store: StoreDep, request: Request, if_match: 
 
 @router.get("/{id}/spec", summary="Read a study's spec", response_description="To submit it again")
 def read_spec(id: Id, store: StoreDep, caller: CallerDep, query: Asked[Revealing]) -> SpecRead:
-    """Return the shortest spec that gives the same study, or one experiment of it, and the complete ones."""
+    """Return the spec of a study, or of one experiment of it, as it was submitted; and the complete ones."""
     return reading.read_spec(store, id, reveal=query.permitted(caller))
 
 
@@ -192,7 +192,7 @@ def extend_study(id: Id, totals: ExtensionSpec, store: StoreDep, admitted: Limit
     Existing results stay, and the whole equals a study that was submitted with these totals. An experiment that is
     larger keeps its size, and one that takes no samples has no iterations to add. A stopped experiment is completed.
     """
-    return extension.extend(store, id, totals, query.given(admitted))
+    return lifecycle.extend(store, id, totals, query.given(admitted))
 
 
 @router.patch("/{id}/schedule", summary="Change a study's schedule", response_description="With its new schedule")

@@ -4,17 +4,18 @@ Each table is exported, or left out for a reason; a column that is added to an e
 Columns that are left out are null, or have the value of a database in which nothing runs.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 
+from gaplab.schemas.lifecycle import Ending, State
 from gaplab.services.store import tables
 from gaplab.services.store.queries.archives import EXPERIMENT as EXPERIMENT
 from gaplab.services.store.queries.archives import REPETITION as REPETITION
 from gaplab.services.store.queries.archives import REPETITION_ID
 from gaplab.services.store.queries.archives import Row as Row
-from gaplab.services.store.tables import Column, Kind
+from gaplab.services.store.tables import Column
 
 EXPORTED = (
     "robot",
@@ -97,7 +98,7 @@ def columns_of(table: str) -> tuple[Column, ...]:
 def _replaced(column: Column) -> tuple[Column, ...]:
     if column.name != REPETITION_ID:
         return (column,)
-    return replace(column, name=EXPERIMENT, kind=Kind.TEXT, longest=32), replace(column, name=REPETITION)
+    return replace(column, name=EXPERIMENT, type=str, longest=32), replace(column, name=REPETITION)
 
 
 _EARLIEST = datetime(1980, 1, 1, tzinfo=UTC)
@@ -113,3 +114,36 @@ def at_rest(table: str, row: Row) -> Row:
         case "robot" | "attachment":
             return {"created_at": _EARLIEST}
     return {}
+
+
+def owner_of(table: str, row: Row) -> str:
+    """Return the id of the experiment that a row belongs to; "" of a row that belongs to none."""
+    owner: str = row["id"] if table == "experiment" else row.get(EXPERIMENT) or row.get("experiment_id") or ""
+    return owner
+
+
+def is_over(row: Row) -> bool:
+    """Return whether an experiment, a repetition or an attempt has ended, and has the time of its end."""
+    return row["ended_at"] is not None and State(row.get("state", State.COMPLETED)).ended
+
+
+def resting(table: str, row: Row, on_bench: Collection[str], now: datetime | None = None) -> Row:
+    """Return a row without the state of work that is under way.
+
+    It is CANCELLED, since the archive hides the parameters of reality. Where reality is a robot on a bench nothing is
+    hidden: an experiment is PAUSED, and its repetitions are QUEUED.
+
+    Args:
+        table: the row's table.
+        row: the row.
+        on_bench: the experiments on a bench that have not ended.
+        now: when it ends; None if its end is not to be said.
+    """
+    if table not in {"experiment", "repetition", "attempt"} or is_over(row):
+        return row
+    physical = owner_of(table, row) in on_bench
+    if table == "attempt":
+        return row | {"ending": Ending.HANDED_BACK if physical else Ending.CANCELLED, "ended_at": now}
+    if physical:
+        return row | {"state": State.PAUSED if table == "experiment" else State.QUEUED, "ended_at": None}
+    return row | {"state": State.CANCELLED, "ended_at": now}

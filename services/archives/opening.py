@@ -8,7 +8,6 @@ Source: https://sqlite.org/security.html.
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from errno import EINVAL
 from hashlib import sha256
 from pathlib import Path
@@ -65,21 +64,10 @@ _MIGRATING = Lock()
 """Alembic's environment is one for the process."""
 
 
-@dataclass(frozen=True)
-class OpenedArchive:
-    """The rows of an archive in a database with our own tables, at the present revision. Their values are not checked.
+def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> tuple[Path, int]:
+    """Return an archive as a database with our own tables, in a folder, and the number of rows that fit in memory.
 
-    Attributes:
-        database: the file of the database.
-        at_once: number of rows that fit in memory.
-    """
-
-    database: Path
-    at_once: int
-
-
-def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive:
-    """Unpack an archive into a folder; its tables have at most `most_rows` together.
+    The database is at the present revision, with unchecked values; its tables have at most `most_rows` together.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, not an archive, or written by a later version.
@@ -90,7 +78,10 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive
     try:
         with closing(sqlite3.connect(f"{given.as_uri()}?mode=ro&immutable=1", uri=True)) as source:
             revision = _revision(source)
-            _make(database, revision)
+            if revision == REVISION:
+                new_database(database)
+            else:
+                _migrate(database, revision, f"its database is at revision {revision[:100]}, which is unknown")
             with closing(sqlite3.connect(database)) as target:
                 longest = _copy(source, target, most_rows)
     except sqlite3.IntegrityError as error:
@@ -100,7 +91,7 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive
     given.unlink()
     if revision != REVISION:
         _migrate(database, "head", f"its database of revision {revision} cannot be read")
-    return OpenedArchive(database, max(1, min(_ROWS_IN_MEMORY, _CHARACTERS_IN_MEMORY // max(1, longest))))
+    return database, max(1, min(_ROWS_IN_MEMORY, _CHARACTERS_IN_MEMORY // max(1, longest)))
 
 
 class _Bounded:
@@ -175,14 +166,6 @@ def _revision(connection: sqlite3.Connection) -> str:
         told = ", ".join(found)[:100] or "none"
         raise InvalidArchive(f"its database is at revision {told}; this version of gaplab reads up to {REVISION}")
     return found[0]
-
-
-def _make(database: Path, revision: str) -> None:
-    """Make a database with the tables of a revision, without rows."""
-    if revision == REVISION:
-        new_database(database)
-    else:
-        _migrate(database, revision, f"its database is at revision {revision[:100]}, which is unknown")
 
 
 def _migrate(database: Path, revision: str, problem: str) -> None:

@@ -21,24 +21,23 @@ from gaplab.schemas.archives import ImportRead
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import RequestState
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.archives.checking import checked, readable
-from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, Row, columns_of
-from gaplab.services.archives.consistency import (
+from gaplab.services.archives.checking import (
     MOST_EXPERIMENTS,
     check_attachments,
     check_logs,
     check_row,
+    checked,
     checked_experiments,
+    readable,
 )
+from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, Row, columns_of, is_over, resting
 from gaplab.services.archives.opening import open_archive
-from gaplab.services.archives.resting import is_over, resting
 from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import settle
 from gaplab.services.experiments.submission import admit
 from gaplab.services.settings import Limits, variable_of
-from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.specs.rollouts import expected_rollouts, hardware_of
+from gaplab.services.specs.resolution import expected_rollouts, hardware_of, resolve_experiment
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ExperimentRow, StudyRow
@@ -48,7 +47,6 @@ from gaplab.services.store.queries.experiments import new_id
 from gaplab.services.store.queries.requests import PENDING
 from gaplab.services.store.session import Session, Store
 from gaplab.services.store.sqlite_file import url_of
-from gaplab.services.store.tables import Kind
 
 _REQUEST_IDS = {"id", "request_id", "same_as", "replaces"}
 """Columns with the ids of requests and answers."""
@@ -142,14 +140,14 @@ def archived_specs(file: IO[bytes]) -> tuple[Any, ...]:
 @contextmanager
 def _opened(file: IO[bytes], most_rows: int | None) -> Iterator[tuple[Store, int]]:
     with TemporaryDirectory(prefix="gaplab-import-") as folder:
-        opened = open_archive(file, Path(folder), most_rows or Limits().imported_rows)
-        with Store(url_of(opened.database)) as private:
-            yield private, opened.at_once
+        database, at_once = open_archive(file, Path(folder), most_rows or Limits().imported_rows)
+        with Store(url_of(database)) as private:
+            yield private, at_once
 
 
-def _rows(session: Session, table: str, owners: Sequence[str], at_once: int, *kinds: Kind) -> Iterator[Row]:
-    """Yield rows, without columns of these kinds."""
-    columns = [column.name for column in columns_of(table) if column.kind not in kinds]
+def _rows(session: Session, table: str, owners: Sequence[str], at_once: int, *without: type) -> Iterator[Row]:
+    """Yield rows, without columns of these types."""
+    columns = [column.name for column in columns_of(table) if column.type not in without]
     return archives.read_rows(session, table, columns, owners, at_once)
 
 
@@ -161,7 +159,7 @@ def _check(session: Session, private: Store, at_once: int) -> CheckedArchive:
 
     def rows(table: str) -> Iterator[Row]:
         owners = studies if table == "study" else ids
-        return checked(table, _rows(session, table, owners, at_once, Kind.BINARY))
+        return checked(table, _rows(session, table, owners, at_once, bytes))
 
     (study,) = studies
     experiments = checked_experiments(rows, study)
@@ -232,10 +230,6 @@ def _renamed(table: str, row: Row, ids: Mapping[str, str]) -> Row:
     for name in {EXPERIMENT, "experiment_id"} & set(row):
         before, row[name] = row[name], ids[row[name]]
         if table in {"request", "answer"} and before != row[name]:
-            row |= {key: _derived(row[name], row[key]) for key in _REQUEST_IDS & set(row)}
+            given = {key: row[key] for key in _REQUEST_IDS & set(row) if row[key] is not None}
+            row |= {key: sha256(f"{row[name]} {id_}".encode()).hexdigest()[:10] for key, id_ in given.items()}
     return row
-
-
-def _derived(experiment: str, id_: str | None) -> str | None:
-    """Return the id of a request or an answer in an experiment whose own id was taken."""
-    return None if id_ is None else sha256(f"{experiment} {id_}".encode()).hexdigest()[:10]

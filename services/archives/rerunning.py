@@ -24,12 +24,12 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.core.ports import Reality
 from gaplab.services.core.types import Measured, Probed, Step, Transferred
 from gaplab.services.engines import engines
+from gaplab.services.experiments.reading import read_spec
 from gaplab.services.plugins import folders
 from gaplab.services.plugins.external import named_files
 from gaplab.services.running import provenance
 from gaplab.services.running.versions import provenance as provenance_here
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.shortening import shortest
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import experiments, logs
@@ -39,14 +39,9 @@ from gaplab.services.world import robot_library
 
 @dataclass(frozen=True)
 class Recorded:
-    """A repetition as an archive has it.
+    """A repetition as an archive has it, with id, name and stored spec of its experiment.
 
     Attributes:
-        experiment: id of its experiment.
-        name: name of its experiment.
-        number: number of the repetition, from 0.
-        spec: stored spec of the experiment.
-        log: steps of the repetition.
         robots: texts of the robot files that the spec needs, for a process that does not know them.
         until: time in seconds since 1970 after which no further step is computed.
     """
@@ -202,13 +197,11 @@ def submitted_spec(file: IO[bytes]) -> dict[str, Any]:
         InvalidArchive: the file is damaged, or not an archive.
         Conflict: no single spec gives all experiments, or parameters of reality are hidden.
     """
-    with checked_archive(file) as checked, checked.store.reading() as session:
-        whole = experiments.members(session, checked.study)
-        specs = [row.spec for row in whole.experiments]
-        found = shortest(whole.study.name, specs)
+    with checked_archive(file) as checked:
+        found = read_spec(checked.store, checked.study, reveal=True)
     if found.spec is None:
         raise Conflict(f"no single spec gives the experiments of the archive: {'; '.join(found.remarks)}")
-    if any(value is None for spec in specs for value in spec["reality"]["parameters"].values()):
+    if any(value is None for spec in found.resolved for value in spec["reality"]["parameters"].values()):
         raise Conflict("the archive hides parameters of reality, so its spec cannot be submitted again")
     return found.spec
 

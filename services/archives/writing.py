@@ -10,12 +10,12 @@ from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO
 from zipfile import ZipFile
 
-from gaplab.services.archives.columns import EXPORTED, Row, at_rest, columns_of
+from gaplab.services.archives.columns import EXPORTED, Row, at_rest, columns_of, resting
 from gaplab.services.archives.opening import DATABASE
-from gaplab.services.archives.resting import resting
-from gaplab.services.experiments import hiding
+from gaplab.services.experiments import views
 from gaplab.services.results.files import entry_of
 from gaplab.services.specs.stored_specs import without_truth
+from gaplab.services.specs.submitted import without_parameters
 from gaplab.services.store.queries import archives, experiments
 from gaplab.services.store.session import Session, Store, new_database
 from gaplab.services.store.sqlite_file import url_of
@@ -23,13 +23,7 @@ from gaplab.services.store.sqlite_file import url_of
 
 @dataclass(frozen=True)
 class Archive:
-    """An archive in a temporary file, which is deleted when it is closed.
-
-    Attributes:
-        name: a suitable file name.
-        size: size in bytes.
-        file: open file, at its beginning.
-    """
+    """An archive in an open temporary file, at its beginning, which is deleted when it is closed; its size in bytes."""
 
     name: str
     size: int
@@ -41,9 +35,6 @@ def export(store: Store, id_: str) -> Archive:
 
     The parameters of reality are null until they may be shown. What has not ended rests: it is CANCELLED, or PAUSED on
     a bench. Memory does not grow with the number of results.
-
-    Raises:
-        NotFound: no such study or experiment.
     """
     with TemporaryDirectory(prefix="gaplab-export-") as folder:
         file = Path(folder) / DATABASE
@@ -58,7 +49,7 @@ def export(store: Store, id_: str) -> Archive:
 
 
 def _fill(copy: Session, session: Session, found: experiments.Members) -> None:
-    hidden = hiding.hidden(session, found.experiments)
+    hidden = views.hidden(session, found.experiments)
     for table in EXPORTED:
         archives.insert_rows(copy, table, _rows(session, table, found, hidden))
 
@@ -70,8 +61,11 @@ def _rows(session: Session, table: str, found: experiments.Members, hidden: Coll
     }
     ids = [found.study.id] if table == "study" else found.ids
     for row in archives.read_rows(session, table, [column.name for column in columns_of(table)], ids):
-        secret = {"spec": without_truth(row["spec"])} if table == "experiment" and row["id"] in hidden else {}
-        yield resting(table, row, on_bench) | secret | at_rest(table, row)
+        if table == "experiment" and row["id"] in hidden:
+            row |= {"spec": without_truth(row["spec"])}
+        if table == "study" and hidden:
+            row |= {"submitted": row["submitted"] and without_parameters(row["submitted"])}
+        yield resting(table, row, on_bench) | at_rest(table, row)
 
 
 def _zipped(source: IO[bytes], name: str) -> Archive:

@@ -1,12 +1,10 @@
 """Sensitivity checks as people use them: submitted, read, and summarised for their experiments.
 
-Supervisors run them by `gaplab.services.running.sensitivity`. Use cases raise StoreUnavailable while the database
-cannot be used.
+Supervisors run them by `gaplab.services.running.sensitivity`.
 """
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 
@@ -16,7 +14,6 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
-from gaplab.services.core.errors import NotFound
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move
@@ -30,20 +27,7 @@ from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ExperimentRow, SensitivityRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.session import Store, snapshot
-from gaplab.services.store.statements import insert_new, storable
-
-
-@dataclass(frozen=True)
-class CheckSummary:
-    """What an experiment shows of its check.
-
-    Attributes:
-        id: id of the check; None if there is none.
-        warnings: warnings as sentences; empty before the check has ended.
-    """
-
-    id: str | None = None
-    warnings: tuple[str, ...] = ()
+from gaplab.services.store.statements import existing, insert_new
 
 
 def admit(store: Store, spec: SensitivitySpec, admitted: Admission = FREELY) -> Once[SensitivityRead]:
@@ -59,12 +43,8 @@ def admit(store: Store, spec: SensitivitySpec, admitted: Admission = FREELY) -> 
 
 @snapshot
 def read(session: Session, id: str) -> SensitivityRead:
-    """Return the check; it has results once it is COMPLETED.
-
-    Raises:
-        NotFound: no such check.
-    """
-    return _view(get(session, id))
+    """Return the check; it has results once it is COMPLETED."""
+    return _view(existing(session, SensitivityRow, id, "sensitivity check"))
 
 
 def queue(session: Session, spec: Checked) -> SensitivityRow:
@@ -101,17 +81,6 @@ def cancel_unneeded(session: Session, check: str | None) -> None:
     move(session, row, (row.id == check) & row.id.not_in(needed), State.CANCELLED)
 
 
-def get(session: Session, id_: str) -> SensitivityRow:
-    """Return the check with this id.
-
-    Raises:
-        NotFound: there is none.
-    """
-    if (check := session.get(SensitivityRow, storable(id_), populate_existing=True)) is None:
-        raise NotFound(f"there is no sensitivity check {id_!r}")
-    return check
-
-
 def tell(session: Session, check: SensitivityRow, experiments: Iterable[str]) -> None:
     """Record for these experiments that their check has ended, with its warnings."""
     body = {"sensitivity": check.id, "state": check.state.value, "warnings": list(warnings(check))}
@@ -119,14 +88,14 @@ def tell(session: Session, check: SensitivityRow, experiments: Iterable[str]) ->
         note(session, EventKind.SENSITIVITY_ENDED, experiment, **body)
 
 
-def summaries(session: Session, experiments: Iterable[ExperimentRow]) -> dict[str, CheckSummary]:
-    """Return the summary of each experiment's check; experiments without a check are left out.
+def summaries(session: Session, experiments: Iterable[ExperimentRow]) -> dict[str, tuple[str, tuple[str, ...]]]:
+    """Return id and warnings of each experiment's check; experiments without a check are left out.
 
     An imported experiment names no check: it has the check of the same tunables, if there is one.
     """
     ids = {row.id: row.sensitivity_id or _id_of_text(subject(row.spec)) for row in experiments if row.tunes}
     rows = session.scalars(select(SensitivityRow).where(SensitivityRow.id.in_(ids.values())))
-    found = {row.id: CheckSummary(row.id, warnings(row)) for row in rows}
+    found = {row.id: (row.id, warnings(row)) for row in rows}
     return {experiment: found[check] for experiment, check in ids.items() if check in found}
 
 

@@ -12,8 +12,7 @@ from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import Admission, CostUnconfirmed, check_extent
 from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.settings import Limits, variable_of
-from gaplab.services.specs.resolution import is_direct, resolve, takes_samples
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve, takes_samples
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries import costs
 from gaplab.services.store.session import Session, Store
@@ -38,7 +37,6 @@ def estimate(
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation, as on submission.
-        StoreUnavailable: the database cannot be used now.
     """
     resolved = resolved_here(store, spec, resolve)
     check_extent(resolved, limits)

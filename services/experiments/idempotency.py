@@ -31,12 +31,7 @@ class KeyReused(GaplabError):
 
 @dataclass(frozen=True)
 class Once(Generic[R]):
-    """The answer to a request that may be a repetition.
-
-    Attributes:
-        answer: the same answer each time.
-        replayed: whether the answer was stored earlier, so that no work was done now.
-    """
+    """The answer to a request that may be a repetition, and whether it was stored earlier, so that no work was done."""
 
     answer: R
     replayed: bool = False

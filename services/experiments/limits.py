@@ -3,16 +3,20 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
-from sqlalchemy import case, func, select, text
+from sqlalchemy import case, func, select
 
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import InvalidSpec, LimitReached, Violation
 from gaplab.services.settings import Limits, variable_of
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.resolution import expected_rollouts
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.queries.requests import bench_key, spellings
 from gaplab.services.store.session import Session
+from gaplab.services.store.statements import wait_for_others
+from gaplab.services.world.robot_library import label_of
 
 RETRY_AFTER_S = 60
 """A service at its limit stays there for minutes at least."""
@@ -77,8 +81,7 @@ def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
     """
     if (limits := admitted.limits) is None:
         return
-    if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write overlap
-        session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
+    wait_for_others(session, _LOCK)
     experiments, rollouts = _load(session)
     more = max(0, sum(expected_rollouts(each) * each.repetitions for each in specs) - done)
     _check("experiments_per_token", experiments[admitted.token], len(specs), limits)
@@ -110,3 +113,29 @@ def _check(name: str, present: int, more: int, limits: Limits) -> None:
             f"{present:,} {noun} {whose}are in progress, and {more:,} more would exceed {limit:,} ({variable_of(name)})"
         )
         raise LimitReached(msg, RETRY_AFTER_S)
+
+
+CLOSE = 0.8
+"""Similarity of two names, from 0 to 1, from which one may be the other; names with other digits are others."""
+
+
+def check_benches(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission) -> None:
+    """Refuse a bench that is new and nearly has the name of another, unless the request confirms it.
+
+    Raises:
+        CostUnconfirmed: the message has both names.
+    """
+    named = {each.reality.bench: None for each in specs if each.reality.bench not in (None, label_of(each.robot))}
+    if not named or admitted.limits is None or admitted.cost_known:
+        return
+    known = {bench_key(each): each for each in spellings(session)}
+    for bench in named:
+        key = bench_key(bench)
+        digits = list(filter(str.isdigit, key))
+        alike = [each for each in known if list(filter(str.isdigit, each)) == digits]
+        if key not in known and (close := get_close_matches(key, alike, n=1, cutoff=CLOSE)):
+            message = (
+                f"the bench {bench!r} is new, and {known[close[0]]!r} is known; if they are two robots, confirm it"
+            )
+            how = "confirm_cost=true, --yes, or yes=True in Python"
+            raise CostUnconfirmed([Violation("confirm_cost", False, f"{message}: {how}", "true")])

@@ -1,24 +1,27 @@
 """The list of studies, page by page, filtered and sorted.
 
 A page begins after the key of the last row of the page before. The key is the sorted column, then the id. If a row's
-name changes between two pages, both pages or neither may have it.
+name changes between two pages, both pages or neither may have it. Saved views are queries with a name.
 """
 
 import json
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 
-from sqlalchemy import select, tuple_
+from sqlalchemy import delete, func, select, tuple_, update
 
+from gaplab.schemas.editing import ViewRead, ViewSpec
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Page, StudyRead
+from gaplab.services.core.errors import InvalidSpec, LimitReached
 from gaplab.services.experiments.query.conditions import conditions, containing, of_one, study_is
 from gaplab.services.experiments.views import view
+from gaplab.services.store.clock import moment
 from gaplab.services.store.cursor import decode, encode, next_cursor
-from gaplab.services.store.models import ExperimentRow, StudyRow
+from gaplab.services.store.models import ExperimentRow, StudyRow, ViewRow
 from gaplab.services.store.queries.experiments import of_studies
-from gaplab.services.store.session import Session, snapshot
-from gaplab.services.store.statements import storable
+from gaplab.services.store.session import Session, snapshot, transaction
+from gaplab.services.store.statements import existing, insert_new, storable
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,6 @@ def list_studies(
 
     Raises:
         InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
-        StoreUnavailable: the database cannot be used now.
     """
     row, falling = StudyRow, wanted.sort.startswith("-")
     columns = (getattr(row, wanted.sort.removeprefix("-")), row.id)
@@ -77,3 +79,55 @@ def list_studies(
     rows = session.scalars(query).all()
     found = of_studies(session, rows[:limit])
     return Page(items=view(session, *found), next=next_cursor(rows, limit, wanted.cursor_after))
+
+
+MOST = 200
+"""Views of a service."""
+
+
+@snapshot
+def list_views(session: Session) -> tuple[ViewRead, ...]:
+    """Return the views, by name."""
+    return tuple(map(ViewRead.filled_from, session.scalars(select(ViewRow).order_by(ViewRow.name))))
+
+
+@snapshot
+def read_view(session: Session, name: str) -> ViewRead:
+    """Return a view."""
+    return _found(session, name)
+
+
+@transaction
+def save_view(session: Session, name: str, spec: ViewSpec) -> ViewRead:
+    """Save a view, or replace the one with this name.
+
+    Raises:
+        InvalidSpec: its query is invalid.
+        LimitReached: there are too many views.
+    """
+    try:
+        conditions(spec.query)
+    except InvalidSpec as error:
+        raise InvalidSpec(violation.moved("q", "/query") for violation in error.violations) from error
+    query = storable(spec.query) if spec.query else None
+    shown = {"query": query, "sort": spec.sort}
+    if session.get(ViewRow, storable(name)) is None:
+        if session.execute(select(func.count()).select_from(ViewRow)).scalar_one() >= MOST:
+            raise LimitReached(f"this service has {MOST} saved views already: delete one first")
+        new = insert_new(session, ViewRow).values(name=storable(name), created_at=moment(session), **shown)
+        session.execute(new)  # waits for another one of this name, which is replaced like an earlier one
+    row = ViewRow
+    session.execute(update(row).where(row.name == storable(name)).values(shown))
+    return _found(session, name)
+
+
+@transaction
+def delete_view(session: Session, name: str) -> ViewRead:
+    """Delete a view, and return it."""
+    view = _found(session, name)
+    session.execute(delete(ViewRow).where(ViewRow.name == view.name))
+    return view
+
+
+def _found(session: Session, name: str) -> ViewRead:
+    return ViewRead.filled_from(existing(session, ViewRow, name, "saved view"))

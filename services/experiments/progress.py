@@ -28,11 +28,8 @@ first steps slow, and iterations cost more than the first transfer."""
 MOST_STEPS = 5
 """Steps under way that are told."""
 
-Span = tuple[datetime, datetime]
-"""Begin and end of the work of an attempt."""
 
-
-def busy_s(spans: Sequence[Span]) -> float:
+def busy_s(spans: Sequence[tuple[datetime, datetime]]) -> float:
     """Return the seconds in which there was work on at least one repetition: pauses and waiting do not count."""
     total, until = 0.0, None
     for begin, end in sorted(spans):
@@ -67,15 +64,10 @@ def span(low_s: float, high_s: float) -> str:
     return f"{low} to {high} {name}" if low else f"less than {high} {name}"
 
 
-def progress_of(tally: Tally, spans: Sequence[Span] = ()) -> Progress:
-    """Return the progress of an experiment or a study, with the times of its work if it is running."""
-    finished, left, busy = tally.rollouts_done + tally.rollouts_saved, tally.rollouts_left, busy_s(spans)
-    return Progress.filled_from(
-        tally,
-        share=_share(tally),
-        text=_text(tally),
-        time_left=interval(finished, left, busy),
-    )
+def progress_of(tally: Tally) -> Progress:
+    """Return the progress of an experiment or a study, with the time left if it has times of its work."""
+    time_left = interval(tally.rollouts_done + tally.rollouts_saved, tally.rollouts_left, busy_s(tally.spans))
+    return Progress.filled_from(tally, share=_share(tally), text=_text(tally), time_left=time_left)
 
 
 def caveat_of(state: State, tally: Tally) -> str | None:

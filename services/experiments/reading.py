@@ -1,4 +1,7 @@
-"""Experiments and studies, read with their repetitions, samples and simulators. Use cases raise StoreUnavailable."""
+"""Experiments and studies, read with their repetitions, samples and simulators.
+
+Use cases raise NotFound if nothing has the id.
+"""
 
 from collections.abc import Sequence
 
@@ -14,11 +17,10 @@ from gaplab.schemas.records import (
     StudyRead,
 )
 from gaplab.schemas.spec import SpecRead
-from gaplab.services.experiments.hiding import hidden
-from gaplab.services.experiments.views import view, view_experiments, view_repetition
+from gaplab.services.experiments.views import hidden, view, view_experiments, view_repetition
 from gaplab.services.specs.differences import SpecColumn, differences
-from gaplab.services.specs.shortening import shortest
 from gaplab.services.specs.stored_specs import without_truth
+from gaplab.services.specs.submitted import part_of, to_submit_again, without_parameters
 from gaplab.services.store.cursor import next_cursor
 from gaplab.services.store.queries import attempts, results
 from gaplab.services.store.queries.experiments import get_experiment, members, repetitions_of
@@ -27,44 +29,31 @@ from gaplab.services.store.session import Session, Store, snapshot
 
 @snapshot
 def read(session: Session, id_: str, *, reveal: bool = False) -> StudyRead:
-    """Return a study, or one experiment of it as a study of one; `reveal` includes hidden parameters of reality.
-
-    Raises:
-        NotFound: no such study or experiment.
-    """
+    """Return a study, or one experiment of it as a study of one; `reveal` includes hidden parameters of reality."""
     return view(session, members(session, id_), reveal=reveal)[0]
 
 
 @snapshot
 def read_experiment(session: Session, experiment_id: str, *, reveal: bool = False) -> ExperimentRead:
-    """Return the experiment with its progress; `reveal` includes hidden parameters of reality.
-
-    Raises:
-        NotFound: no such experiment.
-    """
+    """Return the experiment with its progress; `reveal` includes hidden parameters of reality."""
     return view_experiments(session, [get_experiment(session, experiment_id)], reveal=reveal)[0]
 
 
 @snapshot
 def read_spec(session: Session, id_: str, *, reveal: bool = False) -> SpecRead:
-    """Return the spec of a study, or of one experiment of it; `reveal` includes hidden parameters of reality.
-
-    Raises:
-        NotFound: no such study or experiment.
-    """
+    """Return the spec of a study, or of one experiment of it, to submit it again; `reveal` includes what is hidden."""
     found = members(session, id_)
-    secret = frozenset() if reveal else hidden(session, found.experiments)
-    specs = [without_truth(row.spec) if row.id in secret else row.spec for row in found.experiments]
-    return shortest(found.named.name, specs)
+    specs, given = [row.spec for row in found.experiments], found.study.submitted
+    if given is not None:
+        given = part_of(given, [row.position for row in found.experiments], alone=found.one is not None)
+    if not reveal and hidden(session, found.experiments):
+        specs, given = [without_truth(each) for each in specs], given and without_parameters(given)
+    return to_submit_again(found.named.name, given, specs)
 
 
 @snapshot
 def list_repetitions(session: Session, experiment_id: str) -> tuple[RepetitionRead, ...]:
-    """Return the repetitions of an experiment, by number.
-
-    Raises:
-        NotFound: no such experiment.
-    """
+    """Return the repetitions of an experiment, by number."""
     secret = bool(hidden(session, [get_experiment(session, experiment_id)]))
     return tuple(view_repetition(row, secret=secret) for row in repetitions_of(session, experiment_id))
 
@@ -82,7 +71,6 @@ def list_samples(
     """Return a page of real-world evaluations, by repetition and in the order of the log.
 
     Raises:
-        NotFound: no such experiment.
         InvalidSpec: the cursor is invalid, or of another list.
     """
     get_experiment(session, experiment_id)
@@ -105,7 +93,6 @@ def list_simulators(
     """Return a page of tuned simulators, by repetition, iteration and rank.
 
     Raises:
-        NotFound: no such experiment.
         InvalidSpec: the cursor is invalid, or of another list.
     """
     row = get_experiment(session, experiment_id)
@@ -130,7 +117,6 @@ def read_differences(store: Store, ids: Sequence[str]) -> SpecDiff:
     """Return the settings that differ between studies and experiments, or within a single study.
 
     Raises:
-        NotFound: one of them does not exist.
         InvalidSpec: there is only one experiment to compare.
     """
     studies = [read(store, id_) for id_ in dict.fromkeys(ids)]

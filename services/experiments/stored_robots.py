@@ -15,7 +15,7 @@ from gaplab.services.specs.robots import Driven, ref_of_file, robot_of, robot_of
 from gaplab.services.specs.sample_tables import read_samples
 from gaplab.services.store.models import RobotRow
 from gaplab.services.store.queries import robots as rows
-from gaplab.services.store.session import Session, Store, snapshot, transaction
+from gaplab.services.store.session import Session, Store, snapshot
 from gaplab.services.store.texts import storable
 from gaplab.services.world.robot_files import RobotFile, read_robot_file, stored_robot_file
 from gaplab.services.world.robot_library import IMPORTED
@@ -39,24 +39,14 @@ def add_robot(store: Store, text: str | bytes) -> RobotRead:
             and rate it; with every violation.
     """
     try:
-        file = _checked(text)
+        file = read_robot_file(text)
+        if file.name in robots:
+            message = f"gaplab has a robot {file.name!r} already; choose another name"
+            raise InvalidSpec([Violation("/name", file.name, message, "another name")])
+        robot_of_file(file)
     except InvalidSpec as error:
         raise InvalidRobotFile(error.violations) from error
-    return _insert(store, file)
-
-
-def _checked(text: str | bytes) -> RobotFile:
-    file = read_robot_file(text)
-    if file.name in robots:
-        message = f"gaplab has a robot {file.name!r} already; choose another name"
-        raise InvalidSpec([Violation("/name", file.name, message, "another name")])
-    robot_of_file(file)
-    return file
-
-
-@transaction
-def _insert(session: Session, file: RobotFile) -> RobotRead:
-    return _view(rows.put(session, file.sha256, file.name, file.text), file)
+    return store.write(lambda session: _view(rows.put(session, file.sha256, file.name, file.text), file))
 
 
 @snapshot

@@ -5,15 +5,14 @@ from collections.abc import Sequence
 from gaplab.schemas.records import StudyRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.experiments.bench_names import check_benches
 from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.estimates import check_cost
 from gaplab.services.experiments.idempotency import Once, once
-from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
+from gaplab.services.experiments.limits import FREELY, Admission, check_benches, check_extent, check_load
 from gaplab.services.experiments.stored_robots import resolved_here
 from gaplab.services.experiments.views import view
-from gaplab.services.specs.resolution import resolve, takes_samples
-from gaplab.services.specs.rollouts import expected_rollouts, hardware_of
+from gaplab.services.specs.resolution import expected_rollouts, hardware_of, resolve, takes_samples
+from gaplab.services.specs.submitted import kept
 from gaplab.services.store.queries.experiments import Extent, insert_study, members
 from gaplab.services.store.session import Session, Store
 
@@ -25,7 +24,6 @@ def submit(store: Store, spec: ExperimentSpec | StudySpec) -> StudyRead:
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation.
-        StoreUnavailable: the database cannot be used now.
     """
     return submit_once(store, spec, FREELY).answer
 
@@ -39,15 +37,16 @@ def submit_once(store: Store, spec: ExperimentSpec | StudySpec, admitted: Admiss
         LimitReached: too much work is in progress.
         KeyReused: the key was used for another request.
         NotFound: the key's study was deleted; the message says when.
-        StoreUnavailable: the database cannot be used now.
     """
     resolved = resolved_here(store, spec, resolve)
     name = spec.name or (resolved[0].name if len(resolved) == 1 else "study")
 
+    sized = [(each, extent_of(each)) for each in resolved]
+
     def create(session: Session) -> StudyRead:
         check_benches(session, resolved, admitted)
         admit(session, resolved, admitted)
-        found = insert_study(session, name, [(each, extent_of(each)) for each in resolved], admitted.token)
+        found = insert_study(session, name, sized, admitted.token, kept(spec, resolved[0]))
         queue_for(session, found.experiments)
         return view(session, found)[0]
 

@@ -1,29 +1,98 @@
-"""Experiments, studies and repetitions as the API shows them: with progress, without hidden parameters."""
+"""Experiments, studies and repetitions as the API shows them: with progress and fitness, without hidden parameters.
+
+The experiments of a study share one reality, so an ended experiment stays hidden until all of its study have ended.
+Their fitness in one number agrees with their curves: it is a point that all have reached.
+"""
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, Progress, RepetitionRead, StudyRead
+from gaplab.schemas.records import (
+    BestRead,
+    ExperimentRead,
+    FitnessRead,
+    RepetitionRead,
+    StudyRead,
+    common_count,
+)
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.curves import mean_and_deviation
 from gaplab.services.core.strategies import strategies
-from gaplab.services.experiments.checks import CheckSummary, summaries
-from gaplab.services.experiments.fitness import best_of, fitness_of
-from gaplab.services.experiments.hiding import hidden
-from gaplab.services.experiments.progress import Span, caveat_of, caveat_of_several, mean_best, progress_of
+from gaplab.services.experiments.checks import summaries
+from gaplab.services.experiments.progress import caveat_of, caveat_of_several, mean_best, progress_of
 from gaplab.services.plugins.external import tells_unavailable
 from gaplab.services.specs.measured import needs_readings
 from gaplab.services.specs.robots import sensors
 from gaplab.services.specs.stored_specs import checked, discrepancy_of, without_truth
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import attempts
-from gaplab.services.store.queries.experiments import Members
+from gaplab.services.store.queries.experiments import Members, open_studies
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
 from gaplab.services.store.queries.requests import doubtful
-from gaplab.services.store.queries.results import best_recorded
+from gaplab.services.store.queries.results import best_recorded, last_common, recorded_at
 from gaplab.services.store.texts import unpack_tags
+
+
+def hidden(session: Session, experiments: Sequence[ExperimentRow]) -> frozenset[str]:
+    """Return the ids of the experiments whose reality's parameters may not be shown yet."""
+    open_ = open_studies(session, [row.study_id for row in experiments])
+    return frozenset(row.id for row in experiments if row.study_id in open_)
+
+
+def fitness_of(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, FitnessRead]:
+    """Return the point of each experiment's curve after the last common number of evaluations, if it has a mean."""
+    return points_at(session, last_common(session, [row.id for row in rows]), {row.id: row.known for row in rows})
+
+
+def points_at(session: Session, counts: Mapping[str, int], known: Mapping[str, int]) -> dict[str, FitnessRead]:
+    """Return the point of each experiment's curve after its number of real-world evaluations, if it has a mean.
+
+    `counts` are these numbers, `known` those of samples from before.
+    """
+    points = {
+        experiment: mean_and_deviation(frozen(values)) for experiment, values in recorded_at(session, counts).items()
+    }
+    return {
+        experiment: FitnessRead(evaluations=counts[experiment], known=known[experiment], n=n, mean=mean, sd=sd)
+        for experiment, (n, mean, sd) in points.items()
+        if mean is not None
+    }
+
+
+def best_of(session: Session, studies: Mapping[str, Sequence[ExperimentRead]]) -> dict[str, BestRead]:
+    """Return the fittest experiment of each study, after the last number of evaluations that its experiments share.
+
+    It is the fittest of those with the most repetitions.
+    """
+    shared = {study: common_count(experiments) for study, experiments in studies.items()}
+    counts = {study: count for study, count in shared.items() if count is not None}
+    rivals = {study: _rivals(studies[study]) for study in counts}
+    points = {each.id: each.fitness for found in rivals.values() for each in found if each.fitness}
+    wanted = {each.id: counts[study] for study, found in rivals.items() for each in found if not each.level}
+    elsewhere = {id_: count for id_, count in wanted.items() if points[id_].evaluations != count}
+    points |= points_at(session, elsewhere, {id_: point.known for id_, point in points.items()})
+    return {
+        study: _fittest(
+            [(each, points[each.id]) for each in found if each.level or points[each.id].evaluations == counts[study]]
+        )
+        for study, found in rivals.items()
+    }
+
+
+def _rivals(experiments: Sequence[ExperimentRead]) -> list[ExperimentRead]:
+    """Return the experiments with a fitness; the direct baseline only if there is no other."""
+    found = [each for each in experiments if each.fitness]
+    return [each for each in found if not each.direct] or found
+
+
+def _fittest(points: Sequence[tuple[ExperimentRead, FitnessRead]]) -> BestRead:
+    experiment, point = max(points, key=lambda each: (each[1].n, each[1].mean))  # of few, the best is luck
+    return BestRead(**point.model_dump(), experiment=experiment.id, name=experiment.name, strategy=experiment.strategy)
+
 
 _MOVING = (State.RUNNING, State.PAUSING, State.STOPPING)
 
@@ -72,81 +141,50 @@ def state_of(states: Collection[State]) -> State:
     return first
 
 
-@dataclass(frozen=True)
-class _Work:
-    """Work on an experiment: sums over its repetitions, and the times of work on them while it is running."""
-
-    tally: Tally = field(default_factory=Tally)
-    spans: tuple[Span, ...] = ()
-
-    def __add__(self, other: "_Work") -> "_Work":
-        return _Work(self.tally + other.tally, self.spans + other.spans)
-
-    @property
-    def progress(self) -> Progress:
-        return progress_of(self.tally, self.spans)
-
-
-def _work(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, _Work]:
+def _work(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, Tally]:
     """Return the work on each experiment; a study that runs needs the times of those of its members that ended too."""
     found = tallies(session, [row.id for row in rows])
     running = {row.study_id for row in rows if row.state in _MOVING}
     spans = attempts.work_spans(session, [row.id for row in rows if row.study_id in running])
-    return {row.id: _Work(found.get(row.id, Tally()), tuple(spans.get(row.id, ()))) for row in rows}
+    return {row.id: replace(found.get(row.id, Tally()), spans=tuple(spans.get(row.id, ()))) for row in rows}
 
 
 def _view(
-    session: Session, rows: Sequence[ExperimentRow], work: Mapping[str, _Work], *, reveal: bool
+    session: Session, rows: Sequence[ExperimentRow], work: Mapping[str, Tally], *, reveal: bool
 ) -> list[ExperimentRead]:
     ids = [row.id for row in rows]
-    found = _Findings(
-        failures=reasons(session, ids),
-        checks=summaries(session, rows),
-        fitness=fitness_of(session, rows),
-        best=best_recorded(session, ids),
-        doubts=doubtful(session, ids),
-    )
+    failures, checks, doubts = reasons(session, ids), summaries(session, rows), doubtful(session, ids)
+    fitness, best = fitness_of(session, rows), best_recorded(session, ids)
     secret = frozenset() if reveal else hidden(session, rows)
-    return [_experiment(row, work[row.id], found, secret=row.id in secret) for row in rows]
 
+    def read(row: ExperimentRow) -> ExperimentRead:
+        check, warnings = checks.get(row.id, (None, ()))
+        return ExperimentRead.filled_from(
+            row,
+            study=row.study_id,
+            direct=row.strategy in strategies and strategies[row.strategy].in_reality,
+            level=not row.tunes,
+            caveat=caveat_of(row.state, work[row.id]),
+            spec=without_truth(row.spec) if row.id in secret else row.spec,
+            priority=-row.precedence,
+            progress=progress_of(work[row.id]),
+            fitness=fitness.get(row.id),
+            best_fitness=mean_best(best[row.id]) if row.id in best else None,
+            reasons=(*([row.paused_because] if row.paused_because else []), *failures.get(row.id, ())),
+            sensitivity=check,
+            doubts=doubts.get(row.id, ()),
+            warnings=(*doubts.get(row.id, ()), *warnings, *_version_warnings(row, work[row.id])),
+        )
 
-@dataclass(frozen=True)
-class _Findings:
-    """Findings by experiment: reasons of failure, sensitivity check, fitness, doubtful measurements."""
-
-    failures: Mapping[str, tuple[str, ...]]
-    checks: Mapping[str, CheckSummary]
-    fitness: Mapping[str, FitnessRead]
-    best: Mapping[str, Sequence[float]]
-    doubts: Mapping[str, tuple[str, ...]]
-
-
-def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bool) -> ExperimentRead:
-    check, doubts = found.checks.get(row.id, CheckSummary()), found.doubts.get(row.id, ())
-    return ExperimentRead.filled_from(
-        row,
-        study=row.study_id,
-        direct=row.strategy in strategies and strategies[row.strategy].in_reality,
-        level=not row.tunes,
-        caveat=caveat_of(row.state, work.tally),
-        spec=without_truth(row.spec) if secret else row.spec,
-        priority=-row.precedence,
-        progress=work.progress,
-        fitness=found.fitness.get(row.id),
-        best_fitness=mean_best(found.best[row.id]) if row.id in found.best else None,
-        reasons=(*([row.paused_because] if row.paused_because else []), *found.failures.get(row.id, ())),
-        sensitivity=check.id,
-        doubts=doubts,
-        warnings=(*doubts, *check.warnings, *_version_warnings(row, work.tally)),
-    )
+    return list(map(read, rows))
 
 
 def _study(
-    found: Members, experiments: Sequence[ExperimentRead], work: Mapping[str, _Work], best: BestRead | None
+    found: Members, experiments: Sequence[ExperimentRead], work: Mapping[str, Tally], best: BestRead | None
 ) -> StudyRead:
-    together = sum((work[each.id] for each in experiments), _Work())
+    together = sum((work[each.id] for each in experiments), Tally())
     states = Counter(each.state for each in experiments)
-    stopped = sum(each.state is State.COMPLETED and work[each.id].tally.stopped > 0 for each in experiments)
+    stopped = sum(each.state is State.COMPLETED and work[each.id].stopped > 0 for each in experiments)
     state = state_of(states)
     alone = experiments[0].caveat if len(experiments) == 1 else None
     return StudyRead.filled_from(
@@ -155,10 +193,10 @@ def _study(
         name=found.named.name,
         tags=unpack_tags(found.study.tags),
         state=state,
-        caveat=alone or caveat_of_several(state, states, stopped, together.tally),
+        caveat=alone or caveat_of_several(state, states, stopped, together),
         best=best,
         experiments=tuple(experiments),
-        progress=together.progress,
+        progress=progress_of(together),
     )
 
 

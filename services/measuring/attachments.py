@@ -5,14 +5,14 @@ from hashlib import sha256
 from sqlalchemy import update
 
 from gaplab.schemas.measurements import AttachmentRead
-from gaplab.services.core.errors import InvalidSpec, LimitReached, NotFound, Violation
+from gaplab.services.core.errors import InvalidSpec, LimitReached, Violation
 from gaplab.services.settings import variable_of
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import AttachmentRow
 from gaplab.services.store.queries import attachments
 from gaplab.services.store.queries.attachments import MOST_BYTES
 from gaplab.services.store.session import Session, snapshot, transaction
-from gaplab.services.store.statements import insert_new, storable
+from gaplab.services.store.statements import existing, insert_new, storable
 
 
 @transaction
@@ -50,7 +50,5 @@ def read_attachment(session: Session, digest: str) -> tuple[AttachmentRead, byte
     Raises:
         NotFound: none has this hash.
     """
-    row = session.get(AttachmentRow, storable(digest))
-    if row is None:
-        raise NotFound(f"there is no attachment {digest!r}")
+    row = existing(session, AttachmentRow, digest, "attachment")
     return AttachmentRead(id=row.id, name=row.name, media_type=row.media_type, size=len(row.content)), row.content

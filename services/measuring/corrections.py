@@ -17,6 +17,7 @@ from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.queries.requests import judge
 from gaplab.services.store.session import Session, Store
+from gaplab.services.store.statements import existing
 
 
 def correct(
@@ -67,7 +68,7 @@ def decide(
     """
     if dry_run:
         with store.reading() as session:
-            row = requests.get_answer(session, id_)
+            row = existing(session, AnswerRow, id_, "measurement")
             return Once(_decided(session, row, *requests.get(session, row.request_id), spec))
     return once(store, admitted, spec, Consequences, lambda session: _decide(session, id_, spec), of=id_)
 
@@ -102,7 +103,7 @@ def _void(session: Session, id_: str, spec: VoidSpec) -> Consequences:
 
 
 def _decide(session: Session, id_: str, spec: ConflictSpec) -> Consequences:
-    row = requests.get_answer(session, id_)
+    row = existing(session, AnswerRow, id_, "measurement")
     request, repetition = requests.locked(session, row.request_id)
     session.refresh(row)
     found = _decided(session, row, request, repetition, spec)
@@ -150,7 +151,7 @@ def _counted(
     session: Session, id_: str, get: Callable[[Session, str], tuple[RequestRow, RepetitionRow]]
 ) -> tuple[AnswerRow, RequestRow, RepetitionRow]:
     """Return an answer, its request and its repetition as `get` does, unless the answer does not count."""
-    row = requests.get_answer(session, id_)
+    row = existing(session, AnswerRow, id_, "measurement")
     request, repetition = get(session, row.request_id)
     session.refresh(row)
     if row.state is not AnswerState.COUNTED:

@@ -14,7 +14,7 @@ from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.measurements import RequestState
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.types import History, Measured, Probed, recorded_fitness
-from gaplab.services.experiments.archiving import show_again
+from gaplab.services.experiments.editing import show_again
 from gaplab.services.experiments.lease_ends import take_back
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.findings.event_sentences import step_sentence

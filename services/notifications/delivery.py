@@ -1,19 +1,31 @@
-"""Delivery of one notification: a POST to a webhook, or a command of the service's owner."""
+"""Delivery of notifications, one after another: a POST to a webhook, or a command of the service's owner.
+
+The courier is a thread of the API. Of several processes on one database one at a time has its turn; if it dies, another
+continues two minutes later.
+"""
 
 import asyncio
 import hmac
+import logging
 import os
+import secrets
 import shlex
+import socket
 import subprocess
+import threading
 import time
 from dataclasses import dataclass
 from hashlib import sha256
+from typing import Self
 
 import httpx2
 
 from gaplab.schemas.notifications import Channel, Notification
+from gaplab.services.notifications import outbox
 from gaplab.services.notifications.webhooks import refusal
 from gaplab.services.settings import Notify
+from gaplab.services.store.database_errors import StoreUnavailable
+from gaplab.services.store.session import Store
 
 WEBHOOK_S = 10.0
 COMMAND_S = 60.0
@@ -129,3 +141,60 @@ def run(command: str, message: Notification) -> Attempt:
 
 def _no_longer(what: str) -> Attempt:
     return Attempt(f"{what} was removed before it was told", hopeless=True)
+
+
+EVERY_S = 2.0
+"""Interval between two looks at the events."""
+
+log = logging.getLogger("gaplab.notifications")
+
+
+class Courier:
+    """Delivers notifications in the background for as long as its context lasts; without settings it does nothing.
+
+    What is left is sent by the next courier. Links in messages lead to `page`, the address of the service's page.
+    """
+
+    def __init__(self, store: Store, notify: Notify, page: str = "") -> None:
+        self._store = store
+        self._notify = notify
+        self._page = page.rstrip("/")
+        self._owner = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(4)}"
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="notifications", daemon=True)
+
+    def __enter__(self) -> Self:
+        if self._notify.is_on:
+            self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopped.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=5.0)
+
+    def work(self) -> bool:
+        """Deliver what is due, and return whether it was this process's turn."""
+        settings = {Channel.WEBHOOK: self._notify.url, Channel.COMMAND: self._notify.command}
+        channels = [channel for channel, setting in settings.items() if setting]
+        while has_turn := outbox.collect(self._store, self._owner, channels):
+            letter = outbox.next_letter(self._store)
+            if letter is None or self._stopped.is_set():
+                break
+            url = f"{self._page}/#/studies/{letter.message.subject}" if self._page else None
+            outcome = deliver(
+                letter.message.model_copy(update={"url": url}), letter.channel, letter.webhook, self._notify
+            )
+            if outcome.failure:
+                log.warning("notification %s by %s: %s", letter.message.id, letter.channel, outcome.failure)
+            outbox.settle(self._store, letter, outcome.failure, hopeless=outcome.hopeless)
+        return has_turn
+
+    def _run(self) -> None:
+        while not self._stopped.wait(EVERY_S):
+            try:
+                self.work()
+            except StoreUnavailable as error:
+                log.warning("notifications wait for the database: %s", error)
+            except Exception:  # a courier that ends would tell nobody anything again
+                log.exception("a notification failed")

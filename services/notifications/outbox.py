@@ -1,7 +1,6 @@
 """The outbox: notifications that are left to send, found in the events, which are stored in the order of commits.
 
-So no change of an experiment does more work than before, and nothing is forgotten when the service is down. Each
-function is one transaction, and raises StoreUnavailable while the database cannot be used.
+So no change of an experiment does more work than before, and nothing is forgotten when the service is down.
 """
 
 from collections.abc import Iterator, Sequence
@@ -46,13 +45,9 @@ _AT_ONCE = 10_000
 
 @dataclass(frozen=True)
 class Letter:
-    """A notification to send now.
+    """A notification to send now: event, subject and channel are its key; attempts count from 1.
 
-    Attributes:
-        key: event, subject and channel, which identify it.
-        message: what it says.
-        webhook: address, if the study has its own; None if that was removed.
-        attempt: number of this attempt, from 1.
+    The webhook is the study's own; None if that was removed.
     """
 
     key: tuple[int, str, str]

@@ -1,4 +1,7 @@
-"""Webhooks of single studies: only to hosts that the owner of the service permits."""
+"""Webhooks of single studies: only to hosts that the owner of the service permits.
+
+Use cases raise NotFound if nothing has the id.
+"""
 
 from collections.abc import Collection
 from urllib.parse import SplitResult, urlsplit
@@ -18,7 +21,6 @@ def set_webhook(session: Session, id_: str, spec: WebhookSpec | None, hosts: Col
     """Tell a webhook when all experiments of a study have ended; None tells none any more.
 
     Raises:
-        NotFound: no such study.
         InvalidSpec: the address is not permitted.
         Conflict: they have ended, so nothing would be sent; or the id is that of one of them.
     """
@@ -36,7 +38,6 @@ def read(session: Session, id_: str) -> WebhookRead:
     """Return the host of the webhook of a study.
 
     Raises:
-        NotFound: no such study.
         Conflict: the id is that of one of its experiments.
     """
     return _view(whole(session, id_).study.webhook)

@@ -11,8 +11,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.plugins.loading import here
-from gaplab.services.specs.defaults import default_engine
-from gaplab.services.specs.presets import PRESETS
+from gaplab.services.specs.defaults import PRESETS, default_engine
 from gaplab.services.world.controllers import controllers
 from gaplab.services.world.robot_library import IMPORTED
 from gaplab.services.world.robots import robots

@@ -8,15 +8,14 @@ from gaplab.schemas.replays import ControllerKind, Replay, RobotShapes
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
 from gaplab.services.experiments import stored_robots
-from gaplab.services.experiments.hiding import hidden
+from gaplab.services.experiments.views import hidden
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import LAST, ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.replay.sent_specs import sent
 from gaplab.services.replay.shapes import at_start
 from gaplab.services.specs.assembly import refuse_missing
-from gaplab.services.specs.resolution import is_direct, takes_samples
+from gaplab.services.specs.resolution import is_computed, is_direct, takes_samples
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.specs.rollouts import is_computed
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays

@@ -13,8 +13,10 @@ from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import ExperimentRead, SampleRead, SimulatorRead, StudyRead, common_count
 from gaplab.schemas.reports import VerdictRead
 from gaplab.schemas.sensitivity import SensitivityRead
+from gaplab.schemas.spec import SpecRead
 from gaplab.services.core.errors import NotFound
 from gaplab.services.experiments import checks
+from gaplab.services.experiments.reading import read_spec
 from gaplab.services.findings.judged import Judged, judged_curves
 from gaplab.services.findings.sentences import judge
 from gaplab.services.results import curves as results
@@ -69,6 +71,7 @@ class Facts:
         misfits: misfit by experiment, without levels; work and provenance are by experiment too.
         leading: simulators of the experiment with the highest mean; None if there are none.
         outcome: what its only experiment has measured and tuned; None if there are several.
+        again: the spec to submit it again; if no single one gives it, also that of each experiment.
     """
 
     id: str
@@ -89,6 +92,7 @@ class Facts:
     provenance: Mapping[str, ProvenanceRead]
     leading: tuple[Judged, TunedSimulators] | None
     outcome: Outcome | None
+    again: tuple[SpecRead, ...]
 
     @cached_property
     def names(self) -> dict[str, str]:
@@ -140,7 +144,13 @@ def facts_of(store: Store, subject: StudyRead, margin: Margin | None = None) -> 
         provenance={id_: provenance.read(store, id_) for id_ in ids},
         leading=_leading(store, judged),
         outcome=outcome,
+        again=_again(store, subject.id, ids),
     )
+
+
+def _again(store: Store, id_: str, experiments: Sequence[str]) -> tuple[SpecRead, ...]:
+    whole = read_spec(store, id_)
+    return (whole, *(read_spec(store, each) for each in experiments if whole.spec is None))
 
 
 def _outcome(session: Session, experiment_id: str) -> Outcome:

@@ -6,7 +6,6 @@ from typing import Any
 
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import from_before
-from gaplab.schemas.spec import SpecRead
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number, number_of, spoken, titled
@@ -17,7 +16,6 @@ from gaplab.services.reports import tables
 from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Paragraph, Report, Section
 from gaplab.services.reports.content import Facts, Outcome
 from gaplab.services.results.tuned_simulators import simulator_coordinates
-from gaplab.services.specs.shortening import shortest
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.world.robot_library import label_of
 
@@ -172,25 +170,19 @@ EACH = "Save each spec below as a file and submit it: gaplab submit spec.json --
 
 def reproduction(facts: Facts) -> Iterator[Block]:
     """Yield what to do, in sentences, and the spec to submit; that of each experiment if no single spec gives all."""
-    found = submitted(facts)
-    yield Paragraph(ONE if found.spec else EACH)
+    whole, *each = facts.again
+    yield Paragraph(EACH if each else ONE)
     yield Paragraph(
         "The same spec and seed give the same numbers, to the last bit, with the engines of the provenance above."
     )
     yield Paragraph(f"Every number is in the archive that gaplab export {facts.id} writes.")
-    for remark in found.remarks:
+    for remark in whole.remarks:
         yield Paragraph(f"{remark[0].upper()}{remark[1:]}.", note=True)
-    if found.spec:
-        yield Code(spec_text(found.spec))
-        return
-    for experiment, one in zip(facts.experiments, facts.judged, strict=True):
+    for one, found in zip(facts.judged, each, strict=bool(each)):
         yield Paragraph(f"{one.name}:")
-        yield Code(spec_text(shortest(experiment.name, [experiment.spec]).spec))
-
-
-def submitted(facts: Facts) -> SpecRead:
-    """Return the spec to submit, without parameters of reality that are hidden yet."""
-    return shortest(facts.name, [experiment.spec for experiment in facts.experiments])
+        yield Code(spec_text(found.spec))
+    if not each:
+        yield Code(spec_text(whole.spec))
 
 
 def spec_text(spec: dict[str, Any] | None) -> str:

@@ -25,7 +25,7 @@ from gaplab.services.replay.sent_specs import SentSpec, received, sent
 from gaplab.services.replay.traces import expected_motion
 from gaplab.services.reports.blocks import render_html
 from gaplab.services.reports.content import Facts, Outcome, facts_of
-from gaplab.services.reports.document import report_of, said, spec_text, submitted
+from gaplab.services.reports.document import report_of, said, spec_text
 from gaplab.services.reports.tables import MOST_SHOWN
 from gaplab.services.results.files import entry_of
 from gaplab.services.specs.assembly import simulation_of
@@ -163,7 +163,7 @@ def _files(home: _Home, readings: Readings) -> Iterator[tuple[str, str]]:
     experiment, best = home.experiment, home.outcome.best
     yield "README.txt", README.format(id=experiment.id, name=experiment.name, version=version("gaplab"))
     yield "verdict.txt", "\n\n".join((home.facts.verdict.headline, *said(home.facts))) + "\n"
-    yield "spec.json", spec_text(submitted(home.facts).spec) + "\n"
+    yield "spec.json", spec_text(home.facts.again[0].spec) + "\n"
     yield "provenance.json", home.facts.provenance[experiment.id].model_dump_json(indent=1) + "\n"
     if best is not None or home.spec.reality.samples:
         yield "samples.csv", _samples_csv(home, readings)

@@ -10,9 +10,7 @@ from gaplab.schemas.records import common_count
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.experiments.fitness import fitness_of
-from gaplab.services.experiments.hiding import hidden
-from gaplab.services.experiments.views import view_experiments
+from gaplab.services.experiments.views import fitness_of, hidden, view_experiments
 from gaplab.services.findings import sentences
 from gaplab.services.findings.comparisons import Compared, compare_all
 from gaplab.services.results.curves import values_of

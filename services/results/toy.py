@@ -10,7 +10,7 @@ from gaplab.schemas.replays import ToyIteration, ToySample, ToyTransfer
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray, known
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
-from gaplab.services.experiments import hiding
+from gaplab.services.experiments import views
 from gaplab.services.figures.words import titled
 from gaplab.services.specs.assembly import reality_of, simulation_of
 from gaplab.services.specs.measured import samples_of
@@ -83,7 +83,7 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
         spec=spec,
         robot=robot,
         shown=spec.reality.engine is not None
-        and row.id not in hiding.hidden(session, [row])
+        and row.id not in views.hidden(session, [row])
         and None not in row.spec["reality"]["parameters"].values(),
         measured=measured,
         samples=(

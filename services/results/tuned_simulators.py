@@ -8,7 +8,7 @@ from gaplab.schemas.differences import SettingRead
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import known
-from gaplab.services.experiments import hiding, reading
+from gaplab.services.experiments import reading, views
 from gaplab.services.experiments.reading import read_differences
 from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_figure
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint
@@ -56,7 +56,7 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
         row = experiments.get_experiment(session, experiment_id)
         simulators = tunings.best_simulators(session, experiment_id) if row.tunes else ()
         measured = tunings.measured(session, row)
-        hidden = row.id in hiding.hidden(session, [row])
+        hidden = row.id in views.hidden(session, [row])
     spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
     points = list[SimulatorPoint]()
     errors: dict[int, dict[int, float | None]] = defaultdict(dict)

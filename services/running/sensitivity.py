@@ -32,7 +32,7 @@ class _Checks(Leases[CheckClaim]):
         row = ExperimentRow
         for id_ in ended if change.to.ended else ():
             experiments = session.scalars(select(row.id).where(row.sensitivity_id == id_).order_by(row.id))
-            checks.tell(session, checks.get(session, id_), experiments)
+            checks.tell(session, session.get_one(SensitivityRow, id_, populate_existing=True), experiments)
         return ended
 
 

@@ -22,8 +22,8 @@ from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.findings.sensitivity import Subject
 from gaplab.services.specs.measured import samples_of
+from gaplab.services.specs.resolution import hardware_of
 from gaplab.services.specs.robots import robot_of
-from gaplab.services.specs.rollouts import hardware_of
 from gaplab.services.specs.simulation import Simulation, forecast_of
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.tunables.base import Tunable

@@ -51,6 +51,7 @@ def differences(columns: Sequence[SpecColumn]) -> SpecDiff:
     hidden = {path for path in values if any(_is_hidden(path, cell) for cell in values[path])}
     differing = {path for path in values if _differs([cell for cell in values[path] if not _is_hidden(path, cell)])}
     equal, concealed = len(values) - len(differing | hidden), sorted(hidden - differing, key=_order)
+    later = f" Parameters of reality are compared once they may be shown: {len(concealed)} are hidden."
     return SpecDiff(
         columns=tuple(DiffColumn(id=column.id, name=column.name, experiments=len(column.specs)) for column in columns),
         settings=tuple(
@@ -63,7 +64,7 @@ def differences(columns: Sequence[SpecColumn]) -> SpecDiff:
             for path in sorted(differing, key=_order)
         ),
         equal=equal,
-        note=_note(equal, len(concealed)),
+        note=f"{equal} other settings are equal.{later if concealed else ''}",
         hidden=tuple(pointers[path] for path in concealed),
     )
 
@@ -83,11 +84,6 @@ def in_words(path: Path) -> str:
     if path[0] in {"tunables", "reality"}:
         return " of ".join(reversed(spoken[1:] if path[0] == "tunables" and len(spoken) > 1 else spoken))
     return " of the ".join(reversed(spoken))
-
-
-def _note(equal: int, hidden: int) -> str:
-    later = f" Parameters of reality are compared once they may be shown: {hidden} are hidden." if hidden else ""
-    return f"{equal} other settings are equal.{later}"
 
 
 def text_of(values: Values) -> str:

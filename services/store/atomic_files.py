@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
@@ -32,65 +32,50 @@ def hand_over(descriptor: int, like: Path) -> None:
 
 
 @contextmanager
-def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
+def appearing(file: Path) -> Iterator[Path]:
     """Yield a part file to write into. When the context ends without an error, it is synced and renamed to `file`.
 
-    A killed process leaves its part file; the name is random, so a later attempt is not blocked.
-
-    Args:
-        file: final name, which must be free.
-        mode: permissions, restricted by the process's umask.
+    Only its owner may read it. A killed process leaves its part file; the name is random, so a later attempt is not
+    blocked.
 
     Raises:
         OSError: the file exists already, or cannot be written.
     """
     if file.exists():
         raise _taken(file)
-    part = _part_of(file, mode)
-    try:
+    with _written(file, _name) as part:
         yield part
-        _sync(part)
-        _name(part, file)
-    finally:
-        part.unlink(missing_ok=True)
-    _sync(file.parent)
 
 
 @contextmanager
-def replacing(file: Path, mode: int) -> Iterator[Path]:
-    """Yield a temporary file to write into, which replaces `file`, if any, when the context ends without an error.
+def replacing(file: Path) -> Iterator[Path]:
+    """Yield a part file as `appearing` does; it takes the name, from another file too.
 
     If root writes it, it belongs to the owner of the replaced file, or else of the folder.
-
-    Args:
-        file: final name, which may be taken.
-        mode: permissions, restricted by the process's umask.
 
     Raises:
         OSError: it cannot be written.
     """
-    part = _part_of(file, mode, like=file)
+    with _written(file, Path.replace, like=file) as part:
+        yield part
+
+
+@contextmanager
+def _written(file: Path, put: Callable[[Path, Path], object], *, like: Path | None = None) -> Iterator[Path]:
+    part = file.with_name(f"{file.name}.{token_hex(4)}.part")
+    descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, PRIVATE)
     try:
+        try:
+            if like:
+                hand_over(descriptor, like)
+        finally:
+            os.close(descriptor)
         yield part
         _sync(part)
-        part.replace(file)
+        put(part, file)
     finally:
         part.unlink(missing_ok=True)
     _sync(file.parent)
-
-
-def _part_of(file: Path, mode: int, *, like: Path | None = None) -> Path:
-    part = file.with_name(f"{file.name}.{token_hex(4)}.part")
-    descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode)
-    try:
-        if like:
-            hand_over(descriptor, like)
-    except OSError:
-        part.unlink()
-        raise
-    finally:
-        os.close(descriptor)
-    return part
 
 
 def _name(part: Path, file: Path) -> None:

@@ -17,8 +17,7 @@ class Checkpoint:
     Attributes:
         step: place of the step in the log.
         part: number of the checkpoint within the step, from 0.
-        answers: answers, packed by `gaplab.services.core.answers`.
-        seconds: seconds of work that they took.
+        answers: packed by `gaplab.services.core.answers`, after `seconds` of work.
         rollouts, budget: rollouts of the step so far, and those that it was given.
     """
 
@@ -50,9 +49,7 @@ class Claim(Lease):
     """The lease of a repetition; claims with the same epoch are equal.
 
     Attributes:
-        experiment_id: id of the repetition's experiment.
         number: number of the repetition within its experiment, from 0.
-        spec: spec of the experiment.
         log: recorded steps, after which to continue.
         checkpoints: checkpoints of the next step, if an earlier lease began it.
     """
@@ -67,11 +64,7 @@ class Claim(Lease):
 
 @dataclass(frozen=True)
 class CheckClaim(Lease):
-    """The lease of a sensitivity check.
-
-    Attributes:
-        spec: subject of the check.
-    """
+    """The lease of a sensitivity check, with its subject."""
 
     id: str
     spec: Checked = field(compare=False)
@@ -123,8 +116,6 @@ class Requested:
 
     Attributes:
         place: place of the measurement's step in the log.
-        iteration: iteration of the measurement.
-        kind: sample or probe.
         genome: `(g,)`: the controller to run.
         safety: what the latest tuned simulators expect of it, as JSON; None if nothing was asked.
     """

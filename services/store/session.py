@@ -18,11 +18,10 @@ from sqlalchemy.schema import CreateIndex, CreateTable, DDLElement
 from gaplab.services.store import database_errors
 from gaplab.services.store.database_errors import StoreDamaged, StoreUnavailable
 from gaplab.services.store.engine import HASTENS, WRITES, open_engine
-from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION, Base
 from gaplab.services.store.models.base import other_schema
 from gaplab.services.store.queries import events
-from gaplab.services.store.sqlite_file import create, file_of
+from gaplab.services.store.sqlite_file import Guard, create, file_of
 
 P = ParamSpec("P")
 T = TypeVar("T")

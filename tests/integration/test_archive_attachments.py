@@ -14,7 +14,7 @@ from gaplab.api.app import create_app
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export, opening
 from gaplab.services.core.errors import InvalidArchive
-from gaplab.services.experiments.deletion import Deleter, delete
+from gaplab.services.experiments.editing import Deleter, delete
 from gaplab.services.experiments.reading import read_experiment
 from gaplab.services.experiments.submission import submit
 from gaplab.services.measuring import attachments

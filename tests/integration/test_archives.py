@@ -25,12 +25,12 @@ from gaplab.schemas.lifecycle import Ending, ExtensionSpec, State, Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export, import_archive
 from gaplab.services.archives import reading as importing
-from gaplab.services.archives.consistency import check_logs
+from gaplab.services.archives.checking import check_logs
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.experiments import extension, lifecycle, reading, submission
+from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
@@ -369,7 +369,7 @@ def test_what_came_without_its_reality_cannot_be_extended(store: Store, other: A
 
     assert reading.read_experiment(other, direct).state is State.COMPLETED
     with pytest.raises(Conflict, match="while its reality was hidden"):
-        extension.extend(other, direct, ExtensionSpec(repetitions=3))
+        lifecycle.extend(other, direct, ExtensionSpec(repetitions=3))
 
 
 def test_a_stopped_study_goes_on_from_its_archive_as_if_it_had_never_stopped(store: Store, other: Any) -> None:
@@ -386,7 +386,7 @@ def test_a_stopped_study_goes_on_from_its_archive_as_if_it_had_never_stopped(sto
 
     imported(other, exported(export(store, study.id)))
     stopped = reading.read(other, study.id)
-    extension.extend(other, study.id, ExtensionSpec(repetitions=2))
+    lifecycle.extend(other, study.id, ExtensionSpec(repetitions=2))
     compute(other)
 
     assert (stopped.state, stopped.experiments[0].progress.iterations_done) == (State.COMPLETED, 1)

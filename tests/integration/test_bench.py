@@ -24,7 +24,7 @@ from gaplab.services.archives.rerunning import Part, verify
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import lifecycle
-from gaplab.services.experiments.deletion import Deleter, delete
+from gaplab.services.experiments.editing import Deleter, delete
 from gaplab.services.experiments.idempotency import KeyReused
 from gaplab.services.experiments.lease_ends import Silences
 from gaplab.services.experiments.limits import FREELY, Admission

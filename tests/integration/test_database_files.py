@@ -22,7 +22,7 @@ from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.service import migrate, warn_of_readers
 from gaplab.services.events import WantedEvents
 from gaplab.services.running import execution, supervisors
-from gaplab.services.store import guard
+from gaplab.services.store import sqlite_file
 from gaplab.services.store.database_errors import StoreChanged, StoreDamaged, StoreUnavailable
 from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
@@ -143,7 +143,7 @@ def test_damage_is_told_and_nothing_more_is_written_until_the_file_is_whole(
     told = readyz(sqlite_store)
     file.write_bytes(whole)
     still = readyz(sqlite_store)
-    monkeypatch.setattr(guard, "CHECK_AGAIN_S", 0.0)
+    monkeypatch.setattr(sqlite_file, "CHECK_AGAIN_S", 0.0)
 
     assert told.status_code == still.status_code == 503
     assert "is damaged" in told.json()["detail"]

@@ -36,9 +36,9 @@ from gaplab.schemas.notifications import Channel
 from gaplab.services import access, archives, events
 from gaplab.services.core.errors import NotFound
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import archiving, deletion, editing, extension, lifecycle, submission
+from gaplab.services.experiments import editing, lifecycle, submission
 from gaplab.services.experiments.checks import queue_for
-from gaplab.services.experiments.deletion import Deleter
+from gaplab.services.experiments.editing import Deleter
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.measuring import corrections, taking
 from gaplab.services.measuring.taking import RequestFilter
@@ -152,9 +152,9 @@ def kept_and_told_of(store: Store) -> None:
     outbox.settle(store, letter, "no answer")
     outbox.settle(store, replace(letter, attempt=2), None)
     editing.edit(store, ended, Edit(tags=("gait",)), starting_from=None)
-    archiving.archive(store, ended)
-    archiving.archive(store, ended, archived=False)
-    deletion.delete(store, ended, Deleter(None))
+    editing.archive(store, ended)
+    editing.archive(store, ended, archived=False)
+    editing.delete(store, ended, Deleter(None))
 
 
 def all_verbs(store: Store) -> None:
@@ -170,7 +170,7 @@ def all_verbs(store: Store) -> None:
             lifecycle.ask(store, asked, Verb.RESUME)
     whole = submit_one(store, toy(repetitions=1)).id
     run(store, *execution.claim(store, "me", 1))  # type: ignore[arg-type]
-    extension.extend(store, whole, ExtensionSpec(repetitions=2))
+    lifecycle.extend(store, whole, ExtensionSpec(repetitions=2))
     with archives.export(store, asked).file as file:
         archives.import_archive(store, file)
 

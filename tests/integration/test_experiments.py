@@ -14,8 +14,7 @@ from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.running import execution
-from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.experiments import AWKWARD, cancel, listed, run, some_log, submit_one, toy

@@ -22,10 +22,9 @@ from gaplab.services.archives import export, import_archive
 from gaplab.services.archives.writing import Archive
 from gaplab.services.core.errors import Conflict, Forbidden, NotFound
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import archiving, deletion, lifecycle, reading, saved_views, submission
-from gaplab.services.experiments.deletion import Deleter
-from gaplab.services.experiments.extension import extend
-from gaplab.services.experiments.notes import render
+from gaplab.services.experiments import editing, lifecycle, listing, reading, submission
+from gaplab.services.experiments.editing import Deleter, render
+from gaplab.services.experiments.lifecycle import extend
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Failure
 from gaplab.services.store.clock import moment
@@ -106,9 +105,9 @@ def test_archiving_and_back_changes_nothing_else_and_each_is_one_event(store: St
     before = reading.read(store, made.id)
 
     for _ in range(2):
-        archived = archiving.archive(store, made.id)
+        archived = editing.archive(store, made.id)
     for _ in range(2):
-        shown = archiving.archive(store, made.id, archived=False)
+        shown = editing.archive(store, made.id, archived=False)
 
     assert archived.archived_at is not None
     assert shown == before
@@ -119,15 +118,15 @@ def test_only_what_has_ended_is_archived_and_what_goes_on_is_shown_again(store: 
     made = study(store)
     first, second = (each.id for each in made.experiments)
     with pytest.raises(Conflict, match="is QUEUED and cannot be archived: wait for its end"):
-        archiving.archive(store, made.id)
+        editing.archive(store, made.id)
     finish(store)
-    archiving.archive(store, made.id)
+    editing.archive(store, made.id)
 
     extend(store, first, ExtensionSpec(repetitions=2))
 
     assert reading.read(store, made.id).archived_at is None
     with pytest.raises(Conflict, match="this request is about all of it: use the id of the study"):
-        archiving.archive(store, second)
+        editing.archive(store, second)
 
 
 @pytest.mark.dialects
@@ -139,14 +138,14 @@ def test_a_deleted_study_leaves_nothing_but_its_events_and_what_others_share(sto
     finish(store)
     lasting = {"event", "event_counter", "deletion", "sensitivity", "provenance"}
 
-    deleted = deletion.delete(store, made.id, ME)
+    deleted = editing.delete(store, made.id, ME)
 
     after = rows(store)
     assert {name: count for name, count in after.items() if name not in lasting} == {
         name: count for name, count in with_one.items() if name not in lasting
     }
     assert (after["deletion"], after["provenance"]) == (3, with_one["provenance"])
-    assert deletion.delete(store, made.id, ME) == deleted
+    assert editing.delete(store, made.id, ME) == deleted
     assert rows(store) == after
     assert reading.read_experiment(store, kept.id).state is State.COMPLETED
     with pytest.raises(NotFound, match=rf"'study' \({made.id}\) was deleted at"):
@@ -157,7 +156,7 @@ def test_events_of_the_deleted_stay_in_order_and_can_be_asked_for(store: Store) 
     made = study(store)
     finish(store)
     number = events.latest(store)
-    deletion.delete(store, made.id, ME)
+    editing.delete(store, made.id, ME)
     page = events.page(store, 0, WantedEvents(study=made.id), limit=1000)
     of_one = events.page(store, number, WantedEvents(study=made.experiments[0].id), limit=10)
 
@@ -174,14 +173,14 @@ def test_nothing_is_deleted_that_is_under_way_or_holds_hardware(store: Store) ->
     (claim,) = execution.claim(store, "me", 1)
 
     with pytest.raises(Conflict, match="is RUNNING and cannot be deleted: cancel it first"):
-        deletion.delete(store, made.id, ME)
+        editing.delete(store, made.id, ME)
     cancel(store, made.id)
     with store.transaction() as session:
         session.execute(update(RepetitionRow).values(hardware="arm"))
     with pytest.raises(Conflict, match="still holds hardware"):
-        deletion.delete(store, made.id, ME)
+        editing.delete(store, made.id, ME)
     execution.free_hardware(store, [claim])
-    deletion.delete(store, made.id, ME)
+    editing.delete(store, made.id, ME)
 
     with pytest.raises(NotFound):
         lifecycle.ask(store, made.id, Verb.RETRY)
@@ -191,7 +190,7 @@ def test_a_worker_that_has_not_heard_of_the_deletion_writes_into_no_other_experi
     made = submit_one(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     cancel(store, made.id)
-    deletion.delete(store, made.id, ME)
+    editing.delete(store, made.id, ME)
     other = submit_one(store, toy(repetitions=1))
     (theirs,) = execution.claim(store, "you", 1)
 
@@ -209,22 +208,22 @@ def test_the_last_experiment_of_a_study_takes_it_along(store: Store) -> None:
     finish(store)
     first, second = (each.id for each in made.experiments)
 
-    one = deletion.delete(store, first, ME)
+    one = editing.delete(store, first, ME)
 
     assert (one.id, one.study) == (first, made.id)
     assert [each.id for each in reading.read(store, made.id).experiments] == [second]
-    assert deletion.delete(store, second, ME).id == second
+    assert editing.delete(store, second, ME).id == second
     with pytest.raises(NotFound, match="was deleted at"):
         reading.read(store, made.id)
-    assert deletion.delete(store, made.id, ME).study is None
+    assert editing.delete(store, made.id, ME).study is None
 
 
 def deleted_during(store: Store, before: str, after: str) -> Future[DeletionRead]:
     """Delete something in a transaction that has not ended when the other deletion begins; return that."""
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
-            unwrap(deletion.delete)(session, before, ME)
-            later = pool.submit(deletion.delete, store, after, ME)
+            unwrap(editing.delete)(session, before, ME)
+            later = pool.submit(editing.delete, store, after, ME)
             wait([later], timeout=0.5)
         return later
 
@@ -261,14 +260,14 @@ def test_an_archive_of_the_deleted_brings_it_back_under_its_id(store: Store) -> 
     made = study(store)
     finish(store)
     archive = content(export(store, made.id))
-    deletion.delete(store, made.id, ME)
+    editing.delete(store, made.id, ME)
 
     imported = import_archive(store, BytesIO(archive))
 
     assert (imported.study, imported.renamed) == (made.id, {})
     assert content(export(store, made.id)) == archive
     assert reading.read(store, made.id).state is State.COMPLETED
-    deletion.delete(store, made.id, ME)
+    editing.delete(store, made.id, ME)
 
 
 def test_tags_travel_in_archives_and_hiding_does_not(store: Store, api: TestClient) -> None:
@@ -276,7 +275,7 @@ def test_tags_travel_in_archives_and_hiding_does_not(store: Store, api: TestClie
     finish(store)
     client = TestClient(create_app(store))
     client.patch(f"/studies/{made.id}", json={"tags": ["gait", "b"]}, headers={"If-Match": "*"})
-    archiving.archive(store, made.id)
+    editing.archive(store, made.id)
 
     imported = import_archive(store, BytesIO(content(export(store, made.id))))
 
@@ -317,8 +316,8 @@ def test_what_an_open_service_stored_only_an_admin_deletes_once_there_are_tokens
     cancel(sqlite_store, made.id)
 
     with pytest.raises(Forbidden):
-        deletion.delete(sqlite_store, made.id, Deleter("a token"))
-    deletion.delete(sqlite_store, made.id, Deleter("an admin's", may_delete_all=True))
+        editing.delete(sqlite_store, made.id, Deleter("a token"))
+    editing.delete(sqlite_store, made.id, Deleter("an admin's", may_delete_all=True))
 
 
 @pytest.mark.dialects
@@ -327,12 +326,12 @@ def test_a_view_that_two_save_at_the_same_time_is_that_of_the_second(store: Stor
         with store.transaction() as session:
             session.add(ViewRow(name="mine", sort="name", created_at=moment(session)))
             session.flush()
-            second = pool.submit(saved_views.save_view, store, "mine", ViewSpec(query="strategy = random"))
+            second = pool.submit(listing.save_view, store, "mine", ViewSpec(query="strategy = random"))
             sleep(1.0)  # until it waits for this one
         saved = second.result()
 
     assert saved.query == "strategy = random"
-    assert saved_views.list_views(store) == (saved,)
+    assert listing.list_views(store) == (saved,)
 
 
 def test_saved_views_are_shared_replaced_and_deleted(api: TestClient) -> None:

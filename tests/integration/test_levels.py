@@ -16,7 +16,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export, import_archive
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import estimates, extension, listing, reading, submission
+from gaplab.services.experiments import estimates, lifecycle, listing, reading, submission
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.marks import Level
 from gaplab.services.reports.content import facts_of
@@ -26,7 +26,6 @@ from gaplab.services.results.toy import toy_iterations
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve
-from gaplab.services.specs.shortening import shortest
 from gaplab.services.store.lease import TimedStep
 from gaplab.services.store.session import Store
 from tests.conftest import filled
@@ -104,8 +103,8 @@ def test_a_level_has_no_iterations_to_add_and_no_misfit(sqlite_store: Store, stu
     envelope = study.experiments[2].id
 
     with pytest.raises(InvalidSpec, match="noise_envelope has no iterations"):
-        extension.extend(sqlite_store, envelope, ExtensionSpec(iterations=5))
-    assert extension.extend(sqlite_store, envelope, ExtensionSpec(repetitions=3)).progress.repetitions == 3
+        lifecycle.extend(sqlite_store, envelope, ExtensionSpec(iterations=5))
+    assert lifecycle.extend(sqlite_store, envelope, ExtensionSpec(repetitions=3)).progress.repetitions == 3
     assert misfit(sqlite_store, envelope).points == ()
 
 
@@ -128,8 +127,7 @@ def test_figures_of_tuned_simulators_say_why_they_are_empty(sqlite_store: Store,
 
 @pytest.mark.release
 def test_a_level_is_exported_and_imported_and_its_study_submitted_again(sqlite_store: Store, study: Any) -> None:
-    stored = [each.spec for each in study.experiments]
-    again = shortest(study.name, stored)
+    again = reading.read_spec(sqlite_store, study.id)
     with export(sqlite_store, study.id).file as file:
         data = file.read()
 
@@ -141,9 +139,9 @@ def test_a_level_is_exported_and_imported_and_its_study_submitted_again(sqlite_s
 
 
 def test_an_extended_study_with_a_level_keeps_one_spec(sqlite_store: Store, study: Any) -> None:
-    extension.extend(sqlite_store, study.experiments[0].id, ExtensionSpec(iterations=4))
+    lifecycle.extend(sqlite_store, study.experiments[0].id, ExtensionSpec(iterations=4))
 
-    again = shortest(study.name, [each.spec for each in reading.read(sqlite_store, study.id).experiments])
+    again = reading.read_spec(sqlite_store, study.id, reveal=True)
 
     assert again.spec is not None
     assert again.spec["iterations"] == 4

@@ -8,7 +8,7 @@ from gaplab.schemas.lifecycle import PERMITTED, Ending, ExtensionSpec, State, Ve
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import extension, lifecycle, reading, submission
+from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.running.execution import TimedStep
@@ -246,7 +246,7 @@ def compute_with(store: Store, log: Any) -> None:
 
 def obey(store: Store, experiment: Any, verb: Any) -> Any:
     if verb is Verb.EXTEND:
-        return extension.extend(store, experiment, ExtensionSpec(iterations=9)).state
+        return lifecycle.extend(store, experiment, ExtensionSpec(iterations=9)).state
     return ask(store, experiment, verb)
 
 
@@ -297,7 +297,7 @@ def test_an_extended_experiment_equals_one_that_was_submitted_with_the_larger_to
     large = submitted(store, strategy=strategy, iterations=3, repetitions=2)
     expected = compute(store, large)
 
-    extended = extension.extend(store, small, ExtensionSpec(iterations=3, repetitions=2))
+    extended = lifecycle.extend(store, small, ExtensionSpec(iterations=3, repetitions=2))
     queued = states(store, small)
     found = compute(store, small)
 
@@ -315,7 +315,7 @@ def test_an_extended_study_equals_one_that_was_submitted_with_the_larger_totals(
     small = compared(store, iterations=1, repetitions=1)
     large = compared(store, iterations=2, repetitions=2)
 
-    extended = extension.extend(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
+    extended = lifecycle.extend(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
     for experiment in (*small.experiments[:2], *large.experiments):
         compute(store, experiment.id)
 
@@ -326,18 +326,18 @@ def test_an_extended_study_equals_one_that_was_submitted_with_the_larger_totals(
     for one, other in zip(found.experiments, expected.experiments, strict=True):
         assert curves.curve(store, one.id).points == curves.curve(store, other.id).points
     with pytest.raises(Conflict, match="3 repetitions already, and none of these is left to run"):
-        extension.extend(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
+        lifecycle.extend(store, small.id, ExtensionSpec(iterations=2, repetitions=2))
     with pytest.raises(InvalidSpec, match="give a total of iterations"):
-        extension.extend(store, small.id, ExtensionSpec())
+        lifecycle.extend(store, small.id, ExtensionSpec())
 
 
 def test_a_study_of_which_nothing_has_completed_is_not_extended(store: Store) -> None:
     study = compared(store, compute_it=False, iterations=1, repetitions=1)
 
     with pytest.raises(Conflict, match="is QUEUED and cannot be extended; permitted: pause, stop, cancel"):
-        extension.extend(store, study.id, ExtensionSpec(repetitions=9))
+        lifecycle.extend(store, study.id, ExtensionSpec(repetitions=9))
     with pytest.raises(NotFound):
-        extension.extend(store, "nope", ExtensionSpec(repetitions=9))
+        lifecycle.extend(store, "nope", ExtensionSpec(repetitions=9))
 
 
 def compared(store: Store, *, compute_it: bool = True, **changes: Any) -> Any:
@@ -358,13 +358,13 @@ def test_extending_a_stopped_experiment_to_what_it_had_brings_it_to_its_end(stor
     ask(store, experiment, Verb.STOP)
     execution.record(store, second, next(repetition(setting(second.spec, 1))))
 
-    extension.extend(store, experiment, ExtensionSpec(repetitions=3))
+    lifecycle.extend(store, experiment, ExtensionSpec(repetitions=3))
     found = compute(store, experiment)
 
     assert same(tuple(found), tuple(expected))
     assert states(store, experiment) == [State.COMPLETED] * 3
     with pytest.raises(Conflict, match="2 iterations and 3 repetitions already"):
-        extension.extend(store, experiment, ExtensionSpec(repetitions=3))
+        lifecycle.extend(store, experiment, ExtensionSpec(repetitions=3))
 
 
 def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterations(store: Store) -> None:
@@ -372,8 +372,8 @@ def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterat
     before = compute(store, experiment)
 
     with pytest.raises(InvalidSpec, match="direct baseline has no iterations"):
-        extension.extend(store, experiment, ExtensionSpec(iterations=5))
-    extension.extend(store, experiment, ExtensionSpec(repetitions=2))
+        lifecycle.extend(store, experiment, ExtensionSpec(iterations=5))
+    lifecycle.extend(store, experiment, ExtensionSpec(repetitions=2))
 
     found = compute(store, experiment)
     assert same(found[0], before[0])
@@ -385,7 +385,7 @@ def test_totals_below_what_is_there_are_refused(store: Store, totals: Any) -> No
     experiment = in_state(store, State.COMPLETED)
 
     with pytest.raises(InvalidSpec, match=r"that there are; give a total|give a total of"):
-        extension.extend(store, experiment, ExtensionSpec(**totals))
+        lifecycle.extend(store, experiment, ExtensionSpec(**totals))
 
     assert state(store, experiment) is State.COMPLETED
 
@@ -396,7 +396,7 @@ def test_a_failed_repetition_is_not_tried_again_by_extending(store: Store) -> No
     run(store, first)
     execution.fail(store, second, Failure("broken"))
 
-    extension.extend(store, experiment, ExtensionSpec(iterations=3))
+    lifecycle.extend(store, experiment, ExtensionSpec(iterations=3))
 
     assert states(store, experiment) == [State.QUEUED, State.FAILED]
 
@@ -405,7 +405,7 @@ def test_reality_is_hidden_again_while_an_extended_experiment_runs(store: Store)
     experiment = in_state(store, State.COMPLETED)
     shown = reading.read_experiment(store, experiment).spec["reality"]["parameters"]
 
-    extended = extension.extend(store, experiment, ExtensionSpec(repetitions=9))
+    extended = lifecycle.extend(store, experiment, ExtensionSpec(repetitions=9))
 
     assert set(extended.experiments[0].spec["reality"]["parameters"].values()) == {None}
     assert None not in shown.values()

@@ -27,10 +27,10 @@ from gaplab.services import events
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import lifecycle, reading, submission
-from gaplab.services.experiments.deletion import Deleter, delete
-from gaplab.services.experiments.extension import extend
+from gaplab.services.experiments.editing import Deleter, delete
+from gaplab.services.experiments.lifecycle import extend
 from gaplab.services.notifications import delivery, outbox
-from gaplab.services.notifications.courier import Courier, courier
+from gaplab.services.notifications.delivery import Courier
 from gaplab.services.notifications.webhooks import refusal, set_webhook
 from gaplab.services.running import execution
 from gaplab.services.settings import Notify
@@ -429,7 +429,7 @@ def test_no_notification_changes_a_spec_or_is_shown_with_its_address(sqlite_stor
 
 
 def test_the_courier_works_in_the_background_until_it_is_stopped(sqlite_store: Store, receiver: Receiver) -> None:
-    with courier(sqlite_store, Notify(url=receiver.url), "") as bob:
+    with Courier(sqlite_store, Notify(url=receiver.url), "") as bob:
         assert bob.work()
         cancel(sqlite_store, submit_one(sqlite_store, toy()).id)
         wait_until(lambda: told(sqlite_store))

@@ -8,7 +8,7 @@ from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.experiments import archiving, editing, lifecycle, listing, reading, submission
+from gaplab.services.experiments import editing, lifecycle, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.experiments.query.conditions import FIELDS
 from gaplab.services.experiments.query.parsing import LONGEST
@@ -201,9 +201,9 @@ def test_every_field_can_be_asked_on_both_databases(store: Store, ids: dict[str,
 
 
 def test_archived_ones_are_listed_only_if_the_query_asks(store: Store, ids: dict[str, str]) -> None:
-    archiving.archive(store, ids["done"])
+    editing.archive(store, ids["done"])
     lifecycle.ask(store, ids["both"], Verb.CANCEL)
-    archiving.archive(store, ids["both"])
+    editing.archive(store, ids["both"])
 
     assert found(store, "") == {"Tagged", "other"}
     assert found(store, "archived = true") == {"done", "both"}

@@ -15,10 +15,9 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from gaplab.services.store.backup import PG_DUMP, backup
+from gaplab.services.store.backup import PG_DUMP, backup, restore
 from gaplab.services.store.database_errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.store.engine import WRITES, open_engine
-from gaplab.services.store.restore import restore
 from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import in_use
 from tests.commands import Gaplab

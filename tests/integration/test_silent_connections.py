@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from sqlalchemy import make_url, text
 
-from gaplab.services.store import postgres as connections
+from gaplab.services.store import engine as connections
 from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.engine import open_engine
 from gaplab.services.store.session import Store

@@ -7,26 +7,29 @@ from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import pytest
 from fastapi.testclient import TestClient
+from pydantic import TypeAdapter
 
 from gaplab.api.app import create_app
 from gaplab.arithmetic import chosen, has
 from gaplab.schemas.archives import RepetitionRerun
-from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.schemas.editing import Edit
+from gaplab.schemas.spec import AnySpec, ExperimentSpec, StudySpec
 from gaplab.services.archives import export, rerunning
 from gaplab.services.archives.rerunning import Recorded, difference, rerun, rerun_all, result_of, submitted_spec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import editing, submission
+from gaplab.services.experiments.reading import read_spec
 from gaplab.services.running import execution
-from gaplab.services.specs import shortening
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve, resolve_experiment
-from gaplab.services.specs.shortening import shortest
+from gaplab.services.specs.submitted import COMPLETE, to_submit_again
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import run, toy
@@ -70,6 +73,8 @@ class Lingering(ToyFunction):
     name = "lingering"
 """
 SMALL = {"strategies": ["simulated_fit", "direct"], "robot": "toy_function", "budget": "smoke", "seed": 2**63}
+SHARED = ("robot", "budget", "seed")
+ANY: TypeAdapter[Any] = TypeAdapter(AnySpec)
 
 
 def stored(spec: dict[str, object]) -> list[dict[str, object]]:
@@ -88,66 +93,66 @@ def compute(store: Store) -> None:
             run(store, claim, repetition(setting(claim.spec, claim.number)))
 
 
-@pytest.mark.parametrize("name", ["figure_4", "quadruped", "toy", "weights"])
-def test_a_short_spec_of_a_study_gives_the_same_experiments(name: str) -> None:
+@pytest.mark.parametrize("name", ["figure_4", "quadruped", "smoke", "toy", "tunables", "weights"])
+def test_the_spec_of_a_study_is_the_submitted_one_and_gives_the_same(name: str, sqlite_store: Store) -> None:
     given = json.loads((EXAMPLES / f"{name}.json").read_text())
+    spec: ExperimentSpec | StudySpec = ANY.validate_python(given)
+    study = submission.submit(sqlite_store, spec)
 
-    found = shortest(given["name"], stored(given))
+    found = read_spec(sqlite_store, study.id, reveal=True)
 
     assert found.spec is not None
     assert found.remarks == ()
-    assert stored(found.spec) == stored(given)
-    assert found.spec["name"] == given["name"]
-    assert len(json.dumps(found.spec)) < len(json.dumps(found.resolved)) / 5
+    assert given.items() <= found.spec.items()
+    assert found.spec.keys() - given.keys() <= {"engine", "strategies"}
+    assert resolve(ANY.validate_python(found.spec)) == resolve(spec)
 
 
-@pytest.mark.parametrize("name", ["smoke", "tunables"])
-def test_a_short_spec_of_an_experiment_gives_the_same(name: str) -> None:
-    given = ExperimentSpec.model_validate_json((EXAMPLES / f"{name}.json").read_text())
-    resolved = resolve_experiment(given)
+def test_a_spec_that_is_not_known_or_gives_something_else_here_has_every_field() -> None:
+    wanted = stored(SMALL)
 
-    found = shortest(resolved.name, [resolved.model_dump(mode="json")])
+    unusable: list[dict[str, Any] | None] = [None, SMALL | {"seed": 5}, {"strategies": []}]
+    for given in unusable:
+        found = to_submit_again("study", given, wanted)
 
-    assert resolve_experiment(ExperimentSpec.model_validate(found.spec)) == resolved
-    assert found.spec is not None
-    assert found.spec["budget"] == given.budget.preset
+        assert found.spec is not None
+        assert found.remarks == (COMPLETE,)
+        assert stored(found.spec) == wanted
 
 
-def test_many_known_samples_are_shortened_in_as_many_trials_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
-    trials: list[Any] = []
+def test_one_of_several_experiments_has_a_spec_of_its_own(sqlite_store: Store) -> None:
+    study = submission.submit(sqlite_store, StudySpec.model_validate(SMALL | {"direct_repetitions": 3}))
 
-    def resolved(spec: Any) -> Any:
-        trials.append(spec)
-        return resolve_experiment(spec)
+    fit, direct = (read_spec(sqlite_store, each.id, reveal=True).spec for each in study.experiments)
 
-    monkeypatch.setattr(shortening, "resolve_experiment", resolved)
+    assert fit == {"strategy": "simulated_fit", "engine": "analytic"} | {name: SMALL[name] for name in SHARED}
+    assert direct == fit | {"strategy": "direct", "repetitions": 3}
 
-    def tried(count: int) -> int:
-        samples = [{"genome": [0.2], "values": [0.4]}, {"genome": [0.7], "values": [0.5], "unit": "m/s"}] * count
-        spec = toy(reality={"kind": "physical", "samples": samples})
-        before = len(trials)
-        found = shortest("simulated_fit", [resolve_experiment(spec).model_dump(mode="json")]).spec
-        assert found is not None
-        assert found["reality"]["samples"] == samples
-        return len(trials) - before
 
-    assert tried(10) == tried(1)
+def test_the_schedule_and_a_new_name_change_no_spec_but_its_name(sqlite_store: Store) -> None:
+    study = submission.submit(sqlite_store, StudySpec.model_validate(SMALL | {"priority": 3}))
+    editing.edit(sqlite_store, study.id, Edit(name="again"), starting_from=None)
+
+    found = read_spec(sqlite_store, study.id, reveal=True)
+
+    assert found.spec == SMALL | {"engine": "analytic", "name": "again"}
 
 
 def test_a_study_whose_experiments_were_extended_has_the_size_that_all_have() -> None:
     experiments = stored(SMALL | {"repetitions": 3})
-    grown = [experiments[0] | {"repetitions": 9}, experiments[1]]
 
-    found = shortest("study", grown)
+    one = to_submit_again("study", SMALL, [experiments[0] | {"repetitions": 9}, experiments[1]])
+    all_ = to_submit_again("study", SMALL, [each | {"repetitions": 9} for each in experiments])
 
-    assert found.spec is not None
-    assert [each["repetitions"] for each in stored(found.spec)] == [9, 3]
+    assert one.spec == SMALL | {"repetitions": 9, "direct_repetitions": 3}
+    assert all_.spec == SMALL | {"repetitions": 9}
+    assert (one.remarks, all_.remarks) == ((), ())
 
 
 def test_experiments_that_differ_in_more_than_strategy_have_no_single_spec() -> None:
     one, other = stored(SMALL)
 
-    found = shortest("mixed", [one, other | {"seed": 5}])
+    found = to_submit_again("mixed", None, [one, other | {"seed": 5}])
 
     assert found.spec is None
     assert "differ in more than their strategies" in found.remarks[0]
@@ -165,6 +170,8 @@ def test_hidden_parameters_are_in_no_spec_until_the_experiment_has_ended(sqlite_
         one = api.get(f"/studies/{study.experiments[0].id}/spec").json()
 
     assert "0.77" not in before.text
+    with ZipFile(archive) as members:
+        assert b"0.77" not in members.read("study.sqlite3")
     assert "static_friction are hidden until" in before.json()["remarks"][0]
     assert after["spec"]["reality"] == {"parameters": {"static_friction": 0.77}}
     assert after["remarks"] == []
@@ -182,6 +189,8 @@ def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
     file = tmp_path / "a.zip"
     file.write_bytes(exported(sqlite_store, study.id))
 
+    with file.open("rb") as archive:
+        spec = submitted_spec(archive)
     said, document = gaplab("rerun", str(file), "--verify"), gaplab("rerun", str(file), "--verify", "--json")
     again = gaplab("rerun", str(file))
 

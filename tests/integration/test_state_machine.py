@@ -19,7 +19,7 @@ from gaplab.schemas.lifecycle import ENDS, MOVES, PERMITTED, Ending, ExtensionSp
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import extension, lifecycle
+from gaplab.services.experiments import lifecycle
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.specs.assembly import setting
@@ -163,20 +163,20 @@ class LifeCycle(RuleBasedStateMachine):
         new = repetitions - len(experiment.repetitions)
         if new < 0 or iterations < experiment.iterations:
             with pytest.raises(InvalidSpec):
-                extension.extend(self.store, experiment.id, totals)
+                lifecycle.extend(self.store, experiment.id, totals)
             return
         again = [
             each for each in experiment.of(State.COMPLETED, State.CANCELLED) if points(each.steps) < iterations + 1
         ]
         if not (again or new):
             with pytest.raises(Conflict):
-                extension.extend(self.store, experiment.id, totals)
+                lifecycle.extend(self.store, experiment.id, totals)
             return
         for each in again:
             each.state, each.losses = State.QUEUED, 0
         experiment.repetitions += [Repetition() for _ in range(new)]
         experiment.iterations, experiment.state = iterations, State.QUEUED
-        extension.extend(self.store, experiment.id, totals)
+        lifecycle.extend(self.store, experiment.id, totals)
 
     @rule(limit=st.integers(1, 3))
     def claim(self, limit: Any) -> None:

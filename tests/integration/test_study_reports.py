@@ -13,7 +13,7 @@ from gaplab.api.app import create_app
 from gaplab.schemas.lifecycle import ExtensionSpec, Verb
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.types import Probed
-from gaplab.services.experiments import extension, lifecycle, listing, reading, submission
+from gaplab.services.experiments import lifecycle, listing, reading, submission
 from gaplab.services.reports.blocks import Code, Paragraph
 from gaplab.services.reports.content import facts_of, verdict_on
 from gaplab.services.reports.document import report_of
@@ -259,7 +259,7 @@ def test_the_spec_of_a_study_of_which_one_experiment_was_extended_has_the_size_t
     study, (extended, _) = two_strategies(sqlite_store)
     for claim in execution.claim(sqlite_store, "test", limit=4):
         run(sqlite_store, claim)
-    extension.extend(sqlite_store, extended, ExtensionSpec(repetitions=3))
+    lifecycle.extend(sqlite_store, extended, ExtensionSpec(repetitions=3))
 
     (spec,), sentences = how_to_reproduce(sqlite_store, study)
 

@@ -2,7 +2,6 @@
 
 from gaplab.services.archives.columns import COLUMNS_LEFT_OUT, EXPORTED, LEFT_OUT, columns_of
 from gaplab.services.store.models import Base
-from gaplab.services.store.tables import Kind
 
 TABLES = Base.metadata.tables
 
@@ -52,10 +51,3 @@ def test_every_exported_table_belongs_to_an_experiment_or_is_its_study() -> None
         "attachment",
     }:  # the last three are shared
         assert {"experiment_id", "repetition_id"} & set(TABLES[name].columns.keys()), name
-
-
-def test_lists_of_numbers_are_told_from_nested_json() -> None:
-    kinds = {(name, each.name): each.kind for name in EXPORTED for each in columns_of(name)}
-
-    assert kinds["request", "genome"] is kinds["answer", "values"] is Kind.VECTOR
-    assert kinds["experiment", "spec"] is kinds["step", "body"] is Kind.NESTED

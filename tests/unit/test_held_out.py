@@ -12,8 +12,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.core.tuning import is_held_out, split
 from gaplab.services.core.types import Measured, Sample, Tuned
-from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
 from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
 
 

@@ -20,8 +20,7 @@ from gaplab.services.core.tuners.search import SearchOptions, SearchTuner
 from gaplab.services.core.types import Belief, History, Measured, Sample, Selected, Simulator, Transferred, Tuned
 from gaplab.services.plugins.external import named_in
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
 from tests.fakes import Recorder, flat, paraboloid, small_setting
 
 DIVERSE = sorted(name for name, each in strategies.items() if issubclass(each, Diverse))

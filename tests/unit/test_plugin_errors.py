@@ -9,8 +9,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.paper import Random
-from gaplab.services.specs.resolution import resolve, resolve_experiment
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.resolution import expected_rollouts, resolve, resolve_experiment
 from tests.experiments import toy
 from tests.fakes import CAREFUL, install
 

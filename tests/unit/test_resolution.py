@@ -13,9 +13,8 @@ from gaplab.schemas.spec import ExperimentSpec, Schedule, StudySpec
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
-from gaplab.services.specs.presets import PRESETS
-from gaplab.services.specs.resolution import resolve, resolve_experiment
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.defaults import PRESETS
+from gaplab.services.specs.resolution import expected_rollouts, resolve, resolve_experiment
 from gaplab.services.world.robots.quadruped import Quadruped
 
 EMBODIED = [name for name, engine in engines.items() if engine.runs(Quadruped().world)]

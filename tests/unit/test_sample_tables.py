@@ -16,8 +16,7 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Outcome, Selected, Transferred, Tuned
 from gaplab.services.specs import sample_tables
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
 from gaplab.services.specs.sample_tables import read_samples
 from gaplab.services.world.robot_files import RobotFile
 from gaplab.services.world.robots.quadruped import Quadruped, QuadrupedOptions

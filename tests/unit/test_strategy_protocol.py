@@ -14,8 +14,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.types import Cost, Measured, Probed, Selected, Transferred, Tuned
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.specs.rollouts import expected_rollouts
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
 from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
 
 

@@ -1,4 +1,4 @@
-"""Studies, experiments and repetitions, with their states, and what was deleted."""
+"""Studies, experiments and repetitions with their leases and attempts, sensitivity checks, and what was deleted."""
 
 from datetime import datetime
 from typing import Any
@@ -7,12 +7,94 @@ from sqlalchemy import BigInteger, ForeignKey, Index, String, Text, UniqueConstr
 from sqlalchemy.ext.hybrid import hybrid_property
 from sqlalchemy.orm import Mapped, mapped_column
 
-from gaplab.schemas.lifecycle import State
+from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.resolved import SPEC_VERSION
 from gaplab.services.core.strategies import strategies
 from gaplab.services.store.clock import now
 from gaplab.services.store.models.base import Base, Reason
-from gaplab.services.store.models.work import LeasedRow
+
+
+class LeasedRow(Base):
+    """A piece of work that one supervisor at a time may hold.
+
+    Attributes:
+        owner: the supervisor that holds the lease, or held it last.
+        epoch: epoch of the lease; every write of a holder has it, and a write with an old epoch changes nothing.
+        heartbeat_at: time of the holder's latest heartbeat.
+        attempts: number of claims that were not handed back.
+        losses: number of workers lost since the last progress.
+        error: reason why it FAILED or was last queued again.
+    """
+
+    __abstract__ = True
+
+    id: Mapped[Any]
+    state: Mapped[State] = mapped_column(default=State.QUEUED)
+    owner: Mapped[str | None] = mapped_column(String(200))
+    epoch: Mapped[int] = mapped_column(default=0)
+    heartbeat_at: Mapped[datetime | None]
+    attempts: Mapped[int] = mapped_column(default=0)
+    losses: Mapped[int] = mapped_column(default=0)
+    error: Mapped[str | None] = mapped_column(Reason)
+    started_at: Mapped[datetime | None]
+    ended_at: Mapped[datetime | None]
+
+
+class AttemptRow(Base):
+    """One lease of a repetition. At most one has not ended: the valid one.
+
+    Attributes:
+        epoch: epoch of the lease, which numbers the attempts of a repetition from 1.
+        ended_at, ending: NULL while the lease is valid.
+        reason: reason of a failure or a loss.
+        hidden_reason: as `hidden_error` of a repetition.
+    """
+
+    __tablename__ = "attempt"
+
+    repetition_id: Mapped[int] = mapped_column(ForeignKey("repetition.id"), primary_key=True)
+    epoch: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    owner: Mapped[str] = mapped_column(String(200))
+    started_at: Mapped[datetime]
+    ended_at: Mapped[datetime | None]
+    ending: Mapped[Ending | None]
+    reason: Mapped[str | None] = mapped_column(Reason)
+    hidden_reason: Mapped[str | None] = mapped_column(Reason)
+
+
+class CheckpointRow(Base):
+    """A part of one step. It is deleted once the step is recorded; without it, only time is lost.
+
+    Its columns are those of `gaplab.services.store.lease.Checkpoint`.
+    """
+
+    __tablename__ = "checkpoint"
+
+    repetition_id: Mapped[int] = mapped_column(ForeignKey("repetition.id"), primary_key=True, autoincrement=False)
+    step: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    part: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    answers: Mapped[bytes]
+    seconds: Mapped[float]
+    rollouts: Mapped[int] = mapped_column(BigInteger, server_default="0")
+    budget: Mapped[int] = mapped_column(BigInteger, server_default="0")
+
+
+class SensitivityRow(LeasedRow):
+    """A sensitivity check, with its lease.
+
+    Attributes:
+        id: hash of the spec, so that equal subjects are checked once.
+        spec: robot, engine and tunables, and the size of the check.
+        found: effect of each tunable on fitness; NULL until it is known.
+    """
+
+    __tablename__ = "sensitivity"
+    __table_args__ = (Index(None, "state", "created_at"),)
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    spec: Mapped[dict[str, Any]]
+    found: Mapped[list[dict[str, Any]] | None]
+    created_at: Mapped[datetime]
 
 
 class StudyRow(Base):
@@ -24,6 +106,7 @@ class StudyRow(Base):
         edits: number of changes of its name, notes or tags, and of names of its experiments.
         archived_at: time since which lists leave it out; NULL if they do not.
         webhook: address that is told of its end; NULL for none.
+        submitted: its spec, as `gaplab.services.specs.submitted` keeps it; NULL if it is not known.
     """
 
     __tablename__ = "study"
@@ -36,6 +119,7 @@ class StudyRow(Base):
     edits: Mapped[int] = mapped_column(default=0, server_default="0")
     archived_at: Mapped[datetime | None]
     webhook: Mapped[str | None] = mapped_column(Text)
+    submitted: Mapped[dict[str, Any] | None]
     created_at: Mapped[datetime]
 
 

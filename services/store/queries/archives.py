@@ -5,7 +5,7 @@ from enum import Enum
 from itertools import islice
 from typing import Any
 
-from sqlalchemy import Select, delete, insert, select, text
+from sqlalchemy import Select, delete, insert, select
 from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
 from sqlalchemy.orm import Session
 
@@ -18,6 +18,7 @@ from gaplab.services.store.models import (
     StudyRow,
 )
 from gaplab.services.store.queries import attachments, attempts, robots
+from gaplab.services.store.statements import wait_for_others
 
 Row = dict[str, Any]
 
@@ -68,8 +69,7 @@ def all_ids(session: Session, model: type[StudyRow | ExperimentRow]) -> list[str
 
 def taken_ids(session: Session, ids: set[str]) -> set[str]:
     """Return the ids that a study or an experiment has already; a concurrent import waits here for this one's end."""
-    if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write ever overlap
-        session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
+    wait_for_others(session, _LOCK)
     queries = (select(row.id).where(row.id.in_(ids)) for row in (StudyRow, ExperimentRow))
     return {each for query in queries for each in session.scalars(query)}
 

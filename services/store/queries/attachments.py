@@ -5,13 +5,13 @@ from datetime import timedelta
 from itertools import chain
 from typing import Any
 
-from sqlalchemy import ScalarSelect, delete, func, select, text
+from sqlalchemy import ScalarSelect, delete, func, select
 
 from gaplab.services.core.errors import Violation
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import AnswerRow, AttachmentRow
 from gaplab.services.store.session import Session
-from gaplab.services.store.statements import insert_new
+from gaplab.services.store.statements import insert_new, wait_for_others
 
 MOST_BYTES = 20_000_000
 """Largest attachment."""
@@ -76,8 +76,7 @@ def insert_unless_there(session: Session, rows: Iterable[dict[str, Any]]) -> Non
 
 def unnamed_bytes(session: Session) -> int:
     """Return the size of all files that no answer names; a concurrent caller waits until this transaction ends."""
-    if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write ever overlap
-        session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
+    wait_for_others(session, _LOCK)
     row = AttachmentRow
     sizes: dict[str, int] = dict(session.execute(select(row.id, func.length(row.content))).all())
     return sum(sizes[each] for each in sizes.keys() - named(session))

@@ -20,6 +20,7 @@ from gaplab.services.core.errors import NotFound
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import AttemptRow, ProvenanceRow, RepetitionRow
 from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.experiments import of_experiments
 from gaplab.services.store.statements import insert_new
 
 _EVENTS = {
@@ -60,9 +61,8 @@ def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: st
 
 def latest(session: Session, experiment: str) -> dict[int, int]:
     """Return the number of the latest attempt by repetition, for all repetitions of an experiment with attempts."""
-    row, repetition = AttemptRow, RepetitionRow
-    of_it = select(row.repetition_id, func.max(row.epoch)).join(repetition, repetition.id == row.repetition_id)
-    found = of_it.where(repetition.experiment_id == experiment).group_by(row.repetition_id)
+    row = AttemptRow
+    found = of_experiments(row, [experiment], row.repetition_id, func.max(row.epoch)).group_by(row.repetition_id)
     return dict(session.execute(found).all())
 
 
@@ -76,8 +76,7 @@ def work_spans(session: Session, experiments: Sequence[str]) -> dict[str, list[t
         return {}
     row, repetition, present = AttemptRow, RepetitionRow, moment(session)
     columns = repetition.experiment_id, repetition.id, repetition.seconds, row.started_at, row.ended_at
-    query = select(*columns).join(repetition, repetition.id == row.repetition_id)
-    query = query.where(repetition.experiment_id.in_(experiments), repetition.seconds > 0)
+    query = of_experiments(row, experiments, *columns).where(repetition.seconds > 0)
     found: dict[str, list[tuple[datetime, datetime]]] = {}
     left: dict[int, timedelta] = {}
     for experiment, id_, seconds, started_at, ended_at in session.execute(query.order_by(row.epoch.desc())):

@@ -11,6 +11,7 @@ from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Checkpoint, Claim, Delivered
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
+from gaplab.services.store.queries.experiments import of_experiments
 
 _COLUMNS = tuple(Checkpoint.__dataclass_fields__)
 _KINDS = ("selection", "measurement", "tuning", "transfer", "probe")
@@ -71,10 +72,9 @@ def stored(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Chec
 def begun(session: Session, experiments: Sequence[str]) -> Iterator[tuple[str, StepRead]]:
     """Yield the steps that have checkpoints, each with its experiment."""
     row, of = CheckpointRow, RepetitionRow
-    query = select(of.experiment_id, of.number, row.step, row.rollouts, row.budget)
-    last = of.experiment_id.in_(experiments) & (row.part == of.checkpoints - 1) & (row.budget > 0)
-    joined = query.join(of, of.id == row.repetition_id).where(last).order_by(of.number)
-    for experiment, number, place, rollouts, budget in session.execute(joined):
+    columns = of.experiment_id, of.number, row.step, row.rollouts, row.budget
+    query = of_experiments(row, experiments, *columns).where(row.part == of.checkpoints - 1, row.budget > 0)
+    for experiment, number, place, rollouts, budget in session.execute(query.order_by(of.number)):
         iteration, kind = divmod(place + _KINDS.index("tuning"), len(_KINDS))
         step = StepRead(repetition=number, iteration=iteration, kind=_KINDS[kind], rollouts=rollouts, budget=budget)
         yield experiment, step

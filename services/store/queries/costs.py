@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.lifecycle import State
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import LOG, ExperimentRow, RepetitionRow, StepKind, StepRow, SupervisorRow
-from gaplab.services.store.queries.experiments import MEASURED
+from gaplab.services.store.queries.experiments import MEASURED, of_experiments
 
 
 def latest(session: Session, count: int) -> tuple[tuple[dict[str, Any], float, int], ...]:
@@ -34,13 +34,7 @@ def latest(session: Session, count: int) -> tuple[tuple[dict[str, Any], float, i
 
 @dataclass(frozen=True)
 class Work:
-    """The work of an experiment so far.
-
-    Attributes:
-        seconds: seconds of computation in its recorded steps.
-        samples: real-world evaluations that the strategy learned from.
-        probes: real-world evaluations that were only recorded.
-    """
+    """Seconds of the recorded steps of an experiment, and its real-world evaluations by kind."""
 
     seconds: float = 0.0
     samples: int = 0
@@ -51,9 +45,8 @@ def work_of(session: Session, experiments: Sequence[str]) -> dict[str, Work]:
     """Return the work of each experiment."""
     run, row = RepetitionRow, StepRow
     seconds = select(run.experiment_id, func.sum(run.seconds)).where(run.experiment_id.in_(experiments))
-    measured = select(run.experiment_id, row.kind, func.count()).join(run, run.id == row.repetition_id)
     real = (row.branch == LOG) & row.kind.in_(MEASURED.values()) & row.measured_by.is_not(None)
-    measured = measured.where(run.experiment_id.in_(experiments), real)
+    measured = of_experiments(row, experiments, run.experiment_id, row.kind, func.count()).where(real)
     found = session.execute(measured.group_by(run.experiment_id, row.kind))
     counts = {(id_, kind): count for id_, kind, count in found}
     return {
@@ -74,15 +67,9 @@ def ages(session: Session) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Totals:
-    """Totals over all experiments.
+    """Totals over all experiments: numbers by state, rollouts that are needed yet, and what was recorded.
 
-    Attributes:
-        experiments: their number, by state.
-        repetitions: their number, by state.
-        rollouts_queued: still needed by repetitions that have not ended.
-        rollouts_done: recorded so far.
-        steps: recorded so far.
-        supervisor_ages_s: seconds since the last heartbeat of each supervisor.
+    The ages of supervisors are the seconds since their last heartbeats.
     """
 
     experiments: dict[State, int]

@@ -20,9 +20,12 @@ from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.models import (
     LOG,
     AnswerRow,
+    AttemptRow,
+    CheckpointRow,
     DeletionRow,
     ExperimentRow,
     RepetitionRow,
+    RequestRow,
     StepKind,
     StepRow,
     StudyRow,
@@ -36,13 +39,7 @@ _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
 @dataclass(frozen=True)
 class Extent:
-    """The size of one repetition.
-
-    Attributes:
-        iterations: number of iterations, number 0 included.
-        rollouts: expected number of rollouts.
-        hardware: name of the hardware that it needs; None for none.
-    """
+    """The size of one repetition: iterations with number 0, expected rollouts, and the hardware that it needs."""
 
     iterations: int
     rollouts: int
@@ -87,13 +84,17 @@ def new_id() -> str:
 
 
 def insert_study(
-    session: Session, name: str, specs: Sequence[tuple[ResolvedSpec, Extent]], token: str | None = None
+    session: Session,
+    name: str,
+    specs: Sequence[tuple[ResolvedSpec, Extent]],
+    token: str | None = None,
+    submitted: dict[str, Any] | None = None,
 ) -> Members:
     """Add a study with its experiments, whose repetitions are all QUEUED; one alone has the id of its study.
 
-    `token` is the id of the token that submitted it.
+    `token` is the id of the token that submitted it, and `submitted` the spec as it is kept.
     """
-    study = StudyRow(id=new_id(), name=storable(name), created_at=moment(session))
+    study = StudyRow(id=new_id(), name=storable(name), submitted=submitted, created_at=moment(session))
     session.add(study)
     session.flush()
     rows = [
@@ -259,11 +260,13 @@ def _admit(row: ExperimentRow, context: QueryContext) -> None:
     robots.learn(context.session, [row.spec])
 
 
+_OfRepetition = AnswerRow | AttemptRow | CheckpointRow | RequestRow | StepRow
+
 MEASURED = {MeasurementKind.SAMPLE: StepKind.MEASURED, MeasurementKind.PROBE: StepKind.PROBED}
 """The kind of step that a measurement is."""
 
 
-def of_experiments(row: type[AnswerRow | StepRow], experiments: Sequence[str], *columns: Any) -> Select[Any]:  # noqa: ANN401
+def of_experiments(row: type[_OfRepetition], experiments: Sequence[str], *columns: Any) -> Select[Any]:  # noqa: ANN401
     """Return a query for columns of a table, joined with the repetitions of these experiments."""
     joined = select(*columns).join(RepetitionRow, RepetitionRow.id == row.repetition_id)
     return joined.where(RepetitionRow.experiment_id.in_(experiments))

@@ -80,11 +80,6 @@ def position(step: Step) -> int:
     return len(_ORDER) * step.iteration + _ORDER.index(kind_of(step)) - _ORDER.index(StepKind.TUNED)
 
 
-def vector(values: FloatArray) -> list[float]:
-    """Return a JSON array, whose numbers read back exactly."""
-    return [float(each) for each in values]
-
-
 def columns_of(step: Step) -> dict[str, Any]:
     """Return the columns of a step that say what it is; not whose it is, who measured it, and how long it took."""
     cost = getattr(step, "cost", Cost())
@@ -103,38 +98,37 @@ def columns_of(step: Step) -> dict[str, Any]:
 def _outcome(step: Step) -> dict[str, Any]:
     match step:
         case Selected(genome=genome):
-            return {"body": {"genome": vector(genome)}}
+            return {"body": {"genome": genome.tolist()}}
         case Measured(sample=sample):
-            return {"fitness": known(sample.fitness), "body": {"genome": vector(sample.genome)} | _seen(sample)}
+            return {"fitness": known(sample.fitness), "body": {"genome": sample.genome.tolist()} | _seen(sample)}
         case Tuned(simulators=simulators):
             return {"body": {"simulators": [*map(_packed, simulators)]}}
         case Transferred(genome=genome):
-            return {"fitness": known(step.fitness), "body": {"genome": vector(genome)}}
+            return {"fitness": known(step.fitness), "body": {"genome": genome.tolist()}}
         case Probed():
             return {"fitness": known(step.fitness), "recorded": known(step.recorded), "body": _seen(step)}
 
 
 def _seen(measured: Sample | Probed) -> dict[str, Any]:
-    readings, repeats = [known(each) for each in measured.readings.tolist()], vector(measured.repeats)
+    readings, repeats = [known(each) for each in measured.readings.tolist()], measured.repeats.tolist()
     return ({"readings": readings} if readings else {}) | ({"repeats": repeats} if repeats else {})
 
 
 def _packed(simulator: Simulator) -> dict[str, Any]:
     interval, fit = simulator.interval, simulator.fit
     packed = {
-        "parameters": vector(simulator.parameters),
+        "parameters": simulator.parameters.tolist(),
         "squared_error": known(simulator.squared_error),
-        "lower": None if interval is None else vector(interval[:, 0]),
-        "upper": None if interval is None else vector(interval[:, 1]),
+        "lower": None if interval is None else interval[:, 0].tolist(),
+        "upper": None if interval is None else interval[:, 1].tolist(),
         "weight": simulator.weight,
         "held_out_error": simulator.held_out_error,
-        "fit": None if fit is None else _fit(fit),
+        "fit": None,
     }
+    if fit is not None:
+        errors = fit.expected_error, fit.surprise, fit.interval_scale, *fit.reading_errors.tolist()
+        packed["fit"] = list(map(known, errors))
     return {name: value for name, value in packed.items() if value is not None or name == "squared_error"}
-
-
-def _fit(fit: Fit) -> list[float | None]:
-    return [*map(known, (fit.expected_error, fit.surprise, fit.interval_scale, *fit.reading_errors.tolist()))]
 
 
 def step_of(row: StepRow | Row[Any]) -> Step:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from datetime import datetime
 from functools import cache
 from typing import Any
 
@@ -27,6 +28,7 @@ class Tally:
         rollouts_left: remaining rollouts of repetitions that have not ended.
         seconds: seconds of work in the completed rollouts.
         steps: what its repetitions have begun; the rollouts of those count.
+        spans: begin and end of the work on it, if that is asked for.
     """
 
     repetitions: int = 0
@@ -45,6 +47,7 @@ class Tally:
     rollouts_left: int = 0
     seconds: float = 0.0
     steps: tuple[StepRead, ...] = ()
+    spans: tuple[tuple[datetime, datetime], ...] = ()
 
     def __add__(self, other: "Tally") -> "Tally":
         return Tally(*(mine + theirs for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True)))
@@ -53,7 +56,10 @@ class Tally:
 def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
     """Return the tally of each experiment."""
     found = session.execute(_all_tallies(), {"experiments": experiments})
-    tallied = {experiment: _tally(*counts, seconds=float(seconds)) for experiment, *counts, seconds in found}
+    tallied: dict[str, Tally] = {}
+    for experiment, *counts, seconds in found:  # as int: Postgres returns decimals
+        named: dict[str, Any] = {each.name: int(count) for each, count in zip(fields(Tally), counts, strict=False)}
+        tallied[experiment] = Tally(seconds=float(seconds), **named)
     for experiment, step in checkpoints.begun(session, experiments):
         tallied[experiment] += Tally(rollouts_done=step.rollouts, rollouts_left=-step.rollouts, steps=(step,))
     return tallied
@@ -109,12 +115,6 @@ def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str
     for experiment, reason in found:
         gathered[experiment] = (*gathered.get(experiment, ()), str(reason))
     return gathered
-
-
-def _tally(*counts: int, seconds: float) -> Tally:
-    """Return a tally from counts in the order of its fields, as int: Postgres returns decimals."""
-    named: dict[str, Any] = {each.name: int(count) for each, count in zip(fields(Tally), counts, strict=False)}
-    return Tally(seconds=seconds, **named)
 
 
 def _count(condition: ColumnElement[bool]) -> ColumnElement[int]:

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from statistics import fmean
 
-from sqlalchemy import func, select
+from sqlalchemy import func
 from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.tuning import is_held_out
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, RequestRow, StepKind, StepRow
-from gaplab.services.store.queries.experiments import MEASURED, best, same_log, steps_of
+from gaplab.services.store.queries.experiments import MEASURED, best, of_experiments, same_log, steps_of
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,7 @@ def requested_controller(
     """Return the controller of an iteration whose measurement is requested; None if there is none."""
     row = RequestRow
     of_it = (row.iteration == iteration) & (row.kind == kind) & row.branch.is_(None)
-    query = select(row.genome).join(RepetitionRow, RepetitionRow.id == row.repetition_id).where(of_it)
-    query = query.where(RepetitionRow.experiment_id == experiment, RepetitionRow.number == repetition)
+    query = of_experiments(row, [experiment], row.genome).where(of_it, RepetitionRow.number == repetition)
     genome = session.scalar(query.order_by(row.created_at.desc(), row.id.desc()).limit(1))
     return None if genome is None else MeasuredController(genome, None, None)
 

@@ -15,14 +15,13 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import AnswerState, RequestState
-from gaplab.services.core.errors import Conflict, NotFound
+from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.lease import Claim, Requested
 from gaplab.services.store.models import AnswerRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import lock, new_id, of_experiments
-from gaplab.services.store.queries.logs import vector
-from gaplab.services.store.statements import storable
+from gaplab.services.store.statements import existing, storable
 
 PENDING = (RequestState.OPEN, RequestState.TAKEN, RequestState.STUCK)
 """States of a request that is still needed."""
@@ -93,7 +92,7 @@ def insert(session: Session, asked: Mapping[Claim, Requested]) -> dict[Claim, Re
     """
     found = {}
     for claim, wanted in asked.items():
-        genome, repetition = vector(wanted.genome), claim.id
+        genome, repetition = wanted.genome.tolist(), claim.id
         earlier = requests_of(session, repetition)
         same = [row for row in earlier if row.genome == genome]
         pending = [row for row in same if row.place == wanted.place and row.state in PENDING]
@@ -110,7 +109,7 @@ def _new(session: Session, claim: Claim, wanted: Requested, same: RequestRow | N
         place=wanted.place,
         iteration=wanted.iteration,
         kind=wanted.kind,
-        genome=vector(wanted.genome),
+        genome=wanted.genome.tolist(),
         bench=next(iter(spellings(session, bench)), storable(bench).strip()),
         state=RequestState.OPEN if same is None else same.state,
         safety=wanted.safety,
@@ -164,12 +163,8 @@ def get(session: Session, id_: str) -> tuple[RequestRow, RepetitionRow]:
     Raises:
         NotFound: there is none.
     """
-    row = session.get(RequestRow, storable(id_))
-    if row is None:
-        raise NotFound(f"there is no request {id_!r}")
-    repetition = session.get(RepetitionRow, row.repetition_id)
-    assert repetition is not None, "a request belongs to a repetition"
-    return row, repetition
+    row = existing(session, RequestRow, id_, "request")
+    return row, session.get_one(RepetitionRow, row.repetition_id)
 
 
 def locked(session: Session, id_: str) -> tuple[RequestRow, RepetitionRow]:
@@ -183,17 +178,6 @@ def locked(session: Session, id_: str) -> tuple[RequestRow, RepetitionRow]:
     session.refresh(row, with_for_update=True)
     session.refresh(repetition)
     return row, repetition
-
-
-def get_answer(session: Session, id_: str) -> AnswerRow:
-    """Return an answer.
-
-    Raises:
-        NotFound: there is none.
-    """
-    if (row := session.get(AnswerRow, storable(id_))) is None:
-        raise NotFound(f"there is no measurement {id_!r}")
-    return row
 
 
 def give_up(session: Session, row: RequestRow, kind: EventKind, **more: str) -> None:

@@ -53,7 +53,9 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     moving = [_move(claim, lengths[claim][0], steps) for claim, steps in fresh.items() if steps]
     if moving and session.connection().execute(_ADVANCE, moving).rowcount != len(moving):
         raise Conflict("a log has new steps although it was locked")
-    rows = [_row(claim.id, each, _engine(claim)) for claim, steps in fresh.items() for each in steps]
+    engines = {claim: claim.spec.reality.engine for claim in fresh}
+    by = {claim: engine.name if engine else "nobody" for claim, engine in engines.items()}
+    rows = [_row(claim.id, each, by[claim]) for claim, steps in fresh.items() for each in steps]
     if rows:
         session.connection().execute(insert(_STEP), rows)
     for claim, steps in fresh.items():
@@ -137,11 +139,6 @@ def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[Time
         if place == following:
             found.append(each)
     return found
-
-
-def _engine(claim: Claim) -> str:
-    engine = claim.spec.reality.engine
-    return engine.name if engine else "nobody"
 
 
 def _move(claim: Claim, length: int, steps: Sequence[TimedStep]) -> dict[str, Any]:

@@ -20,13 +20,7 @@ from gaplab.services.store.queries.logs import simulator_of
 
 @dataclass(frozen=True)
 class BestSimulator:
-    """The best simulator of one iteration, and the fitness of the controller that was evolved in it.
-
-    Attributes:
-        simulator: its intervals are as the tuner gave them.
-        simulated: fitness in the simulator; None if there is none.
-        real: fitness in reality; None if there is none.
-    """
+    """The best simulator of an iteration, as tuned, and the fitness of what evolved in it, there and in reality."""
 
     repetition: int
     iteration: int
