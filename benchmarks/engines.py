@@ -16,10 +16,10 @@ from gaplab.services.core.search import maximise
 from gaplab.services.core.streams import stream
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.mujoco import MuJoCo
-from gaplab.services.engines.mujoco.scene import MuJoCoScene
+from gaplab.services.engines.mujoco.engine import MuJoCoScene
 from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.engines.pybullet.scene import PyBulletScene
+from gaplab.services.engines.pybullet.engine import PyBulletScene
 from gaplab.services.specs.simulation import Simulation
 from gaplab.services.world.motions import Motion, open_loop
 from gaplab.services.world.robots.quadruped import Quadruped

@@ -25,9 +25,8 @@ from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import TITLE, titled
-from gaplab.services.replay.predictions import predictions
 from gaplab.services.replay.process import RolloutProcess
-from gaplab.services.replay.replays import replay
+from gaplab.services.replay.replays import predictions, replay
 from gaplab.services.results import curves
 from gaplab.services.results.curves import cost_axis
 from gaplab.services.results.toy import toy_iterations

@@ -6,7 +6,7 @@ from pydantic import Field
 from gaplab.api.http.dependencies import Asked, Id, Number, Parameters, RolloutProcessDep, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.replays import ControllerKind, Predictions, Replay
-from gaplab.services.replay import predictions, replays
+from gaplab.services.replay import replays
 from gaplab.services.replay.rollout import LAST, ReplayChoice
 
 router = APIRouter(prefix="/experiments", tags=["replays"])
@@ -60,4 +60,4 @@ def read_predictions(id: Id, store: StoreDep, process: RolloutProcessDep) -> Pre
 
     Each request computes for about two seconds; repeat it while some samples are pending.
     """
-    return predictions.predictions(store, process, id)
+    return replays.predictions(store, process, id)

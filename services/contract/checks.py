@@ -8,20 +8,9 @@ from inspect import getdoc, isfunction, signature
 from keyword import iskeyword
 from pathlib import Path
 from traceback import walk_tb
-from types import ModuleType
-from typing import Any
+from typing import Any, get_args
 
-from gaplab.services.contract import (
-    controllers,
-    discrepancies,
-    engines,
-    optimizers,
-    robots,
-    strategies,
-    tunables,
-    tuners,
-)
-from gaplab.services.contract.promises import RATING, is_described
+from gaplab.services.contract import discrepancies, optimizers, promises, robots, strategies, tuners, worlds
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.plugins import loading
 from gaplab.services.plugins.faults import NO_CLASS, why_no_plugin
@@ -29,41 +18,28 @@ from gaplab.services.specs.registries import REGISTRIES
 
 Check = Callable[[type[Any]], None]
 
-MODULES = {
-    "strategy": strategies,
-    "robot": robots,
-    "controller": controllers,
-    "engine": engines,
-    "tunable": tunables,
-    "optimizer": optimizers,
-    "discrepancy": discrepancies,
-    "tuner": tuners,
-}
+MODULES = (strategies, robots, worlds, optimizers, discrepancies, tuners, promises)
 
 
-def _checks_of(module: ModuleType) -> Iterator[Check]:
-    """Yield the checks of a module: its functions of nothing but a plug-in, which return nothing."""
-    for name, found in vars(module).items():
-        if isfunction(found) and found.__module__ == module.__name__ and not name.startswith("_"):
-            asked = signature(found)
-            if list(asked.parameters) == ["plugin"] and asked.return_annotation is None:
-                yield found
+def _checks_of(base: type[Any]) -> Iterator[Check]:
+    """Yield the checks of plug-ins with this base: the functions of nothing but such a plug-in that return nothing."""
+    for module in MODULES:
+        for name, found in vars(module).items():
+            if isfunction(found) and found.__module__ == module.__name__ and not name.startswith("_"):
+                asked = signature(found)
+                if list(asked.parameters) == ["plugin"] and asked.return_annotation is None:
+                    (checked,) = get_args(asked.parameters["plugin"].annotation)
+                    if issubclass(base, checked):
+                        yield found
 
 
-CHECKS: dict[str, tuple[Check, ...]] = {
-    kind: (*_checks_of(module), is_described, *(RATING if kind == "robot" else ())) for kind, module in MODULES.items()
-} | {"task": (is_described, *RATING)}
+CHECKS: dict[str, tuple[Check, ...]] = {kind: tuple(_checks_of(each.base)) for kind, each in REGISTRIES.items()}
 """The checks of each kind of plug-in."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """The result of one check.
-
-    Attributes:
-        promise: what a plug-in of this kind does, in words.
-        reason: why this plug-in does not; None if it does.
-    """
+    """The result of one check: what a plug-in of this kind does, and why this one does not; None if it does."""
 
     promise: str
     reason: str | None
@@ -101,14 +77,7 @@ _IMPORT = re.compile(r"^(?:from \S+ )?import (.+)$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class CheckedPlugin:
-    """A plug-in that was checked.
-
-    Attributes:
-        kind: its kind.
-        name: its name in specs.
-        results: the result of each check; empty if it cannot be used.
-        unusable: why it cannot be used; None if it can.
-    """
+    """A plug-in that was checked, with the result of each check, or why it cannot be used."""
 
     kind: str
     name: str
@@ -160,14 +129,10 @@ def _class_name(name: str) -> str:
 
 
 def check_file(file: Path, folders: Sequence[Path] = ()) -> Iterator[CheckedPlugin]:
-    """Import a file, and yield each of its plug-ins, checked.
+    """Import a file, or the folder of a package, and yield each of its plug-ins, checked.
 
     The file can import others of its folder and of the plug-in folders. Outside the plug-in folders, no other file is
     imported.
-
-    Args:
-        file: a module, or the folder of a package, or its `__init__.py`.
-        folders: the plug-in folders.
 
     Raises:
         FileNotFoundError: there is no such file.

@@ -1,10 +1,11 @@
-"""The contract of an engine: World and Motion in, Trajectory out."""
+"""The contract of an engine: World and Motion in, Trajectory out; and of one that keeps scenes of bodies."""
 
 from abc import abstractmethod
+from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -172,14 +173,9 @@ class Engine(Plugin):
         )
 
     def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
-        """Return the same rollout, with poses at additional times.
+        """Return the same rollout, with poses at times `(k,)`, ascending, from 0 to the last observation.
 
         This default records the base alone. An engine that has joint angles overrides it.
-
-        Args:
-            world: as in `rollout`.
-            motion: as in `rollout`.
-            times_s: `(k,)`, ascending, from 0 to the last observation.
         """
         seen = self.rollout(world, motion.observed_at(times_s))
         poses = np.hstack([seen.positions_m, seen.orientations])
@@ -203,3 +199,72 @@ class Engine(Plugin):
     def details(cls) -> dict[str, Any]:
         """Return the World fields that the engine honours, and whether it closes loops, for the catalogue."""
         return {"honours": sorted(cls.honours), "closes_loops": cls.closes_loops}
+
+
+WARM_SCENES = 4
+"""Largest number of cached scenes. Worlds that differ only in material, or in what is set in place, share a scene."""
+
+
+class Warm(Protocol):
+    """A scene that is kept for the next rollout."""
+
+    def close(self) -> None:
+        """Release the engine's resources."""
+
+
+S = TypeVar("S", bound=Warm)
+
+
+class WarmScenes(Generic[S]):
+    """A cache of scenes by world; `build` builds the scene of a world."""
+
+    def __init__(self, build: Callable[[World], S]) -> None:
+        self._build = build
+        self._scenes: OrderedDict[World, S] = OrderedDict()
+        self._latest: tuple[World, S] | None = None
+
+    def __getitem__(self, world: World) -> S:
+        if self._latest is not None and self._latest[0] == world:  # a hash would take 25 µs
+            return self._latest[1]
+        scene = self._scenes.pop(world, None) or self._build(world)
+        self._scenes[world] = scene
+        while len(self._scenes) > WARM_SCENES:
+            self._scenes.popitem(last=False)[1].close()
+        self._latest = world, scene
+        return scene
+
+    def drop(self, world: World) -> None:
+        """Drop a broken scene; the next call rebuilds it."""
+        self._latest = None
+        self._scenes.pop(world).close()
+
+    def close(self) -> None:
+        """Close all scenes."""
+        self._latest = None
+        while self._scenes:
+            self._scenes.popitem()[1].close()
+
+
+class SceneEngine(Engine, Generic[S]):
+    """An engine of worlds with bodies, which keeps one scene for all worlds that are built alike."""
+
+    honours = ALL_FIELDS
+    repeatable = True
+    closes_loops = True
+
+    def __init__(self, options: Frozen | None = None) -> None:
+        super().__init__(options)
+        self._scenes = WarmScenes(self._build)
+
+    @abstractmethod
+    def _build(self, world: World) -> S:
+        """Build the scene of a world."""
+
+    @classmethod
+    def runs(cls, world: World) -> bool:
+        """Return whether the world has bodies, and exceeds no limit of the engine."""
+        return bool(world.bodies) and cls.exceeded(world) is None
+
+    def close(self) -> None:
+        """Close all scenes."""
+        self._scenes.close()

@@ -1,4 +1,7 @@
-"""Rollouts in a subprocess, so that a crash, a hang or a lack of memory does not affect the service."""
+"""Rollouts in a subprocess, so that a crash, a hang or a lack of memory does not affect the service.
+
+It has no store: a spec is sent with the robot file that it needs.
+"""
 
 import logging
 import os
@@ -10,13 +13,16 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from threading import Lock, Thread
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import EngineUnavailable, GaplabError
 from gaplab.services.plugins import folders
+from gaplab.services.plugins.external import named_files
 from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.store.texts import brief
 from gaplab.services.waiting_line import WaitingLine
+from gaplab.services.world import robot_library
 
 T = TypeVar("T")
 
@@ -48,11 +54,7 @@ class EngineInterrupted(GaplabError):
 
 
 class AnswerCache:
-    """A thread-safe cache of answers that never change; the least recently used make room for new ones.
-
-    Args:
-        most_bytes: the sum of the sizes of all answers.
-    """
+    """A thread-safe cache of answers that never change; the least recently used make room for new ones."""
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
         self._answers: OrderedDict[Key, tuple[Any, int]] = OrderedDict()
@@ -78,17 +80,10 @@ class AnswerCache:
 
 
 class RolloutProcess:
-    """A subprocess that executes one call at a time.
+    """A subprocess that executes one call at a time, within a time limit; `answers` is a cache for the callers.
 
     It starts with the first call, and again after a crash or a timeout. It ends with its parent, even if that
     is killed: the parent's end of the pipe closes, and the next read fails. Other plug-ins get another one.
-
-    Args:
-        longest_s: time limit of one call.
-        line: of callers.
-
-    Attributes:
-        answers: a cache for the callers.
     """
 
     def __init__(self, longest_s: float = LONGEST_S, line: WaitingLine | None = None) -> None:
@@ -211,3 +206,23 @@ def _serve(pipe: Connection, output: Connection, plugins: Mapping[str, str]) -> 
                 answer = (False, (type(error).__name__, brief(str(error))))
             print(end="", flush=True)  # noqa: T201 - what the call printed
             pipe.send(answer)
+
+
+class SentSpec(NamedTuple):
+    """A resolved spec as JSON, with the texts of robot files and the files of external plug-ins that it needs."""
+
+    text: str
+    robots: tuple[str, ...]
+    plugins: dict[str, str]
+
+
+def sent(spec: ResolvedSpec) -> SentSpec:
+    """Return a spec to be sent."""
+    plugins = named_files(spec.model_dump(mode="json"))
+    return SentSpec(spec.model_dump_json(), robot_library.needed_by(spec.robot), plugins)
+
+
+def received(spec: SentSpec) -> ResolvedSpec:
+    """Return the spec that was sent, in a process that has imported its plug-ins and no others."""
+    robot_library.learn(spec.robots)
+    return ResolvedSpec.model_validate_json(spec.text)

@@ -1,24 +1,33 @@
-"""Replays: the motion of a measured controller in its simulator and in reality, and robots at their start."""
+"""What is computed when it is asked for: replays, robots at their start, and predictions.
 
+A replay is the motion of a measured controller in its simulator and in reality; a prediction the fitness of a sample in
+simulation, before and after tuning on it.
+"""
+
+from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import sha256
+from time import monotonic
+
+import numpy as np
 
 from gaplab.schemas.records import MeasurementKind
-from gaplab.schemas.replays import ControllerKind, Replay, RobotShapes
+from gaplab.schemas.replays import ControllerKind, Prediction, Predictions, Replay, RobotShapes
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.arrays import known
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
 from gaplab.services.experiments import stored_robots
 from gaplab.services.experiments.views import hidden
-from gaplab.services.replay.process import Key, RolloutProcess
+from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess, SentSpec, received, sent
 from gaplab.services.replay.rollout import LAST, ReplayChoice, ReplayRequest, compute_replay
-from gaplab.services.replay.sent_specs import sent
 from gaplab.services.replay.shapes import at_start
-from gaplab.services.specs.assembly import refuse_missing
+from gaplab.services.specs.assembly import refuse_missing, simulation_of
 from gaplab.services.specs.resolution import is_computed, is_direct, takes_samples
-from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.robots import robot_of, unit
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays
+from gaplab.services.store.queries.replays import TunedSample
 from gaplab.services.store.session import Session, Store
 from gaplab.services.world.robot_files import stored_robot_file
 from gaplab.services.world.robot_library import label_of
@@ -136,3 +145,96 @@ def _best(session: Session, experiment: str, repetition: int, iteration: int) ->
 def _name(choice: ReplayChoice) -> str:
     what = "sample" if choice.kind is ControllerKind.SAMPLE else "transferred controller"
     return f"{what} of iteration {choice.iteration} of repetition {choice.repetition}"
+
+
+SECONDS = 2.0
+"""Time limit of the rollouts of one request; the rest stays pending."""
+
+MOST_AT_ONCE = 2_000
+"""Samples that are sent to the process in one request."""
+
+SIZE_BYTES = 300
+"""Approximate size of a cached prediction."""
+
+MOST_KEPT = 20_000
+"""Samples of one experiment that are predicted: those of its first repetitions.
+
+The cache then has room for eight such experiments. An experiment of the paper has 400 samples.
+"""
+
+Fitness = float | None
+Pair = tuple[Fitness, Fitness]
+"""Fitness before and after tuning."""
+
+
+def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, seconds: float = SECONDS) -> Predictions:
+    """Return the predictions of an experiment's samples that are computed so far.
+
+    Each request computes more of them, early iterations first, for `seconds`. The rest counts as pending: repeat the
+    request. Samples beyond `MOST_KEPT` are left out.
+
+    Raises:
+        NotFound: no such experiment.
+        InvalidSpec: its robot, its engine or a tunable is no longer installed.
+        EngineUnavailable: the library of its engine is not installed.
+        EngineInterrupted: the physics ended its process.
+        LimitReached: earlier requests took too long.
+    """
+    with store.reading() as session:
+        row = experiments.get_experiment(session, experiment_id)
+        every = replays.tuned_samples(session, row)
+    samples = every[:MOST_KEPT]
+    spec = spec_of(row.spec)
+    sent_spec = sent(spec)
+    unknown = [each for each in samples if process.answers.get(_key(row.id, each)) is None]
+    unknown.sort(key=lambda each: (each.iteration, each.repetition))
+    if unknown:
+        refuse_missing(spec)
+        pairs = process.call(predict, sent_spec, unknown[:MOST_AT_ONCE], seconds, plugins=sent_spec.plugins)
+        for sample, pair in zip(unknown, pairs, strict=False):
+            process.answers.keep(_key(row.id, sample), pair, SIZE_BYTES)
+    items = _items(row.id, samples, process.answers)
+    return Predictions(
+        experiment=row.id,
+        unit=unit(spec),
+        items=items,
+        pending=len(samples) - len(items),
+        left_out=len(every) - len(samples),
+    )
+
+
+def predict(spec: SentSpec, samples: Sequence[TunedSample], seconds: float) -> list[Pair]:
+    """Return the fitness of samples before and after tuning: of the first, and of as many others as time permits."""
+    read = received(spec)
+    robot = robot_of(read)
+    simulate = simulation_of(read, robot)
+    found: list[Pair] = []
+    until = monotonic() + seconds
+    for sample in samples:
+        parameters = np.array([sample.before or sample.after, sample.after])
+        before, after = simulate(np.array([sample.genome]), parameters)[0].tolist()
+        found.append((known(before) if sample.before else None, known(after)))
+        if monotonic() > until:
+            break
+    return found
+
+
+def _items(experiment: str, samples: Sequence[TunedSample], answers: AnswerCache) -> tuple[Prediction, ...]:
+    pairs: list[Pair | None] = [answers.get(_key(experiment, each)) for each in samples]
+    return tuple(
+        Prediction(
+            repetition=sample.repetition,
+            iteration=sample.iteration,
+            simulated_before=pair[0],
+            simulated_after=pair[1],
+            fitness=sample.fitness,
+        )
+        for sample, pair in zip(samples, pairs, strict=True)
+        if pair is not None
+    )
+
+
+def _key(experiment: str, sample: TunedSample) -> Key:
+    """Return the key of a prediction; a correction may change the sample of an iteration and its simulators."""
+    computed_from = repr((sample.genome, sample.before, sample.after))
+    return "prediction", experiment, sample.repetition, sample.iteration, sha256(computed_from.encode()).hexdigest()

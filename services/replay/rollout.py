@@ -6,7 +6,7 @@ import numpy as np
 
 from gaplab.schemas.replays import ControllerKind, Framing, Interval, Replay, ReplayReadings, ReplayWorld
 from gaplab.services.core.arrays import FloatArray, nearest
-from gaplab.services.replay.sent_specs import SentSpec, received
+from gaplab.services.replay.process import SentSpec, received
 from gaplab.services.replay.shapes import extent_of, feet_of, framing_of, labels, observed_of, shapes_of
 from gaplab.services.specs.assembly import reality_of, simulation_of
 from gaplab.services.specs.robots import robot_of
@@ -32,9 +32,7 @@ class ReplayChoice:
     """The choice of a controller and of a simulator.
 
     Attributes:
-        repetition: number of the repetition, from 0.
         iteration: the iteration that measured the controller; `LAST` for the last one that did.
-        kind: a sample, or the transferred controller.
         simulator: the iteration whose best simulator is used; None for the simulator that chose the controller: of the
             same iteration for a transferred controller, of the iteration before for a sample.
     """
@@ -50,10 +48,6 @@ class ReplayRequest:
     """Everything a subprocess needs to compute a replay, in plain values.
 
     Attributes:
-        experiment: id of the experiment.
-        choice: choice of the controller.
-        spec: resolved spec.
-        genome: genome of the controller.
         simulator: the iteration of the simulator; None if the controller evolved in reality itself.
         parameters: parameters of the simulator.
         simulated: the stored fitness in the simulator, if there is one.

@@ -82,10 +82,7 @@ def extent_of(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the least and the greatest coordinates `(3,)` of a robot; 0 for one without shapes.
 
-    Args:
-        shapes: shapes of its world.
-        positions: `(bodies, 3)`: positions of the bodies.
-        orientations: `(bodies, 4)`: their orientations.
+    Positions `(bodies, 3)` and orientations `(bodies, 4)` are those of its bodies.
     """
     clouds = [np.zeros((0, 3))]
     for shape in shapes:

@@ -8,10 +8,9 @@ import numpy as np
 from gaplab.schemas.measurements import MeasurementSpec
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.traces import AlignedTrace, TracesRead, TracesSpec
-from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.arrays import FloatArray, frozen, known
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
-from gaplab.services.replay.process import RolloutProcess
-from gaplab.services.replay.sent_specs import SentSpec, received, sent
+from gaplab.services.replay.process import RolloutProcess, SentSpec, received, sent
 from gaplab.services.specs.assembly import simulation_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
@@ -173,7 +172,7 @@ def evaluated(
             violations.append(Violation(f"/traces/{place}", digest, message))
         if sensors.size:
             seen = robot.sense(placed(trace, found.lag_s, sensors.times_s, robot.world))
-            readings.append(_told(seen))
+            readings.append(tuple(tuple(map(known, row)) for row in seen.tolist()))
         aligned.append(_beside(digest, trace, expected, found, robot.world))
         doubts += [f"trace {place + 1}: {what}" for what in unlikely(trace, expected, found)]
     if violations:
@@ -185,10 +184,6 @@ def evaluated(
         traces=tuple(aligned),
         doubts=tuple(doubts),
     )
-
-
-def _told(seen: FloatArray) -> tuple[tuple[float | None, ...], ...]:
-    return tuple(tuple(value if isfinite(value) else None for value in row) for row in seen.tolist())
 
 
 def _beside(digest: str, trace: Trace, expected: Trace, alignment: Alignment, world: World) -> AlignedTrace:

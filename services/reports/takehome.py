@@ -20,8 +20,7 @@ from gaplab.services.csv_tables import csv_text
 from gaplab.services.engines.mujoco.plain import LOST, mjcf_of, plain_positions
 from gaplab.services.experiments.reading import read, read_experiment
 from gaplab.services.measuring import motion_files
-from gaplab.services.replay.process import RolloutProcess
-from gaplab.services.replay.sent_specs import SentSpec, received, sent
+from gaplab.services.replay.process import RolloutProcess, SentSpec, received, sent
 from gaplab.services.replay.traces import expected_motion
 from gaplab.services.reports.blocks import render_html
 from gaplab.services.reports.content import Facts, Outcome, facts_of

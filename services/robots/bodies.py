@@ -4,15 +4,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from typing import Any
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.robots.options import ImportOptions, Notes
-from gaplab.services.robots.reading import Source, body_name, mujoco_library
+from gaplab.services.robots.reading import Handle, Source, body_name, mujoco_library
 from gaplab.services.world.world import (
     Body,
     Box,
@@ -36,14 +34,10 @@ DIRECTIONS = np.array([each for each in product((-1, 0, 1), repeat=3) if sum(map
 
 
 def simplify(points_m: FloatArray, most: int) -> tuple[FloatArray, float]:
-    """Return `(k, 3)`, k ≤ `most`: some of the points, and the share of the hull's volume that their hull lacks.
+    """Return `(k, 3)`, k ≤ `most`: some of the points `(n, 3)`, and the share of volume that their hull lacks.
 
     The points that are farthest outside are added one by one, so that the result lies inside, and does not depend on
     chance.
-
-    Args:
-        points_m: `(n, 3)`.
-        most: largest number of vertices.
 
     Raises:
         QhullError: the points lie in a plane.
@@ -87,14 +81,11 @@ def rotation_of(wxyz: FloatArray) -> Rotation:
 
 
 class Shapes:
-    """Shapes of the geoms of a model; the hull of a mesh is computed once.
+    """Shapes of the geoms of a model; the hull of a mesh is computed once, and `planes` are the file's ground."""
 
-    Attributes:
-        planes: numbers of the geoms that are the file's ground.
-    """
-
-    def __init__(self, model: Any, options: ImportOptions, notes: Notes) -> None:  # noqa: ANN401
-        self._model, self._options, self._notes = model, options, notes
+    def __init__(self, source: Source) -> None:
+        model = self._model = source.model
+        self._options, self._notes = source.options, source.notes
         self._hull = cache(self._simplified)
         self.planes = [at for at in range(model.ngeom) if model.geom_bodyid[at] == 0 and self._kind(at) == "plane"]
         self._grounds = [(int(model.geom_contype[at]), int(model.geom_conaffinity[at])) for at in self.planes]
@@ -117,13 +108,7 @@ class Shapes:
         return max(float(model.geom_friction[at, 0]) for at in leading)
 
     def part(self, geom: int, center: FloatArray, turn: Rotation) -> Part | None:
-        """Return the part of a geom; None for one that a World cannot have.
-
-        Args:
-            geom: number of the geom.
-            center: `(3,)`: its place in the frame of the World's body.
-            turn: its rotation there.
-        """
+        """Return the part of a geom, given its place `(3,)` and turn in the World's body; None if a World lacks it."""
         shape = self._shape(geom)
         if shape is None:
             return None
@@ -190,9 +175,7 @@ class Frame:
     """The frame of a World's body at the model's reference angles, in the scene.
 
     Attributes:
-        place_m: `(3,)`.
-        turn: rotation.
-        zero: rotation with its joint at zero.
+        zero: its rotation with its joint at zero.
         back_m: `(3,)`: what leads from `place_m` to the place with its joint at zero.
     """
 
@@ -210,20 +193,20 @@ class Bodies:
         frames: frame of each head.
     """
 
-    def __init__(self, source: Source, options: ImportOptions, notes: Notes) -> None:
+    def __init__(self, source: Source) -> None:
         mujoco, self.model = mujoco_library(), source.model
-        self._options, self._notes = options, notes
+        self._options, self._notes = source.options, source.notes
         self._data = mujoco.MjData(self.model)
         self._data.qpos[:] = self.model.qpos0
         mujoco.mj_kinematics(self.model, self._data)
         weld = self.model.body_weldid
         self.heads = [at for at in range(self.model.nbody) if weld[at] == at and (at > 0 or self.is_held)]
         self.frames = {head: self._frame(head) for head in self.heads}
-        self._shapes = Shapes(self.model, options, notes)
+        self._shapes = Shapes(source)
         for head in self.heads:
             if others := [at for at in self.members(head) if at != head]:
                 names = [body_name(self.model, at) for at in others]
-                notes.lose(f"fixed to {self.name(head)}, and part of it: {{}}", *names)
+                self._notes.lose(f"fixed to {self.name(head)}, and part of it: {{}}", *names)
 
     @property
     def is_held(self) -> bool:
@@ -350,11 +333,11 @@ class Bodies:
                 yield part
 
 
-def joint_name(model: Any, at: int) -> str:  # noqa: ANN401
+def joint_name(model: Handle, at: int) -> str:
     """Return the name of a joint, or one made of its number."""
     return str(model.joint(at).name) or f"joint{at}"
 
 
-def joint_number(model: Any, name: str) -> int:  # noqa: ANN401
+def joint_number(model: Handle, name: str) -> int:
     """Return the number of the joint with a name."""
     return next(at for at in range(model.njnt) if joint_name(model, at) == name)

@@ -13,8 +13,9 @@ import numpy as np
 
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.robots.bodies import joint_name, joint_number
-from gaplab.services.robots.changes import Change, Inertial
+from gaplab.services.robots.comparing import Change, Inertial
 from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.reading import Handle
 from gaplab.services.robots.urdf import find_mesh
 from gaplab.services.robots.xml import Document, Element, child, decoded, numbers, scaled, tree
 
@@ -25,7 +26,7 @@ _FILES = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin
 class MjcfDocument(Document):
     """An MJCF whose values change; files that it includes become part of it."""
 
-    def __init__(self, text: str, folder: Path, model: Any, options: ImportOptions) -> None:  # noqa: ANN401 - MjModel
+    def __init__(self, text: str, folder: Path, model: Handle, options: ImportOptions) -> None:
         super().__init__(text)
         _include(self.root, folder)
         self._model, self._has_motors = model, options.motor is None

@@ -3,14 +3,13 @@
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from typing import Any
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.robots.bodies import FREE, joint_name, joint_number
-from gaplab.services.robots.options import ImportOptions, Notes, listed
-from gaplab.services.robots.reading import Source, mujoco_library
+from gaplab.services.robots.options import Notes, listed
+from gaplab.services.robots.reading import Handle, Source, mujoco_library
 from gaplab.services.world.world import Joint, Motor, PDMotor
 
 REACH_RAD, REACH_M = 0.35, 0.02
@@ -35,13 +34,14 @@ FILTERS = {0, 2, 3}
 """MuJoCo's types of actuators' dynamics that a World may do without: none, and filters of the control."""
 
 
-def with_motors(joints: list[Joint], source: Source, options: ImportOptions, notes: Notes) -> list[Joint]:
+def with_motors(joints: list[Joint], source: Source) -> list[Joint]:
     """Return the joints with their motors: the file's, unless the options say which."""
+    options, notes = source.options, source.notes
     if not joints:
         notes.refuse("no joint of the file moves, and a controller moves joints")
         return joints
     if options.motor is None and not source.is_urdf:
-        return _of_the_file(joints, source, options, notes)
+        return _of_the_file(joints, source)
     chosen = [joint.name for joint in joints if fnmatchcase(joint.name, options.motored)]
     if not chosen:
         notes.refuse(f"no joint has a name like {options.motored!r}; joints: {listed((j.name for j in joints), 30)}")
@@ -51,18 +51,12 @@ def with_motors(joints: list[Joint], source: Source, options: ImportOptions, not
         f"{'each joint gets' if len(chosen) == len(joints) else 'these joints get'} a motor, {why}: {{}}", *chosen
     )
     inertias = joint_inertias(source)
-    _refuse_unused(_OPTIONS[kind], kind, options, notes)
-    return [_driven(j, kind, inertias[j.name], source, options, notes) if j.name in chosen else j for j in joints]
+    _refuse_unused(_OPTIONS[kind], kind, source)
+    return [_driven(j, kind, inertias[j.name], source) if j.name in chosen else j for j in joints]
 
 
-def _driven(
-    joint: Joint,
-    kind: str,
-    inertia: float,
-    source: Source,
-    options: ImportOptions,
-    notes: Notes,
-) -> Joint:
+def _driven(joint: Joint, kind: str, inertia: float, source: Source) -> Joint:
+    options, notes = source.options, source.notes
     torque = options.max_torque or effort(source.model, joint.name)
     unit = "N" if joint.slides else "N·m"
     needed = needed_torque(source.model, joint.name)
@@ -89,8 +83,9 @@ def _driven(
     return replace(joint, motor=PDMotor("torque", torque), swing=torque / 2)
 
 
-def _of_the_file(joints: list[Joint], source: Source, options: ImportOptions, notes: Notes) -> list[Joint]:
-    found = dict(_motors(source.model, {joint.name: joint for joint in joints}, options, notes))
+def _of_the_file(joints: list[Joint], source: Source) -> list[Joint]:
+    notes = source.notes
+    found = dict(_motors(source, {joint.name: joint for joint in joints}))
     if len(found) == 0:
         notes.refuse("the file has no actuators: give all joints a motor with --motor")
     order = [joint.name for joint in joints if joint.name in found]
@@ -99,26 +94,22 @@ def _of_the_file(joints: list[Joint], source: Source, options: ImportOptions, no
     kinds = sorted({joint.motor.follows for joint in found.values() if isinstance(joint.motor, PDMotor)})
     used = {option for kind in kinds for option in _OPTIONS[kind] if (kind, option) != ("velocity", "kp")}
     if kinds:
-        _refuse_unused(used, " or ".join(kinds), options, notes)
+        _refuse_unused(used, " or ".join(kinds), source)
     return [found.get(joint.name, joint) for joint in joints]
 
 
-def _refuse_unused(used: Collection[str], kinds: str, options: ImportOptions, notes: Notes) -> None:
+def _refuse_unused(used: Collection[str], kinds: str, source: Source) -> None:
     """Refuse options that would change nothing."""
-    for name, value in options.model_dump(include={"kp", "kd", "position_gain"}, exclude_defaults=True).items():
+    names = {"kp", "kd", "position_gain"}
+    for name, value in source.options.model_dump(include=names, exclude_defaults=True).items():
         if name not in used:
-            notes.refuse(
+            source.notes.refuse(
                 f"{name}={value:g} has no effect on {kinds} motors: leave it out, or choose others with --motor"
             )
 
 
-def _motors(
-    model: Any,  # noqa: ANN401
-    joints: Mapping[str, Joint],
-    options: ImportOptions,
-    notes: Notes,
-) -> Iterator[tuple[str, Joint]]:
-    seen = set()
+def _motors(source: Source, joints: Mapping[str, Joint]) -> Iterator[tuple[str, Joint]]:
+    model, notes, seen = source.model, source.notes, set()
     for at in range(model.nu):
         name = str(model.actuator(at).name) or f"actuator{at}"
         if int(model.actuator_trntype[at]) != 0:
@@ -133,17 +124,11 @@ def _motors(
             notes.refuse(f"actuator {name} is not a motor, position or velocity actuator")
         else:
             seen.add(joint.name)
-            yield joint.name, _motor(model, at, name, joint, options, notes)
+            yield joint.name, _motor(source, at, name, joint)
 
 
-def _motor(
-    model: Any,  # noqa: ANN401
-    at: int,
-    name: str,
-    joint: Joint,
-    options: ImportOptions,
-    notes: Notes,
-) -> Joint:
+def _motor(source: Source, at: int, name: str, joint: Joint) -> Joint:
+    model, options, notes = source.model, source.options, source.notes
     gear, gain = float(model.actuator_gear[at, 0]), float(model.actuator_gainprm[at, 0])
     _, stiffness, damping = (-float(value) for value in model.actuator_biasprm[at, :3])
     kind = "position" if stiffness > 0 else "velocity" if damping > 0 else "torque"
@@ -167,7 +152,7 @@ def _motor(
     return replace(joint, motor=motor, swing=limit / 2 if kind == "torque" else joint.swing)
 
 
-def _note_units(model: Any, at: int, name: str, factor: float, notes: Notes) -> None:  # noqa: ANN401
+def _note_units(model: Handle, at: int, name: str, factor: float, notes: Notes) -> None:
     if factor != 1:
         notes.lose(f"targets are those of the joint, {factor:g} times MuJoCo's control: {{}}", name)
     for field in ("damping", "dampingpoly", "armature", "delay"):
@@ -178,7 +163,7 @@ def _note_units(model: Any, at: int, name: str, factor: float, notes: Notes) -> 
 _ONE_LIMIT = "torque has the same limit to both sides, where {} is {:g} to {:g}: {{}}"
 
 
-def _note_ranges(model: Any, at: int, name: str, kind: str, notes: Notes) -> None:  # noqa: ANN401
+def _note_ranges(model: Handle, at: int, name: str, kind: str, notes: Notes) -> None:
     """Note the limits that a motor lacks: its targets have none, and its torque has the same to both sides."""
     for field in ("ctrlrange", "forcerange"):
         lower, upper = (float(value) for value in getattr(model, f"actuator_{field}")[at])
@@ -194,7 +179,7 @@ def _note_ranges(model: Any, at: int, name: str, kind: str, notes: Notes) -> Non
         notes.lose(_ONE_LIMIT.format("actuatorfrcrange", lower, upper), name)
 
 
-def _limit(model: Any, at: int, joint: Joint, gear: float, gain: float) -> float | None:  # noqa: ANN401
+def _limit(model: Handle, at: int, joint: Joint, gear: float, gain: float) -> float | None:
     """Return the largest torque on the joint; None if the file has no limit."""
     found = []
     if model.actuator_forcelimited[at]:
@@ -238,14 +223,14 @@ PLACEHOLDER = 50.0
 """Effort, as a multiple of what bears the robot's weight, that stands in files whose author did not know it."""
 
 
-def effort(model: Any, name: str) -> float | None:  # noqa: ANN401
+def effort(model: Handle, name: str) -> float | None:
     """Return the largest effort of a joint in the file, N·m or N; None if it has none."""
     at = joint_number(model, name)
     largest = float(np.abs(model.jnt_actfrcrange[at]).max())
     return largest if model.jnt_actfrclimited[at] and largest > 0 else None
 
 
-def needed_torque(model: Any, name: str) -> float:  # noqa: ANN401
+def needed_torque(model: Handle, name: str) -> float:
     """Return half the torque that bears the robot at the farthest point of the limb, as legs share the weight."""
     mujoco = mujoco_library()
     data = mujoco.MjData(model)
@@ -270,7 +255,7 @@ def joint_inertias(source: Source) -> Mapping[str, float]:
     return {joint_name(model, int(model.dof_jntid[dof])): 1 / float(inverse[dof]) for dof in dofs}
 
 
-def _inverse_on_a_fixed_base(model: Any) -> FloatArray:  # noqa: ANN401
+def _inverse_on_a_fixed_base(model: Handle) -> FloatArray:
     """Return `(nv,)`: the inverse inertia of each degree of freedom, 0 for the six of the base."""
     mujoco = mujoco_library()
     data = mujoco.MjData(model)

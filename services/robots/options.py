@@ -89,11 +89,7 @@ MOST_NAMES = 40
 
 
 class Notes:
-    """Lines about one import, in the order of its steps.
-
-    Attributes:
-        refused: why the file cannot be imported, a sentence each.
-    """
+    """Lines about one import, in the order of its steps; what is `refused` has no place in a World."""
 
     def __init__(self) -> None:
         self._lost: dict[str, list[str]] = {}
@@ -105,12 +101,7 @@ class Notes:
         return [_fitting(line, names) for line, names in self._lost.items()]
 
     def lose(self, line: str, *names: str) -> None:
-        """Note what is lost or changed, once.
-
-        Args:
-            line: sentence; `{}` in it becomes the names of all notes with the same line.
-            names: names of the bodies, joints or others that it is about.
-        """
+        """Note once what is lost or changed; `{}` in the line becomes the names of all notes with the same line."""
         known = self._lost.setdefault(line, [])
         known += [name for name in names if name not in known]
 

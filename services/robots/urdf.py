@@ -1,9 +1,12 @@
 """URDF as MuJoCo can read it: with the paths of its meshes, and with notes of what MuJoCo drops or takes otherwise.
 
+Names, what joins what, and numbers are checked before, as other readers take wrong ones silently for others.
+
 Source: https://wiki.ros.org/urdf/XML, https://mujoco.readthedocs.io/en/stable/modeling.html#urdf-extensions
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
@@ -12,8 +15,7 @@ from typing import Any
 
 from lxml import etree
 
-from gaplab.services.robots.options import ImportOptions, Notes
-from gaplab.services.robots.urdf_checks import check_structure, check_values
+from gaplab.services.robots.options import ImportOptions, Notes, listed
 from gaplab.services.robots.xml import Element, child, decoded, tree
 
 _LOST = {
@@ -38,7 +40,6 @@ class Urdf:
         masses_kg: masses of the links that have one.
         massless: links without <inertial>, which have no mass.
         speeds: largest speed of each joint that has one, rad/s or m/s.
-        name: name of the robot in the file.
         fixed: whether the file says that the base never moves.
     """
 
@@ -58,14 +59,14 @@ def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Ur
         InvalidRobot: a name, a link or a number is wrong, or a mesh is missing; with every reason.
     """
     root = tree(text)
-    refuse_xacro(root, notes)
+    _refuse_xacro(root, notes)
     notes.check()
-    check_structure(root, notes)
-    check_values(root, notes)
+    _check_structure(root, notes)
+    _check_values(root, notes)
     notes.check()
     _lock(root, options, notes)
-    is_held = without_the_scene(root, notes)
-    complete_limits(root, notes)
+    is_held = _without_the_scene(root, notes)
+    _complete_limits(root, notes)
     _refuse(root, notes)
     _note_losses(root, notes)
     if not options.visuals:
@@ -150,11 +151,9 @@ def _resolve_meshes(root: Element, file: Path, notes: Notes) -> Iterator[tuple[s
 
 
 def find_mesh(given: str, folder: Path) -> Path | None:
-    """Return the file of a mesh: beside the URDF, or as ROS finds a package, in a folder above it; None if none is.
+    """Return the file of a mesh that a URDF of this folder names, like `package://a1_description/meshes/trunk.stl`.
 
-    Args:
-        given: the name in the URDF, like `package://a1_description/meshes/trunk.stl`.
-        folder: folder of the URDF.
+    It is beside the URDF, or as ROS finds a package, in a folder above it; None if there is none.
     """
     scheme, _, rest = given.rpartition("://")
     if scheme == "file":
@@ -203,7 +202,7 @@ _SCENE = "world"
 """Name of the link to which a file fixes a robot that never moves, as Gazebo has it."""
 
 
-def refuse_xacro(root: Element, notes: Notes) -> None:
+def _refuse_xacro(root: Element, notes: Notes) -> None:
     """Refuse a file whose macros were not expanded: MuJoCo drops what is inside of them."""
     tags = [element for element in root.iter() if "xacro" in str(element.tag)]
     values = [each for each in root.iter() for value in each.attrib.values() if "${" in value or "$(" in value]
@@ -213,7 +212,7 @@ def refuse_xacro(root: Element, notes: Notes) -> None:
         )
 
 
-def complete_limits(root: Element, notes: Notes) -> None:
+def _complete_limits(root: Element, notes: Notes) -> None:
     """Let a joint with one limit have 0 as the other one."""
     for joint in root.findall("joint"):
         limit = joint.find("limit")
@@ -225,7 +224,7 @@ def complete_limits(root: Element, notes: Notes) -> None:
             notes.lose(f"without a limit called {missing[0]}, which is then 0: {{}}", joint.get("name", ""))
 
 
-def without_the_scene(root: Element, notes: Notes) -> bool:
+def _without_the_scene(root: Element, notes: Notes) -> bool:
     """Remove an empty root link from which the base floats, and return whether the file fixes the base to the world."""
     carried = {child.get("link") for child in root.iterfind("joint/child")}
     roots = [link for link in root.findall("link") if link.get("name") not in carried]
@@ -241,3 +240,156 @@ def without_the_scene(root: Element, notes: Notes) -> bool:
         return False
     notes.lose(f"the base never moves, as joint {held[0].get('name', '')} fixes it to the link {name}")
     return True
+
+
+_TYPES = ("revolute", "continuous", "prismatic", "fixed")
+"""Types of joints that a World has; the last one does not move."""
+
+_OTHER_TYPES = ("floating", "planar", "spherical")
+"""Types of joints that are refused by their names, unless they are locked."""
+
+
+def _check_structure(root: Element, notes: Notes) -> None:
+    """Refuse links and joints without a name or with that of another, and joints that join no two links of the file."""
+    links, joints = root.findall("link"), root.findall("joint")
+    for elements in (links, joints):
+        _check_names(elements, notes)
+    for inertial in root.iterfind("link/inertial"):
+        for tag in ("mass", "inertia"):
+            if inertial.find(tag) is None:
+                notes.refuse(f"line {inertial.sourceline}: link {inertial.getparent().get('name', '')}: no <{tag}>")
+    names, carried = list(dict.fromkeys(filter(None, (link.get("name") for link in links)))), dict[str, Element]()
+    for joint in joints:
+        kind = joint.get("type")
+        if kind not in _TYPES + _OTHER_TYPES:
+            given = "no type" if kind is None else f"the type {kind!r}"
+            notes.refuse(f"{_place(joint)} has {given}; permitted: {', '.join(_TYPES)}")
+        ends = {role: _end(joint, role, names, notes) for role in ("parent", "child")}
+        _check_child(joint, ends, carried, notes)
+
+
+def _check_names(elements: Sequence[Element], notes: Notes) -> None:
+    first = dict[str, Element]()
+    for element in elements:
+        name = element.get("name")
+        if not name:
+            notes.refuse(f"line {element.sourceline}: a {element.tag} has no name")
+        elif name in first:
+            notes.refuse(f"{_place(element)} has the name of that in line {first[name].sourceline}; rename one of them")
+        else:
+            first[name] = element
+
+
+def _end(joint: Element, role: str, links: Sequence[str], notes: Notes) -> str | None:
+    """Return the link at one end of a joint; None if the file has none."""
+    end = joint.find(role)
+    given = None if end is None else end.get("link")
+    if given in links:
+        return str(given)
+    line = (joint if end is None else end).sourceline
+    wrong = f"no {role} link is given" if given is None else f"{role} link {given!r} is not in the file"
+    notes.refuse(f"line {line}: joint {joint.get('name', '')}: {wrong}; links: {listed(links, 30)}")
+    return None
+
+
+def _check_child(joint: Element, ends: Mapping[str, str | None], carried: dict[str, Element], notes: Notes) -> None:
+    """Refuse a link that is its own parent, or the child of two joints; add it to those that a joint carries."""
+    child = ends["child"]
+    if child is None:
+        return
+    if child == ends["parent"]:
+        notes.refuse(f"{_place(joint)} joins the link {child} to itself")
+    elif child in carried:
+        where = f"joint {carried[child].get('name', '')} in line {carried[child].sourceline}"
+        notes.refuse(f"{_place(joint)}: child link {child!r} is already that of {where}; a link has one parent")
+    else:
+        carried[child] = joint
+
+
+def _place(element: Element) -> str:
+    return f"line {element.sourceline}: {element.tag} {element.get('name', '')}"
+
+
+_ANY, _AT_LEAST_0, _ABOVE_0 = "any", "at least 0", "above 0"
+
+_NUMBERS = {
+    "mass": {"value": (1, _AT_LEAST_0)},
+    "inertia": {
+        name: (1, _AT_LEAST_0 if name in {"ixx", "iyy", "izz"} else _ANY)
+        for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    },
+    "origin": dict.fromkeys(("xyz", "rpy"), (3, _ANY)),
+    "axis": {"xyz": (3, _ANY)},
+    "box": {"size": (3, _ABOVE_0)},
+    "sphere": {"radius": (1, _ABOVE_0)},
+    "cylinder": dict.fromkeys(("radius", "length"), (1, _ABOVE_0)),
+    "capsule": dict.fromkeys(("radius", "length"), (1, _ABOVE_0)),
+    "mesh": {"scale": (3, _ANY)},
+    "limit": dict.fromkeys(("lower", "upper"), (1, _ANY)) | dict.fromkeys(("effort", "velocity"), (1, _AT_LEAST_0)),
+    "dynamics": dict.fromkeys(("damping", "friction"), (1, _AT_LEAST_0)),
+}
+"""How many numbers an attribute has, and which are permitted, by its element; above 0 are sizes of what touches."""
+
+
+def _check_values(root: Element, notes: Notes) -> None:
+    """Refuse what is missing, not a finite number or out of its range, and limits in the wrong order; name each line.
+
+    A joint whose limits are equal is free in MuJoCo, which is noted.
+    """
+    for joint in root.findall("joint"):
+        for limit in joint.findall("limit"):
+            _check_limits(joint, limit, notes)
+    for element in root.iter(*_NUMBERS):
+        for name, (count, permitted) in _NUMBERS[element.tag].items():
+            if reason := _wrong(element, name, count, permitted):
+                notes.refuse(f"line {element.sourceline}: {_owner(element)}{element.tag} {reason}")
+
+
+def _wrong(element: Element, name: str, count: int, permitted: str) -> str | None:
+    """Return what is wrong with an attribute, beginning with its name; None if nothing."""
+    given, is_used = element.get(name), _is_used(element)
+    if given is None:
+        is_required = permitted == _ABOVE_0 or element.tag in {"mass", "inertia"}
+        return f"has no {name}" if is_required and is_used else None
+    found = list(_parsed(given))
+    reason = None
+    if len(found) != count or not all(map(math.isfinite, found)):
+        reason = f"not {count} finite numbers" if count > 1 else "not a finite number"
+    elif permitted == _AT_LEAST_0 and found[0] < 0:
+        reason = "below 0"
+    elif permitted == _ABOVE_0 and is_used and min(found) <= 0:
+        reason = f"not {count} numbers above 0" if count > 1 else "not above 0"
+    elif element.tag == "axis" and not any(found) and element.getparent().get("type") in _TYPES[:3]:
+        reason = "not a direction; give one like '0 1 0'"
+    return reason and f"{name} {given!r} is {reason}"
+
+
+def _is_used(element: Element) -> bool:
+    """Return whether an element is of a link's inertial or collision, and not of an extension or of what is seen."""
+    around = {each.tag for each in element.iterancestors()}
+    return "link" in around and not around.isdisjoint({"inertial", "collision"}) and "gazebo" not in around
+
+
+def _parsed(given: str) -> Iterator[float]:
+    for word in given.split():
+        try:
+            yield float(word)
+        except ValueError:
+            yield math.nan
+
+
+def _check_limits(joint: Element, limit: Element, notes: Notes) -> None:
+    if joint.get("type") not in {"revolute", "prismatic"}:
+        return
+    lower, upper = (next(_parsed(limit.get(name, "0")), math.nan) for name in ("lower", "upper"))
+    if lower > upper:
+        given = f"joint {joint.get('name', '')} has limits {lower:g} to {upper:g}"
+        notes.refuse(f"line {limit.sourceline}: {given}; the smaller is first")
+    elif lower == upper:
+        notes.lose("joints whose limits are equal have none: {}", joint.get("name", ""))
+
+
+def _owner(element: Element) -> str:
+    """Return the link or joint that an element is part of, for sentences."""
+    owner = next((each for each in element.iterancestors("link", "joint")), None)
+    return "" if owner is None else f"{owner.tag} {owner.get('name', '')}: "

@@ -10,7 +10,7 @@ from typing import Any, NoReturn, TypeAlias, TypeVar, cast
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.engines.mujoco.plain import LOST, mjcf_of
 from gaplab.services.robots.bodies import Bodies
-from gaplab.services.robots.changes import Change, Place, changes, inertials
+from gaplab.services.robots.comparing import Change, Place, changes, inertials
 from gaplab.services.robots.documents import MjcfDocument, UrdfDocument
 from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions, Notes
@@ -67,13 +67,9 @@ Accept: TypeAlias = Callable[[World], None]
 
 @dataclass(frozen=True)
 class Tuning:
-    """What is written into a file.
+    """What is written into a file: the robot as imported, its world with tuned values, and comments for its start.
 
-    Attributes:
-        robot: the robot as it was imported.
-        world: its world with the tuned values.
-        comments: lines for the start of the file.
-        partial: whether values that the format has no place for are left out, instead of refused.
+    If it is partial, values that the format has no place for are left out, instead of refused.
     """
 
     robot: RobotFile
@@ -84,11 +80,6 @@ class Tuning:
 
 def write_json(tuning: Tuning, output: Path, accept: Accept) -> WrittenFile:
     """Write a robot file whose world is the tuned one; its name ends in _tuned, so the robot keeps its own.
-
-    Args:
-        tuning: the tuned values.
-        output: the file to write.
-        accept: check of the new file's world.
 
     Raises:
         InvalidRobot: the world is not the same after it is read again.
@@ -123,11 +114,7 @@ def write_plain(tuning: Tuning, output: Path) -> WrittenFile:
 def write_xml(tuning: Tuning, original: Path, output: Path, accept: Accept) -> WrittenFile:
     """Write a copy of the file that a robot was imported from, with tuned values.
 
-    Args:
-        tuning: the tuned values.
-        original: the file that the robot was imported from.
-        output: the file to write.
-        accept: check of the new file's world, with the values that are not of the format as they were tuned.
+    The world that is to be accepted is that of the new file, with the values that are not of the format as tuned.
 
     Raises:
         InvalidRobot: the original is another file, the format has no place for a value, or the new file gives another
@@ -143,7 +130,7 @@ def write_xml(tuning: Tuning, original: Path, output: Path, accept: Accept) -> W
     wanted = changes(robot.world, tuned)
     given = _given(options, is_urdf=source.is_urdf)
     open_ = [change for change in wanted if change.place[2] not in given]
-    written = _write(document, Bodies(source, options, notes), open_, (robot.world, tuned))
+    written = _write(document, Bodies(source), open_, (robot.world, tuned))
     left_out = tuple(change for change in wanted if change.place not in written)
     if left_out and not tuning.partial:
         _refuse(left_out, given, "URDF" if source.is_urdf else "MJCF")

@@ -30,11 +30,7 @@ def decoded(content: bytes) -> str:
 
 
 class Document:
-    """An XML text as a tree.
-
-    Attributes:
-        root: its root.
-    """
+    """An XML text as a tree, from its `root`."""
 
     def __init__(self, text: str) -> None:
         self._line_end = "\r\n" if "\r\n" in text else "\n"

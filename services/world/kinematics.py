@@ -3,11 +3,11 @@
 They are used as the engine returns them. scipy's `Rotation` would normalise the single precision of PhysX, which moves
 bodies by 1e-8, and refuses the nan of failed physics.
 
-A controller in a loop asks for heights in every period, so `Clearances` carries only the upward direction, as each body
-sees it, from joint to joint. Each row of its results depends on the same row of the arguments alone, to the last bit.
+Each row of the results depends on the same row of the arguments alone, to the last bit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,21 +21,70 @@ TOUCHING_M = 0.002
 def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return positions `(k, bodies, 3)` and orientations `(k, bodies, 4)` of the bodies' frames, in the world's order.
 
-    Args:
-        world: bodies and joints.
-        poses: `(k, 7)`: poses of the base.
-        angles_rad: `(k, joints)`, in the world's order; m for a joint that slides.
+    Poses of the base are `(k, 7)`; angles `(k, joints)` are in the world's order, in m for a joint that slides.
     """
-    places = {body.name: place for place, body in enumerate(world.bodies)}
-    positions = np.empty((len(poses), len(places), 3))
-    orientations = np.empty((len(poses), len(places), 4))
-    positions[:, 0], orientations[:, 0] = poses[:, :3], poses[:, 3:]
-    for number in _outwards(world):
-        joint, angles = world.joints[number], angles_rad[:, number]
-        parent, child = places[joint.parent], places[joint.child]
-        frame = positions[:, parent], orientations[:, parent]
-        positions[:, child], orientations[:, child] = _carried(joint, *frame, angles)
-    return positions, orientations
+    return Skeleton(world)(poses, angles_rad)
+
+
+class Skeleton:
+    """The joints of a world in groups, from the base outwards: the children of a group are placed at once."""
+
+    def __init__(self, world: World) -> None:
+        places, depths = {body.name: place for place, body in enumerate(world.bodies)}, {world.bodies[0].name: 0}
+        groups: dict[tuple[int, bool, bool], list[int]] = {}
+        for number in outwards(world):
+            joint = world.joints[number]
+            depth = depths[joint.child] = depths[joint.parent] + 1
+            groups.setdefault((depth, joint.slides, joint.turn != UNTURNED), []).append(number)
+        self._size = len(places)
+        self._groups = []
+        for _, numbers in sorted(groups.items()):
+            joints = [world.joints[number] for number in numbers]
+            parents, children = [places[joint.parent] for joint in joints], [places[joint.child] for joint in joints]
+            self._groups.append((_Joints.of(joints), numbers, parents, children))
+
+    def __call__(self, poses: FloatArray, angles_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what `body_poses` does."""
+        positions, turns = np.empty((len(poses), self._size, 3)), np.empty((len(poses), self._size, 4))
+        positions[:, 0], turns[:, 0] = poses[:, :3], poses[:, 3:]
+        for joints, numbers, parents, children in self._groups:
+            carried = joints.carried(positions[:, parents], turns[:, parents], angles_rad[:, numbers])
+            positions[:, children], turns[:, children] = carried
+        return positions, turns
+
+
+class _Joints(NamedTuple):
+    """Joints that slide or turn, all of them, and have turned frames, all or none."""
+
+    origins: FloatArray
+    turns: FloatArray | None
+    axes: FloatArray
+    slide: bool
+
+    @classmethod
+    def of(cls, joints: Sequence[Joint]) -> "_Joints":
+        """Return joints that are alike."""
+        turns = np.array([joint.turn for joint in joints]) if joints[0].turn != UNTURNED else None
+        origins, axes = np.array([joint.origin_m for joint in joints]), np.array([joint.axis for joint in joints])
+        return cls(origins, turns, axes, joints[0].slides)
+
+    def carried(self, position: FloatArray, turn: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return positions `(k, j, 3)` and orientations `(k, j, 4)` of the children, given those of the parents."""
+        position = position + rotated(turn, self.origins)
+        if self.turns is not None:
+            turn = product(turn, self.turns)
+        if self.slide:
+            return position + angles[..., None] * rotated(turn, self.axes), turn
+        return position, product(turn, about(self.axes, angles))
+
+
+def outwards(world: World, parent: str | None = None) -> Iterator[int]:
+    """Yield the numbers of the joints from a body outwards, depth first; by default from the base."""
+    parent = world.bodies[0].name if parent is None else parent
+    for number, joint in enumerate(world.joints):
+        if joint.parent == parent:
+            yield number
+            yield from outwards(world, joint.child)
 
 
 def observed_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> FloatArray:
@@ -45,10 +94,10 @@ def observed_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> F
     """
     if observes_base(world):
         return poses
-    position, turn = poses[:, :3], poses[:, 3:]
-    for place in reversed(chain(world, world.observed)):
-        position, turn = _carried(world.joints[place], position, turn, angles_rad[:, place])
-    return np.hstack([position, turn])
+    position, turn = poses[:, None, :3], poses[:, None, 3:]
+    for number in reversed(chain(world, world.observed)):
+        position, turn = _Joints.of([world.joints[number]]).carried(position, turn, angles_rad[:, [number]])
+    return np.concatenate([position, turn], axis=-1)[:, 0]
 
 
 def chain(world: World, body: str) -> list[int]:
@@ -71,31 +120,6 @@ def from_start(world: World, orientations: FloatArray) -> FloatArray:
     if world.start_turn == UNTURNED:
         return orientations
     return product(orientations, inverse(np.array(world.start_turn)))
-
-
-def _outwards(world: World) -> tuple[int, ...]:
-    """Return the numbers of the joints, each after the joint of its parent, and else in the world's order."""
-    placed = {world.bodies[0].name}
-    order: list[int] = []
-    left = list(enumerate(world.joints))
-    while left:
-        for number, joint in left:
-            if joint.parent in placed:
-                placed.add(joint.child)
-                order.append(number)
-        left = [pair for pair in left if pair[1].child not in placed]
-    return tuple(order)
-
-
-def _carried(joint: Joint, position: FloatArray, turn: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return position `(k, 3)` and orientation `(k, 4)` of a joint's child, given those of its parent."""
-    position = position + rotated(turn, np.array(joint.origin_m))
-    if joint.turn != UNTURNED:
-        turn = product(turn, np.array(joint.turn))
-    axis = np.array(joint.axis)
-    if joint.slides:
-        return position + angles[:, None] * rotated(turn, axis), turn
-    return position, product(turn, about(axis, angles))
 
 
 def lowest_m(world: World, turn: FloatArray) -> float:
@@ -121,10 +145,8 @@ def tilted_pose(world: World, tilt_rad: tuple[float, float]) -> FloatArray:
 def clearances_m(body: Body, positions: FloatArray, orientations: FloatArray) -> FloatArray:
     """Return `(k,)`: the height of the lowest point of a body above the ground, negative inside it.
 
-    Args:
-        body: body with its shapes; those that collide count, or all if none collides.
-        positions: `(k, 3)`: positions of the body's frame.
-        orientations: `(k, 4)`: orientations of the body's frame.
+    The shapes that collide count, or all if none collides. Positions `(k, 3)` and orientations `(k, 4)` are those of
+    the body's frame.
     """
     parts = [part for part in body.parts if part.collides] or body.parts
     lowest = [_lowest(part, positions, orientations) for part in parts]
@@ -162,9 +184,9 @@ def _rise(turn: FloatArray) -> FloatArray:
 
 
 def about(axis: FloatArray, angles_rad: FloatArray) -> FloatArray:
-    """Return `(k, 4)`: rotations by `(k,)` angles about a unit vector `(3,)`."""
-    half = angles_rad[:, None] / 2
-    return np.hstack([np.sin(half) * axis, np.cos(half)])
+    """Return `(..., 4)`: rotations by angles `(...)` about unit vectors `(..., 3)`."""
+    half = angles_rad[..., None] / 2
+    return np.concatenate([np.sin(half) * axis, np.cos(half)], axis=-1)
 
 
 def product(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -196,125 +218,14 @@ def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
 
 
 class Clearances:
-    """Heights of the lowest points of some bodies above the ground, negative inside it.
-
-    Args:
-        world: bodies and joints.
-        bodies: b of its bodies that touch the ground.
-    """
+    """Heights of the lowest points of b bodies above the ground, as of `clearances_m`."""
 
     def __init__(self, world: World, bodies: Sequence[Body]) -> None:
-        self._levels = [_Level(world, numbers) for numbers in _levels(world)]
-        self._size = len(world.bodies)
-        self._parts = _Parts(world, bodies)
+        places = {body.name: place for place, body in enumerate(world.bodies)}
+        self._skeleton, self._bodies = Skeleton(world), [(body, places[body.name]) for body in bodies]
 
     def __call__(self, poses: FloatArray, angles_rad: FloatArray) -> FloatArray:
-        """Return `(n, b)`, m.
-
-        Args:
-            poses: `(n, 7)`: poses of the base.
-            angles_rad: `(n, joints)`, in the world's order; m for a joint that slides.
-        """
-        ups, heights = np.empty((len(poses), self._size, 3)), np.empty((len(poses), self._size))
-        x, y, z, w = poses[:, 3], poses[:, 4], poses[:, 5], poses[:, 6]
-        ups[:, 0, 0], ups[:, 0, 1], ups[:, 0, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-        heights[:, 0] = poses[:, 2]
-        for level in self._levels:
-            level.carry(ups, heights, angles_rad)
-        return self._parts.lowest(ups, heights)
-
-
-class _Level:
-    """Joints that are equally far from the base, so that their children are placed at once."""
-
-    def __init__(self, world: World, numbers: Sequence[int]) -> None:
-        joints = [world.joints[number] for number in numbers]
-        places = {body.name: place for place, body in enumerate(world.bodies)}
-        self._numbers = list(numbers)
-        self._parents = [places[joint.parent] for joint in joints]
-        self._children = [places[joint.child] for joint in joints]
-        self._origins = np.array([joint.origin_m for joint in joints])
-        self._turns = np.array([rotated(np.array(joint.turn), np.eye(3)) for joint in joints])
-        self._axes = np.array([joint.axis for joint in joints])
-        self._slides = np.array([joint.slides for joint in joints])
-
-    def carry(self, ups: FloatArray, heights: FloatArray, angles_rad: FloatArray) -> None:
-        """Write the rows of the children of `(n, bodies, 3)` and `(n, bodies)`, given those of their parents."""
-        up, axes, angles = ups[:, self._parents], self._axes, angles_rad[:, self._numbers]
-        height = heights[:, self._parents] + _dot(up, self._origins)
-        up = _seen_from(up, self._turns)
-        along = _dot(up, axes)
-        turned = np.where(self._slides, 0.0, angles)
-        cos, sin = np.cos(turned), np.sin(turned)
-        lifted = along * (1 - cos)
-        u, v, w = up[..., 0], up[..., 1], up[..., 2]
-        x, y, z = axes[:, 0], axes[:, 1], axes[:, 2]
-        found = np.empty_like(up)
-        found[..., 0] = u * cos - (y * w - z * v) * sin + x * lifted
-        found[..., 1] = v * cos - (z * u - x * w) * sin + y * lifted
-        found[..., 2] = w * cos - (x * v - y * u) * sin + z * lifted
-        ups[:, self._children] = found
-        heights[:, self._children] = height + np.where(self._slides, angles, 0.0) * along
-
-
-class _Parts:
-    def __init__(self, world: World, bodies: Sequence[Body]) -> None:
-        places = {body.name: place for place, body in enumerate(world.bodies)}
-        by_body = [[part for part in body.parts if part.collides] for body in bodies]
-        parts = [part for group in by_body for part in group]
-        self._firsts = np.cumsum([0, *(len(group) for group in by_body)])[:-1]
-        self._places = [places[body.name] for body, group in zip(bodies, by_body, strict=True) for _ in group]
-        self._centers = np.array([part.center_m for part in parts]).reshape(-1, 3)
-        self._turns = np.array([rotated(np.array(part.turn), np.eye(3)) for part in parts]).reshape(-1, 3, 3)
-        sizes = np.array([_sizes(part) for part in parts]).reshape(-1, 5)
-        self._halves, self._radii, self._discs = sizes[:, :3], sizes[:, 3], sizes[:, 4]
-        self._hulls = [
-            (i, np.array(part.shape.points_m)) for i, part in enumerate(parts) if isinstance(part.shape, Hull)
-        ]
-
-    def lowest(self, ups: FloatArray, heights: FloatArray) -> FloatArray:
-        """Return `(n, b)`: the heights of the lowest points of the bodies."""
-        if not self._places:
-            return np.empty((len(ups), 0))
-        up = ups[:, self._places]
-        center = heights[:, self._places] + _dot(up, self._centers)
-        up = _seen_from(up, self._turns)
-        level = np.sqrt(np.maximum(1 - up[..., 2] * up[..., 2], 0.0))
-        reach = _dot(np.abs(up), self._halves) + self._radii + self._discs * level
-        for place, points in self._hulls:
-            reach[:, place] = -_dot(up[:, place, None], points).min(axis=1)
-        return np.asarray(np.minimum.reduceat(center - reach, self._firsts, axis=1))
-
-
-def _levels(world: World) -> list[list[int]]:
-    """Return the numbers of the joints by the number of joints between them and the base."""
-    levels: dict[int, list[int]] = {}
-    for number, joint in enumerate(world.joints):
-        levels.setdefault(len(chain(world, joint.parent)), []).append(number)
-    return [levels[depth] for depth in sorted(levels)]
-
-
-def _sizes(part: Part) -> tuple[float, ...]:
-    """Return half the edges, the radius of a ball around them, and that of a disc: 0 for a hull."""
-    match part.shape:
-        case Box(size_m=(x, y, z)):
-            return x / 2, y / 2, z / 2, 0.0, 0.0
-        case Capsule(radius_m=radius, length_m=length):
-            return 0.0, 0.0, length / 2, radius, 0.0
-        case Cylinder(radius_m=radius, length_m=length):
-            return 0.0, 0.0, length / 2, 0.0, radius
-        case Hull():
-            return 0.0, 0.0, 0.0, 0.0, 0.0
-        case _:
-            return 0.0, 0.0, 0.0, part.shape.radius_m, 0.0
-
-
-def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return `(...)`: the dot products of vectors `(..., 3)`, in plain sums."""
-    products = one * other
-    return np.asarray(products[..., 0] + products[..., 1] + products[..., 2])
-
-
-def _seen_from(vectors: FloatArray, axes: FloatArray) -> FloatArray:
-    """Return `(n, m, 3)`: vectors in frames whose axes are the rows of `(m, 3, 3)`."""
-    return np.stack([_dot(vectors, axes[:, 0]), _dot(vectors, axes[:, 1]), _dot(vectors, axes[:, 2])], axis=-1)
+        """Return `(n, b)`, m, given poses of the base `(n, 7)` and angles `(n, joints)`, as of `body_poses`."""
+        positions, turns = self._skeleton(poses, angles_rad)
+        heights = [clearances_m(body, positions[:, place], turns[:, place]) for body, place in self._bodies]
+        return np.reshape(heights, (len(heights), len(poses))).T

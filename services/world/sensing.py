@@ -202,12 +202,7 @@ SEED = 0
 
 
 def stream_of(genome: Genome, purpose: str) -> Generator:
-    """Return the random generator of a genome `(g,)`, at the address of its digest.
-
-    Args:
-        genome: its numbers, to the last bit.
-        purpose: use of the numbers; different purposes are independent.
-    """
+    """Return the random generator of a genome `(g,)`, at the address of its digest; purposes are independent."""
     digest = sha256(np.ascontiguousarray(genome, dtype=np.float64).tobytes()).hexdigest()
     return stream(SEED, purpose, digest, 0)  # the 0 is part of the address: without it, all draws would change
 

@@ -158,9 +158,7 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None) -> Alignmen
 def _onset(trace: Trace, *, at_once: bool = False) -> float | None:
     """Return when a base begins to move, on the clock of its trace; None if it does not, or not after rest.
 
-    Args:
-        trace: of the base.
-        at_once: whether the motion begins with the trace, so that there is no rest.
+    There is no rest if the motion begins `at_once`, with the trace.
     """
     resting = trace.times_s <= trace.times_s[0] + (0.0 if at_once else REST_S)
     away_m = np.linalg.norm(trace.positions_m - trace.positions_m[resting].mean(axis=0), axis=1)
@@ -173,15 +171,9 @@ def _onset(trace: Trace, *, at_once: bool = False) -> float | None:
 
 
 def placed(trace: Trace, lag_s: float, times_s: FloatArray, world: World) -> Trajectory:
-    """Return the poses of a trace at times `(t,)` of the motion, placed and turned as in a simulation.
+    """Return the poses of a trace at times `(t,)` of the motion, which began at the lag, as in a simulation.
 
     There a motion begins above the origin, with the base turned as `world.start_turn`; only a turn about z is removed.
-
-    Args:
-        trace: as recorded.
-        lag_s: when the motion began.
-        times_s: seconds since then.
-        world: the robot's.
     """
     seen = trace.at(np.clip(times_s + lag_s, trace.times_s[0], trace.times_s[-1]))
     start = trace.at(frozen([lag_s]))
@@ -226,12 +218,8 @@ def read_trace(text: str, pointer: str) -> Trace:
 
     A heading may state another unit than seconds and metres: `x [mm]`; further columns do not matter.
 
-    Args:
-        text: content of the file.
-        pointer: where the request names the file, for errors.
-
     Raises:
-        InvalidSpec: with every error, each with its line and column.
+        InvalidSpec: with every error, each with its line and column, at the pointer.
     """
     header, rows, lines = read_csv(text)
     if lines > MOST_LINES:
@@ -308,10 +296,7 @@ def _nonsense(table: FloatArray) -> Iterator[str]:
 def unlikely(trace: Trace, expected: Trace, alignment: Alignment) -> Iterator[str]:
     """Yield what is unlikely about a trace, each as a clause.
 
-    Args:
-        trace: as recorded.
-        expected: what a simulator expects; nan if its physics failed.
-        alignment: when the motion began.
+    The expected motion, of a simulator, is nan if its physics failed.
     """
     inside = (trace.times_s >= alignment.lag_s) & (trace.times_s <= alignment.lag_s + expected.times_s[-1])
     yield from _holes(trace.times_s[inside], np.hstack([trace.positions_m, trace.orientations])[inside])

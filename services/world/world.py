@@ -3,7 +3,6 @@
 SI units throughout; lengths of boxes are full edges, not halves; z points up; the ground is the plane z = 0.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
@@ -70,13 +69,7 @@ Shape: TypeAlias = Annotated[Box | Sphere | Capsule | Cylinder | Hull, Field(dis
 
 @dataclass(frozen=True)
 class Part:
-    """A shape on a body.
-
-    Attributes:
-        center_m: place of the shape's frame, in the frame of the body.
-        turn: rotation of the shape's frame.
-        collides: true if it collides with the ground.
-    """
+    """A shape on a body: place and rotation of its frame in that of the body, and whether it touches the ground."""
 
     shape: Shape
     center_m: Vector = ORIGIN
@@ -103,12 +96,7 @@ class Material:
 
 @dataclass(frozen=True)
 class Inertia:
-    """The inertia of a body about its centre of mass.
-
-    Attributes:
-        moments_kg_m2: principal moments.
-        turn: rotation of the principal axes, in the frame of the body.
-    """
+    """The inertia of a body about its centre of mass: principal moments, and the rotation of their axes in the body."""
 
     moments_kg_m2: Vector
     turn: Quaternion = UNTURNED
@@ -299,11 +287,9 @@ class World:
         return replace(self, material=Material())
 
     def edited(self, name: str, **changes: Any) -> "World":  # noqa: ANN401 - values of fields
-        """Return the world with other values of fields that engines may set in place.
+        """Return the world with other values of its fields, which engines may set in place.
 
-        Args:
-            name: name of the edited field, like `body.mass_kg`.
-            changes: new values of the world's own fields.
+        The name is that of the edited field, like `body.mass_kg`.
         """
         return replace(self, **changes, origin=self.origin or self, edits=self.edits | {name})
 
@@ -325,11 +311,7 @@ STIFFNESS, DAMPING, FEED, STRONGEST = 0, 1, 2, 3
 class PDLaw(NamedTuple):
     """The torque of a PDMotor: stiffness (u - q) - damping c + feed u, limited to ± strongest; PDLaw() gives none.
 
-    Attributes:
-        stiffness: N·m/rad; N/m for a joint that slides, and likewise below.
-        damping: N·m·s/rad.
-        feed: torque by target.
-        strongest_nm: largest torque.
+    Units are N·m and rad; N and m for a joint that slides.
     """
 
     stiffness: float = 0.0
@@ -350,20 +332,15 @@ def pd_law(motor: PDMotor, inverse_inertia: float, step_s: float) -> PDLaw:
     return PDLaw(kp / divisor, (kd + step_s * kp) / divisor, 0.0, strongest)
 
 
-def pd_torque(target: float, angle: float, coasting: float, law: Sequence[float], at: int = 0) -> float:
-    """Return the torque of a motor in a step; nan if any number is nan.
+def pd_torque(target: float, angle: float, coasting: float, law: PDLaw) -> float:
+    """Return the torque of a motor in a step, given target and angle at its start; nan if any number is nan.
 
-    Args:
-        target: its target.
-        angle: of its joint at the start of the step.
-        coasting: speed of its joint at the end of the step without the motor; the speed at its start, if all else that
-            moves the joint is unknown, makes the motor give way by more than load / kp.
-        law: constants of a PDLaw, `(≥ at + 4,)`.
-        at: index of the first.
+    Coasting is the speed of the joint at the end of the step without the motor. If all else that moves the joint is
+    unknown, it is the speed at the start: then the motor gives way by more than load / kp.
     """
-    asked = law[at + STIFFNESS] * (target - angle) - law[at + DAMPING] * coasting + law[at + FEED] * target
-    if asked > law[at + STRONGEST]:
-        return law[at + STRONGEST]
-    if asked < -law[at + STRONGEST]:
-        return -law[at + STRONGEST]
+    asked = law.stiffness * (target - angle) - law.damping * coasting + law.feed * target
+    if asked > law.strongest_nm:
+        return law.strongest_nm
+    if asked < -law.strongest_nm:
+        return -law.strongest_nm
     return asked

@@ -12,8 +12,7 @@ import pytest
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.engines import engines, stepped
-from gaplab.services.engines.base import USES, Engine
-from gaplab.services.engines.stepping import WARM_SCENES
+from gaplab.services.engines.base import USES, WARM_SCENES, Engine
 from gaplab.services.world.motions import Motion, Trajectory, open_loop
 from gaplab.services.world.robot_library import IMPORTED
 from gaplab.services.world.robots import robots

@@ -11,7 +11,7 @@ from gaplab.services.core.errors import LimitReached
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.measuring import answering, corrections, taking
 from gaplab.services.replay.process import RolloutProcess
-from gaplab.services.replay.sent_specs import sent as sent_spec
+from gaplab.services.replay.process import sent as sent_spec
 from gaplab.services.replay.traces import evaluate_traces, said_by_files
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.session import Store

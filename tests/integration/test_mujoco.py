@@ -15,9 +15,9 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco import worlds as models_module
 from gaplab.services.engines.mujoco.callback import callbacks, layout
+from gaplab.services.engines.mujoco.engine import ROWS
 from gaplab.services.engines.mujoco.model import named
 from gaplab.services.engines.mujoco.pool import in_force
-from gaplab.services.engines.mujoco.scene import ROWS
 from gaplab.services.engines.mujoco.worlds import Models
 from gaplab.services.world.motions import Motion, open_loop
 from gaplab.services.world.robots.quadruped import Quadruped

@@ -9,7 +9,7 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.mujoco import MuJoCo
-from gaplab.services.engines.mujoco import scene as of_scenes
+from gaplab.services.engines.mujoco import engine as of_scenes
 from gaplab.services.engines.mujoco import worlds as of_worlds
 from gaplab.services.engines.mujoco.model import Structure, _inverse_inertias
 from gaplab.services.engines.mujoco.model import compiled as compiled_once

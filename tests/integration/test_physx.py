@@ -11,7 +11,7 @@ import pytest
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.physx import PhysX
-from gaplab.services.engines.physx.scene import PhysXScene
+from gaplab.services.engines.physx.engine import PhysXScene
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.world.motions import Motion, open_loop

@@ -9,7 +9,7 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.physx import PhysX
-from gaplab.services.engines.physx.scene import PhysXScene
+from gaplab.services.engines.physx.engine import PhysXScene
 from gaplab.services.world.world import Body, Box, Joint, Material, Sphere, World
 
 if not PhysX.available():

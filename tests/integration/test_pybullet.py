@@ -12,7 +12,7 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.engines.pybullet.scene import StickSlip
+from gaplab.services.engines.pybullet.engine import StickSlip
 from gaplab.services.specs.defaults import default_engine
 from gaplab.services.world.controllers.oscillators import Cpg
 from gaplab.services.world.kinematics import about, body_poses

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gaplab.services.engines.pybullet.scene import PyBulletScene, StickSlip
+from gaplab.services.engines.pybullet.engine import PyBulletScene, StickSlip
 from gaplab.services.world.world import Body, Box, Joint, Material, Sphere, World
 
 pybullet: ModuleType = pytest.importorskip("pybullet")

@@ -25,7 +25,7 @@ from gaplab.services.core.types import Measured, Probed, Sample, Selected, Simul
 from gaplab.services.engines import engines
 from gaplab.services.engines.pybullet.engine import PyBullet
 from gaplab.services.plugins.folders import VARIABLE
-from gaplab.services.replay.predictions import predictions
+from gaplab.services.replay.replays import predictions
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
@@ -439,7 +439,7 @@ def test_samples_for_which_there_is_no_room_are_left_out_and_not_waited_for(
 ) -> None:
     experiment, _, claim = walked(sqlite_store)
     execution.record(sqlite_store, claim, Tuned(2, (Simulator(frozen(BEST)),)))
-    monkeypatch.setattr("gaplab.services.replay.predictions.MOST_KEPT", 1)
+    monkeypatch.setattr("gaplab.services.replay.replays.MOST_KEPT", 1)
 
     found = predicted(api, experiment)
     figure = api.get(f"/figures/predictions?experiment={experiment}&format=json").json()

@@ -189,8 +189,6 @@ def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
     file = tmp_path / "a.zip"
     file.write_bytes(exported(sqlite_store, study.id))
 
-    with file.open("rb") as archive:
-        spec = submitted_spec(archive)
     said, document = gaplab("rerun", str(file), "--verify"), gaplab("rerun", str(file), "--verify", "--json")
     again = gaplab("rerun", str(file))
 

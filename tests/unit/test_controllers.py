@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.contract import controllers as contract
+from gaplab.services.contract import robots as contract
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.engines import engines
 from gaplab.services.specs.robots import Driven, robot_of
@@ -303,7 +303,7 @@ class Drawn(Plastic):
     [
         (Leaky, contract.acts_on_each_row_alone, "the first 1 differ from 1 alone"),
         (Late, contract.drives_every_actuator, "times_s begin at 1.0"),
-        (Drawn, contract.repeats_itself, "the same genome gives different numbers"),
+        (Drawn, contract.repeats_itself, "the motion of a genome differs when it is asked again"),
     ],
 )
 def test_the_contract_finds_a_controller_that_breaks_it(plugin: Any, check: Any, why: str) -> None:

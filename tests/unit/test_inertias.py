@@ -125,5 +125,4 @@ def test_a_torque_is_limited_and_what_is_no_number_stays_none() -> None:
 
     assert pd_torque(5.0, 0.0, 0.0, law) == 2.0
     assert pd_torque(-5.0, 0.0, 0.0, law) == -2.0
-    assert pd_torque(5.0, 0.0, 0.0, [9.0, 9.0, *law], 2) == 2.0
     assert np.isnan(pd_torque(float("nan"), 0.0, 0.0, law))

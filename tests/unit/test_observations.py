@@ -112,18 +112,6 @@ def test_only_what_collides_counts_if_anything_does() -> None:
     assert clearances_m(bare, *level) == pytest.approx([4.9])
 
 
-def test_many_clearances_at_once_are_those_of_each_body() -> None:
-    now = bearing()
-    bodies = [TREE.bodies[place] for place in (4, 0, 2, 1)]
-
-    found = Clearances(TREE, bodies)(now.poses, now.angles_rad)
-
-    positions, orientations = body_poses(TREE, now.poses, now.angles_rad)
-    for column, each in enumerate(bodies):
-        at = TREE.bodies.index(each)
-        assert found[:, column] == pytest.approx(clearances_m(each, positions[:, at], orientations[:, at]), abs=1e-9)
-
-
 def test_joints_slide_and_turn_their_children() -> None:
     slid = np.array([[0.0, 0.3, 0.4, 0.0]])
     base = np.array([[1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.contract.controllers import arm
+from gaplab.services.contract.robots import arm
 from gaplab.services.engines import engines
 from gaplab.services.world.controllers import controllers
 from gaplab.services.world.motions import Trajectory

@@ -12,8 +12,7 @@ import pytest
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.engines.base import Engine
-from gaplab.services.robots.changes import changes
-from gaplab.services.robots.comparing import check_rollouts
+from gaplab.services.robots.comparing import changes, check_rollouts
 from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.writing import Tuning, WrittenFile, write_json, write_xml

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gaplab.services.engines.stepping import DEEPEST_M, FARTHEST_M, WARM_SCENES, WarmScenes, consecutive, plausible
+from gaplab.services.engines.base import WARM_SCENES, WarmScenes
+from gaplab.services.engines.stepped import DEEPEST_M, FARTHEST_M, consecutive, plausible
 from gaplab.services.world.world import Material, World
 
 

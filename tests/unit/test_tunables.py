@@ -9,7 +9,7 @@ import pytest
 from gaplab.schemas.plugin import TunableRef
 from gaplab.schemas.sensitivity import SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
-from gaplab.services.contract.controllers import arm
+from gaplab.services.contract.robots import arm
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.untuned import NoiseEnvelope, NoiseEnvelopeOptions, separated

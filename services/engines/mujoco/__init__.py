@@ -1,4 +1,4 @@
-"""MuJoCo: the fast engine. Read `engine` first, then `scene`, `model`, and `law`, which has the physics."""
+"""MuJoCo: the fast engine. Read `engine` first, then `model`, and `law`, which has the physics."""
 
 from gaplab.services.engines.mujoco.engine import MuJoCo
 

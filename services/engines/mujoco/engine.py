@@ -1,8 +1,9 @@
 """The MuJoCo engine: worlds are grouped by what is compiled, and the rollouts of a group run in one call."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from types import ModuleType
 from typing import Annotated
 
 import numpy as np
@@ -10,11 +11,139 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.engines.base import ALL_FIELDS, USUALLY_IN_PLACE, Engine
-from gaplab.services.engines.mujoco.scene import MuJoCoScene
-from gaplab.services.engines.stepping import WarmScenes, consecutive, recording
+from gaplab.services.engines.base import USUALLY_IN_PLACE, SceneEngine
+from gaplab.services.engines.mujoco.law import drive_torques
+from gaplab.services.engines.mujoco.pool import Looping, Pool
+from gaplab.services.engines.mujoco.worlds import TIME, Controls, Models, Prepared, States, Steps
+from gaplab.services.engines.stepped import checked_s, consecutive, explodes, plausible, recording
+from gaplab.services.world.kinematics import observed_poses, observes_base
 from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory
+from gaplab.services.world.sensing import gravity_m_s2
 from gaplab.services.world.world import World
+
+ROWS = 64
+"""Rollouts per thread in one call of MuJoCo; more would only take memory, 0.1 MB each for the quadruped."""
+
+LOOPING_ROWS = 512
+"""Loops in one call of a controller: the more share a call, the less it takes."""
+
+
+class MuJoCoScene:
+    """Worlds that differ only in what is set in place; threads share the rollouts of a call."""
+
+    def __init__(self, mujoco: ModuleType, world: World, threads: int) -> None:
+        self.world = world
+        self.models = Models(mujoco, world)
+        self.states = States(mujoco, world, self.models)
+        self.controls = Controls(world, self.models.structure)
+        self.pool = Pool(mujoco, self.models.structure.model, threads)
+        self._rows = ROWS * threads
+        self._looping = Looping(self.pool, self.states, self.controls)
+
+    def poses(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> FloatArray:
+        """Return `(n, m, t, 7)`: positions and quaternions x, y, z, w of the observed body; nan if physics failed."""
+        found = np.empty((len(motions), len(worlds), len(motions[0].observe_s), 7))
+        rows = self._rows if isinstance(motions[0], Motion) else LOOPING_ROWS
+        with self.pool.in_force():
+            for down in _slices(len(motions), max(1, rows // len(worlds))):
+                for across in _slices(len(worlds), rows):
+                    seen = self._seen(self.models[worlds[across]], motions[down])
+                    found[down, across] = seen.reshape(*found[down, across].shape)
+        return found
+
+    def record(
+        self, world: World, motion: Motion | Loop, times_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the result of `poses`, `(t, 7)`; base and joints at other times, `(k, 7 + joints)`; and torques.
+
+        The torques `(k, joints)`, N·m, are the motors' in the step before; zeros at time 0.
+        """
+        prepared, kept = self.models[[world]], np.arange(max(1, int(self.steps(motion.observe_s)[-1])) + 1)
+        controls = np.zeros((1, int(kept[-1]), self.controls.width))
+        with self.pool.in_force():
+            states = self._states(prepared, [motion], kept, controls)
+        chosen = self.steps(times_s)
+        looked = states[0, chosen]
+        seen = np.hstack([self.states.base(looked), self.states.angles(looked)])
+        torques = self._torques(prepared[0], controls[0], states[0])[chosen]
+        return self._checked(prepared, states, kept, motion.observe_s)[0], seen, torques
+
+    def close(self) -> None:
+        """End the threads."""
+        self.pool.close()
+
+    def steps(self, times_s: FloatArray) -> Steps:
+        """Return the time steps at which times are."""
+        return np.rint(times_s / self.world.time_step_s).astype(int)
+
+    def _seen(self, prepared: Sequence[Prepared], motions: Sequence[Motion | Loop]) -> FloatArray:
+        """Return `(n · m, t, 7)`: observed poses, by motion and world."""
+        observe_s = motions[0].observe_s
+        observed = self.steps(observe_s)
+        kept = np.union1d([*observed, max(1, observed[-1])], self._checks(observe_s))
+        return self._checked(prepared, self._states(prepared, motions, kept), kept, observe_s)
+
+    def _states(
+        self,
+        prepared: Sequence[Prepared],
+        motions: Sequence[Motion | Loop],
+        kept: Steps,
+        told: FloatArray | None = None,
+    ) -> FloatArray:
+        """Return `(n · m, t, state)`: states after steps `(t,)`, ascending, the last of which ends the rollouts.
+
+        The targets in each step are written to `told`, `(n · m, steps, degrees of freedom)`, if it is given.
+        """
+        loops = [motion for motion in motions if isinstance(motion, Loop)]
+        if loops:
+            return self._looping.run(prepared, loops, kept, told)
+        known = [motion for motion in motions if isinstance(motion, Motion)]
+        controls = self.controls.of(known, int(kept[-1]), [each.delays for each in prepared])
+        if told is not None:
+            told[:] = controls
+        starts = self.states.starts(motions, len(prepared))
+        found = self.pool.rolled([each.model for each in prepared] * len(motions), starts, controls)[:, kept - 1]
+        found[:, kept == 0] = starts[:, None]
+        return found
+
+    def _checks(self, observe_s: FloatArray) -> Steps:
+        """Return the steps after which energy is checked."""
+        return self.steps(checked_s(self.world, float(observe_s[-1])))
+
+    def _checked(
+        self, prepared: Sequence[Prepared], states: FloatArray, kept: Steps, observe_s: FloatArray
+    ) -> FloatArray:
+        """Return `(rows, t, 7)`: observed poses in states after steps; nan if MuJoCo stopped, or a rollout failed.
+
+        The rows belong to the worlds in turns.
+        """
+        places = (np.searchsorted(kept, each) for each in (self.steps(observe_s), self._checks(observe_s)))
+        seen, checked = (states[:, place] for place in places)
+        poses = self.states.base(seen)
+        finished = states[:, -1, TIME] > (kept[-1] - 0.5) * self.world.time_step_s
+        failed = ~(finished & plausible(poses))
+        gravity = np.tile([gravity_m_s2(each.world) for each in prepared], (len(seen) // len(prepared), 1))
+        failed |= explodes(self.world, self.states.base(checked), self.states.angles(checked), gravity)
+        if not observes_base(self.world):
+            rows = len(seen) * seen.shape[1]
+            angles = self.states.angles(seen).reshape(rows, -1)
+            poses = observed_poses(self.world, poses.reshape(rows, 7), angles).reshape(*seen.shape[:2], 7)
+            failed |= ~plausible(poses)
+        if np.count_nonzero(failed):
+            poses[failed] = np.nan
+        return poses
+
+    def _torques(self, prepared: Prepared, controls: FloatArray, states: FloatArray) -> FloatArray:
+        """Return `(steps + 1, joints)`: torques of the motors before each state; zeros before the first."""
+        known = prepared.model.numeric_data
+        torques = drive_torques(known, controls, self.states.positions(states), self.states.speeds(states))
+        dofs = self.models.structure.dofs
+        return np.vstack([np.zeros((1, len(dofs))), torques[:, dofs]])
+
+
+def _slices(count: int, size: int) -> Iterator[slice]:
+    for begin in range(0, count, size):
+        yield slice(begin, min(count, begin + size))
 
 
 class MuJoCoOptions(Frozen):
@@ -25,7 +154,7 @@ class MuJoCoOptions(Frozen):
     )
 
 
-class MuJoCo(Engine):
+class MuJoCo(SceneEngine[MuJoCoScene]):
     """MuJoCo's rigid bodies in batches, with motors and contacts that follow the same law as PyBullet's.
 
     A contact that slides has dynamic friction, any other static friction. Restitution acts on impacts faster than the
@@ -39,7 +168,6 @@ class MuJoCo(Engine):
     install = "pip install 'gaplab[mujoco]'"
     Options = MuJoCoOptions
     options: MuJoCoOptions
-    honours = ALL_FIELDS
     in_place = USUALLY_IN_PLACE | {
         "body.center_m",
         "body.inertia",
@@ -49,18 +177,9 @@ class MuJoCo(Engine):
         "motor.follows",
         "slope_rad",
     }
-    closes_loops = True
-    repeatable = True
 
-    def __init__(self, options: Frozen | None = None) -> None:
-        super().__init__(options)
-        mujoco = import_module("mujoco")
-        self._scenes = WarmScenes(lambda world: MuJoCoScene(mujoco, world, self.options.threads))
-
-    @classmethod
-    def runs(cls, world: World) -> bool:
-        """Return whether the world has bodies."""
-        return bool(world.bodies)
+    def _build(self, world: World) -> MuJoCoScene:
+        return MuJoCoScene(import_module("mujoco"), world, self.options.threads)
 
     @classmethod
     def available(cls) -> bool:
@@ -87,7 +206,3 @@ class MuJoCo(Engine):
     def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
         """Return the same rollout with joint angles and torques."""
         return recording(motion, times_s, *self._scenes[world.built(self.in_place)].record(world, motion, times_s))
-
-    def close(self) -> None:
-        """End all threads."""
-        self._scenes.close()

@@ -66,13 +66,7 @@ def settings(
 ) -> FloatArray:
     """Return the settings of a world, as an array for the law.
 
-    Args:
-        world: world.
-        dofs: number of degrees of freedom.
-        ahead: number of positions, less that of degrees of freedom.
-        servos: its Motors.
-        motors: its PDMotors.
-        dampers: damping of degrees of freedom, by these.
+    `ahead` is the number of positions, less that of degrees of freedom; dampers are these with their damping.
     """
     step, sweeps = world.time_step_s, max(1, world.solver_iterations)
     counts = (len(servos), len(motors), len(dampers))
@@ -143,19 +137,10 @@ def damp(known: Any, forces: Any, speeds: Any) -> None:
 
 
 def drive_torques(known: FloatArray, targets: FloatArray, angles: FloatArray, speeds: FloatArray) -> FloatArray:
-    """Return the torques that motors gave their joints in each step of a rollout, within their limits.
+    """Return `(s, d)`: the torques that motors gave their joints in each step of a rollout, N·m; 0 without a motor.
 
     What the rotor takes is not the joint's. In an impact the rotor passes on more than its motor can; the motor's limit
-    counts.
-
-    Args:
-        known: settings.
-        targets: `(s, d)`: targets.
-        angles: `(s + 1, d + ahead)`: before each step, and at the end.
-        speeds: `(s + 1, d)`, likewise.
-
-    Returns:
-        `(s, d)`, N·m; 0 without a motor.
+    counts. Targets are `(s, d)`; angles `(s + 1, d + ahead)` and speeds `(s + 1, d)` are before each step, and last.
     """
     accelerations = np.diff(speeds, axis=0) / known[STEP]
     before = np.vstack([np.zeros_like(accelerations[:1]), accelerations[:-1]])
@@ -217,9 +202,7 @@ def touch(known: Any, depth: float, before: Any, coefficients: Any, excess: Any)
 def stop(known: Any, gap: float) -> Any:
     """Return the smallest speed away from a limit at the end of a step: it closes the gap, or opens a share of it.
 
-    Args:
-        known: settings.
-        gap: from the joint to its limit, rad; negative beyond it.
+    The gap, rad, is negative beyond the limit.
     """
     return -gap / known[STEP] if gap > 0 else -PUSHED_OUT * gap / known[STEP]
 

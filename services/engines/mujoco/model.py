@@ -4,7 +4,7 @@ These are masses, inertias, joints, motors, materials and gravity. All of a grou
 model that had another world is the same to the bit.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.mujoco.law import EACH_DAMPER, EACH_MOTOR, FALL, FIRST, PD, Servo, settings
 from gaplab.services.world.inertias import inertia_of
+from gaplab.services.world.kinematics import outwards
 from gaplab.services.world.sensing import gravity_m_s2
 from gaplab.services.world.world import (
     UNTURNED,
@@ -22,7 +23,6 @@ from gaplab.services.world.world import (
     Capsule,
     Cylinder,
     Hull,
-    Joint,
     Material,
     Motor,
     Part,
@@ -72,7 +72,6 @@ class Structure(NamedTuple):
     """A compiled model, and where it has the parts of a world.
 
     Attributes:
-        model: the compiled model.
         bodies: `(b,)`: its indices of the world's bodies.
         dofs: `(j,)`: degrees of freedom of the world's joints.
         joints: `(j,)`: its indices of the world's joints.
@@ -96,8 +95,7 @@ def compiled(mujoco: ModuleType, world: World) -> Structure:
     spec = mujoco.MjSpec()
     _set_up_physics(mujoco, spec, world)
     spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=0, conaffinity=0)
-    order = list(outwards(world, world.bodies[0].name))
-    _add_bodies(mujoco, spec, world, order)
+    _complete(spec, add_bodies(mujoco, spec, world, named), world)
     geoms = [
         (at, _add_part(mujoco, spec, world.bodies[at].name, number, part))
         for at in range(int(world.fixed), len(world.bodies))  # what never moves can't collide
@@ -105,7 +103,7 @@ def compiled(mujoco: ModuleType, world: World) -> Structure:
         if part.collides
     ]
     model = spec.compile()
-    return _structure(world, model, order, [(at, model.geom(name).id) for at, name in geoms])
+    return _structure(world, model, [(at, model.geom(name).id) for at, name in geoms])
 
 
 def named(body: str) -> str:
@@ -123,7 +121,8 @@ def _scalar_last(turn: FloatArray) -> Quaternion:
     return x, y, z, w
 
 
-def _structure(world: World, model: Any, order: list[Joint], geoms: list[tuple[int, int]]) -> Structure:
+def _structure(world: World, model: Any, geoms: list[tuple[int, int]]) -> Structure:
+    order = [world.joints[number] for number in outwards(world)]
     places = {joint.name: place for place, joint in enumerate(order)}
     carried = {joint.child: place + 2 for place, joint in enumerate(order)}  # the ground is 0, the base 1
     joints = np.array([places[joint.name] for joint in world.joints], int)
@@ -162,21 +161,28 @@ def _set_up_physics(mujoco: ModuleType, spec: Any, world: World) -> None:
     )
 
 
-def _add_bodies(mujoco: ModuleType, spec: Any, world: World, order: list[Joint]) -> None:
-    """Add bodies and joints, with an inertia that takes any center and any turn."""
-    inertia = {"mass": 1.0, "ipos": [1e-3, 0.0, 0.0], "iquat": TURNED, "inertia": [1.0] * 3, "explicitinertial": True}
+def add_bodies(mujoco: ModuleType, spec: Any, world: World, name_of: Callable[[str], str]) -> dict[str, Any]:
+    """Add the bodies with their joints, depth first, without mass; return them by their names in the world."""
     base, start = world.bodies[0].name, [0.0, 0.0, world.start_height_m]
-    turn = scalar_first(world.start_turn)
-    made = {base: spec.worldbody.add_body(name=named(base), pos=start, quat=turn, **inertia)}
+    made = {base: spec.worldbody.add_body(name=name_of(base), pos=start, quat=scalar_first(world.start_turn))}
     if not world.fixed:
         made[base].add_freejoint()
-    for joint in order:
-        frame = {"pos": joint.origin_m, "quat": scalar_first(joint.turn)}
-        made[joint.child] = made[joint.parent].add_body(name=named(joint.child), **frame, **inertia)
+    for joint in (world.joints[number] for number in outwards(world)):
+        place = {"pos": joint.origin_m, "quat": scalar_first(joint.turn)}
+        made[joint.child] = made[joint.parent].add_body(name=name_of(joint.child), **place)
         kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.slides else mujoco.mjtJoint.mjJNT_HINGE
-        margin = FASTEST * world.time_step_s
-        made[joint.child].add_joint(name=joint.name, type=kind, axis=joint.axis, margin=margin, solimp_limit=RIGID)
-        made[joint.child].joints[0].solimp_friction = RIGID
+        made[joint.child].add_joint(name=joint.name, type=kind, axis=joint.axis)
+    return made
+
+
+def _complete(spec: Any, made: Mapping[str, Any], world: World) -> None:
+    """Give bodies an inertia that takes any center and any turn, and joints their limits' law."""
+    for body in made.values():
+        body.mass, body.inertia, body.explicitinertial = 1.0, [1.0] * 3, True
+        body.ipos, body.iquat = [1e-3, 0.0, 0.0], TURNED
+    for each in world.joints:
+        joint = spec.joint(each.name)
+        joint.margin, joint.solimp_limit, joint.solimp_friction = FASTEST * world.time_step_s, RIGID, RIGID
 
 
 def _add_part(mujoco: ModuleType, spec: Any, body: str, number: int, part: Part) -> str:
@@ -214,14 +220,6 @@ def add_geom(mujoco: ModuleType, spec: Any, body: Any, name: str, part: Part) ->
             return body.add_geom(type=kinds.mjGEOM_MESH, meshname=name, **place)
 
 
-def outwards(world: World, parent: str) -> Iterator[Joint]:
-    """Yield the joints in MuJoCo's order: depth first."""
-    for joint in world.joints:
-        if joint.parent == parent:
-            yield joint
-            yield from outwards(world, joint.child)
-
-
 ROTOR = 8.0
 """Inertia of a servo's rotor, relative to that of what its joint carries in the zero pose: in one step a free limb
 reaches eight ninths of the target speed. The rank correlation with PyBullet over random gaits was 0.78; with 2, 4, 16
@@ -232,16 +230,7 @@ IN_PLACE, SAME_TURN, ANYWHERE = 1, 3, 0
 
 
 def write(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world: World, before: World | None) -> None:
-    """Write a world into a copy of its structure's model.
-
-    Args:
-        mujoco: the library module.
-        structure: structure.
-        model: copy of its model.
-        data: data for computations.
-        world: world to write.
-        before: world that the model has; None if none has been written.
-    """
+    """Write a world into a copy of its structure's model, which has the world before; None if it has none."""
     other_bodies = before is None or world.bodies is not before.bodies
     if other_bodies:
         _write_bodies(structure, model, world)
@@ -250,10 +239,10 @@ def write(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world
     if before is None or (world.slope_rad, world.gravity_m_s2) != (before.slope_rad, before.gravity_m_s2):
         model.numeric_data[FALL] = abs(world.gravity_m_s2) * world.time_step_s
         model.opt.gravity[:] = gravity_m_s2(world)
-    paint(structure, model, world)
+    _paint(structure, model, world)
 
 
-def paint(structure: Structure, model: Any, world: World) -> None:
+def _paint(structure: Structure, model: Any, world: World) -> None:
     """Write materials into the pairs of a model, where the law reads them."""
     if not world.surfaces:
         model.pair_friction[:] = _coefficients(world.material)

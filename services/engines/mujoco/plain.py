@@ -4,7 +4,7 @@ MuJoCo's own contacts have one friction and no restitution: the file has each bo
 PD motors there.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -14,11 +14,12 @@ import numpy as np
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.engines.mujoco.engine import MuJoCo
-from gaplab.services.engines.mujoco.logs import unlogged
-from gaplab.services.engines.mujoco.model import GROUND, ROTOR, add_geom, inertial, named, outwards, scalar_first
+from gaplab.services.engines.mujoco.model import GROUND, ROTOR, add_bodies, add_geom, inertial, named, scalar_first
+from gaplab.services.engines.mujoco.pool import unlogged
+from gaplab.services.world.kinematics import outwards
 from gaplab.services.world.motions import Motion
 from gaplab.services.world.sensing import gravity_m_s2
-from gaplab.services.world.world import Joint, Motor, PDMotor, World
+from gaplab.services.world.world import Motor, PDMotor, World
 
 LOST = ("material.static_friction", "material.restitution", "motor.delay_s", "noise.")
 """How names of values begin that the file has no place for."""
@@ -28,11 +29,7 @@ SPINNING_ROLLING = (0.005, 0.0001)
 
 
 def mjcf_of(world: World, comments: Sequence[str] = ()) -> str:
-    """Return a world with bodies as MJCF; the control of an actuator is the target of its motor.
-
-    Args:
-        world: the world.
-        comments: lines for the start of the file.
+    """Return a world with bodies as MJCF, after comments; the control of an actuator is the target of its motor.
 
     Raises:
         InvalidRobot: MuJoCo is not installed, or refuses the world.
@@ -45,11 +42,11 @@ def mjcf_of(world: World, comments: Sequence[str] = ()) -> str:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.compiler.autolimits = spec.compiler.degree = False
     spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
-    order = list(outwards(world, world.bodies[0].name))
-    _add_bodies(mujoco, spec, world, order)
+    _complete(mujoco, spec, add_bodies(mujoco, spec, world, _called), world)
     try:
         model = spec.compile()
-        inertias = dict(zip((joint.name for joint in order), model.dof_M0[model.nv - len(order) :], strict=True))
+        names = [world.joints[number].name for number in outwards(world)]
+        inertias = dict(zip(names, model.dof_M0[model.nv - len(names) :], strict=True))
         for joint in world.actuators:
             if joint.motor is not None:
                 _add_motor(mujoco, spec, spec.joint(joint.name), joint.motor, inertias[joint.name], world.time_step_s)
@@ -85,26 +82,12 @@ def _called(body: str) -> str:
     return named(body) if body == "world" else body
 
 
-def _add_bodies(mujoco: ModuleType, spec: Any, world: World, order: Sequence[Joint]) -> None:
-    base, made, kinds = world.bodies[0].name, {}, mujoco.mjtJoint
-    start = {"pos": [0.0, 0.0, world.start_height_m], "quat": scalar_first(world.start_turn)}
-    made[base] = spec.worldbody.add_body(name=_called(base), **start)
-    if not world.fixed:
-        made[base].add_freejoint()
-    for joint in order:
-        made[joint.child] = body = made[joint.parent].add_body(
-            name=_called(joint.child), pos=joint.origin_m, quat=scalar_first(joint.turn)
-        )
-        body.add_joint(
-            name=joint.name,
-            type=kinds.mjJNT_SLIDE if joint.slides else kinds.mjJNT_HINGE,
-            axis=joint.axis,
-            limited=joint.limits is not None,
-            range=joint.limits or (0.0, 0.0),
-            damping=[joint.damping, 0.0, 0.0],
-            frictionloss=joint.dry_friction,
-            armature=joint.armature,
-        )
+def _complete(mujoco: ModuleType, spec: Any, made: Mapping[str, Any], world: World) -> None:
+    """Give joints and bodies all that a world says of them, and bodies their shapes."""
+    for ours in world.joints:
+        joint = spec.joint(ours.name)
+        joint.limited, joint.range = ours.limits is not None, ours.limits or (0.0, 0.0)
+        joint.damping, joint.frictionloss, joint.armature = [ours.damping, 0.0, 0.0], ours.dry_friction, ours.armature
     surfaces = dict(world.surfaces)
     for each in world.bodies:
         body = made[each.name]

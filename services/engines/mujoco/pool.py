@@ -1,6 +1,9 @@
-"""Calls of MuJoCo: many rollouts at once, under the law, on any number of threads."""
+"""Calls of MuJoCo: many rollouts at once, under the law, on any number of threads.
 
-from collections.abc import Iterator, Sequence
+All rollouts of a call with loops are stepped together, with one call of the controller in each period.
+"""
+
+from collections.abc import Hashable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from importlib import import_module
 from types import ModuleType
@@ -10,16 +13,15 @@ import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.mujoco.callback import Callbacks, callbacks
-from gaplab.services.engines.mujoco.logs import unlogged
+from gaplab.services.engines.mujoco.worlds import Controls, Memory, Prepared, States, Steps, grouped, held
+from gaplab.services.engines.stepped import Acting, tick_steps
+from gaplab.services.world.motions import Loop
+from gaplab.services.world.sensing import observations
+from gaplab.services.world.world import World
 
 
 class Continued(NamedTuple):
-    """States from which rollouts go on.
-
-    Attributes:
-        states: `(rows, state)`.
-        accelerations: `(rows, degrees of freedom)`: those of the last step.
-    """
+    """States `(rows, state)` from which rollouts go on, and the last accelerations `(rows, degrees of freedom)`."""
 
     states: FloatArray
     accelerations: FloatArray
@@ -29,11 +31,6 @@ class Pool:
     """Threads that share the rollouts of a call.
 
     Rollouts are independent: each sets the whole state, and the solver starts from zero in each step.
-
-    Args:
-        mujoco: the library module.
-        model: a model of the structure.
-        threads: number of threads.
     """
 
     def __init__(self, mujoco: ModuleType, model: Any, threads: int) -> None:
@@ -43,28 +40,22 @@ class Pool:
         self._channel = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
         self._sensor_off = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
         self._callbacks = callbacks()
-        self._memory = np.empty(0)
+        self._memory = Memory()
         self._threads = import_module("mujoco.rollout").Rollout(nthread=threads if threads > 1 else 0)
 
     def rolled(self, models: Sequence[Any], starts: FloatArray, controls: FloatArray) -> FloatArray:
         """Return `(rows, steps, state)`: states after each step; nan where MuJoCo stopped. The next call overwrites it.
 
-        Args:
-            models: `rows` models.
-            starts: `(rows, state)`.
-            controls: `(rows, steps, degrees of freedom)`.
+        Starts are `(rows, state)`, controls `(rows, steps, degrees of freedom)`.
         """
-        states = self._room(*controls.shape[:2])
+        states = self._memory(*controls.shape[:2], self._size)
         self._roll(models, starts, controls, None, states, None)
         return states
 
     def advanced(self, models: Sequence[Any], begin: Continued, controls: FloatArray) -> tuple[FloatArray, Continued]:
         """Return states after each step, and the end, from which another call goes on as if there were no end.
 
-        Args:
-            models: `rows` models, in `sensing`.
-            begin: where rollouts begin.
-            controls: `(rows, steps, degrees of freedom)`.
+        Models are in `sensing`, controls `(rows, steps, degrees of freedom)`.
         """
         states, felt = np.empty((*controls.shape[:2], self._size)), np.empty(controls.shape)
         self._roll(models, begin.states, controls, begin.accelerations, states, felt)
@@ -120,13 +111,6 @@ class Pool:
                 begin = None if accelerations is None else accelerations[at]
                 self._roll(models[at], starts[at], controls[at], begin, states[at], None if felt is None else felt[at])
 
-    def _room(self, count: int, steps: int) -> FloatArray:
-        """Return an array `(count, steps, state)`, in the memory of the last call if it is large enough."""
-        size = count * steps * self._size
-        if self._memory.size < size:
-            self._memory = np.empty(size)
-        return self._memory[:size].reshape(count, steps, self._size)
-
 
 @contextmanager
 def in_force(mujoco: ModuleType, these: Callbacks) -> Iterator[None]:
@@ -144,3 +128,98 @@ def _set(mujoco: ModuleType, these: Callbacks) -> None:
     mujoco.set_mjcb_control(these.law)
     mujoco.set_mjcb_time(these.clock)
     mujoco.set_mjcb_sensor(these.sensor)
+
+
+@contextmanager
+def unlogged(mujoco: ModuleType) -> Iterator[None]:
+    """Stop MuJoCo from printing warnings or writing them to a file; the setting is process-wide, so it is restored."""
+    log, silent = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    silent.logto_console = silent.logto_file = False
+    silent.set()
+    try:
+        yield
+    finally:
+        log.set()
+
+
+class Looping:
+    """Loops in the worlds of a scene."""
+
+    def __init__(self, pool: Pool, states: States, controls: Controls) -> None:
+        self._pool, self._states, self._controls = pool, states, controls
+
+    def run(
+        self, prepared: Sequence[Prepared], loops: Sequence[Loop], kept: Steps, told: FloatArray | None = None
+    ) -> FloatArray:
+        """Return states `(n · m, t, state)` after the given steps, by loop and world.
+
+        Args:
+            prepared: m worlds.
+            loops: n loops, which share their function and their times.
+            kept: `(t,)`, ascending: steps; the last one ends the rollout.
+            told: `(n · m, steps, degrees of freedom)`: overwritten with the targets in each step, if it is given.
+        """
+        run, end = _Run(self._states, prepared, loops), int(kept[-1])
+        at = np.array(tick_steps(loops[0], prepared[0].world.time_step_s))
+        targets = np.empty((len(run.models), len(at), len(prepared[0].world.actuators)))  # of each call
+        delays = grouped([each.delays for each in prepared] * len(loops))
+        found = np.empty((len(run.models), len(kept), len(self._states.start)))
+        found[:, kept == 0] = run.recent[:, -1:]
+        now = Continued(run.recent[:, -1], np.zeros((len(run.models), self._controls.width)))
+        with self._pool.sensing(run.models[: len(prepared)]):
+            for tick, (begin, then) in enumerate(zip(at, [*np.minimum(at[1:], end), end], strict=True)):
+                targets[:, tick] = run.targets(tick)
+                if begin == then:
+                    continue
+                controls = np.zeros((len(run.models), then - begin, self._controls.width))
+                for late, columns in delays:
+                    for column in columns:
+                        given = targets[column, : tick + 1]
+                        self._controls.put(controls[column], held(at[: tick + 1], given, np.arange(begin, then), late))
+                if told is not None:
+                    told[:, begin:then] = controls
+                states, now = self._pool.advanced(run.models, now, controls)
+                run.see(states)
+                inside = (kept > begin) & (kept <= then)
+                found[:, inside] = states[:, kept[inside] - begin - 1]
+        return found
+
+
+class _Run:
+    """The controllers of a call, and what they observe."""
+
+    def __init__(self, states: States, prepared: Sequence[Prepared], loops: Sequence[Loop]) -> None:
+        self.models = [each.model for each in prepared] * len(loops)
+        self._states = states
+        self._senses = loops[0].senses
+        self._acting = Acting([loop for loop in loops for _ in prepared])
+        step_s = prepared[0].world.time_step_s
+        lags = np.repeat([round(loop.latency_s / step_s) for loop in loops], len(prepared))
+        self._length = int(lags.max()) + 1
+        self._seen_at = np.arange(len(lags)), self._length - 1 - lags
+        self.recent = np.repeat(states.starts(loops, len(prepared))[:, None], self._length, axis=1)
+        self._worlds: dict[Hashable, tuple[World, list[int]]] = {}
+        for row, each in enumerate([*prepared] * len(loops)):
+            self._worlds.setdefault(_looks(each.world), (each.world, []))[1].append(row)
+
+    def see(self, states: FloatArray) -> None:
+        """Remember the latest states `(rows, steps, state)`, as far back as they are observed."""
+        behind = [self.recent, states] if states.shape[1] < self._length else [states]
+        self.recent = np.concatenate(behind, axis=1)[:, -self._length :]
+
+    def targets(self, tick: int) -> FloatArray:
+        """Return the targets `(rows, a)` that controllers set now."""
+        seen = self.recent[self._seen_at]
+        with np.errstate(all="ignore"):  # physics that failed gives nan, or numbers without bounds
+            found = [
+                observations(world, self._senses, self._states.bearing(seen[rows]))
+                for world, rows in self._worlds.values()
+            ]
+            order = np.argsort(np.concatenate([rows for _, rows in self._worlds.values()]), kind="stable")
+            return self._acting.targets(tick, np.concatenate(found)[order])
+
+
+def _looks(world: World) -> Hashable:
+    """Return what observations in worlds of one structure depend on: the slope, and the places of shapes."""
+    solids = [body.center_m for body in world.bodies if not isinstance(body.shape, tuple)]
+    return world.slope_rad, *solids

@@ -1,36 +1,35 @@
-"""Worlds of one structure in MuJoCo: their models, which are rewritten and never compiled again, and their states.
+"""Worlds of one structure in MuJoCo: models, which are rewritten and never compiled again, states, and controls.
 
-A state has time, positions and speeds.
+A state has time, positions and speeds. Controls are the targets of motors in each time step, where the law reads them.
 """
 
 from collections import OrderedDict
 from collections.abc import Sequence
 from copy import copy
+from math import prod
 from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.engines.mujoco.model import compiled, start, write
-from gaplab.services.engines.stepping import consecutive, delays
+from gaplab.services.engines.mujoco.model import Structure, compiled, start, write
+from gaplab.services.engines.stepped import check_targets, consecutive, delays
 from gaplab.services.world.controllers.parts import middles
 from gaplab.services.world.kinematics import tilted_pose
 from gaplab.services.world.motions import LEVEL, Loop, Motion
 from gaplab.services.world.sensing import Bearing
 from gaplab.services.world.world import World
 
+Steps = NDArray[np.int_]
+
 KEPT, KEPT_BYTES = 64, 256 * 2**20
 """Largest number and size of the models that are kept for the next call; one of the quadruped takes 0.1 MB."""
 
 
 class Delays(NamedTuple):
-    """When motors follow commands.
-
-    Attributes:
-        steps: time steps from a command until the motor follows it, of each actuator.
-        first: targets `(a,)` before any command arrives.
-    """
+    """How many time steps later each actuator follows a command, and its targets `(a,)` before any command arrives."""
 
     steps: tuple[int, ...]
     first: FloatArray
@@ -45,12 +44,7 @@ class Prepared(NamedTuple):
 
 
 class Models:
-    """The models of worlds that differ only in what is set in place.
-
-    Args:
-        mujoco: the library module.
-        world: world with the structure.
-    """
+    """The models of worlds that differ only in what is set in place."""
 
     def __init__(self, mujoco: ModuleType, world: World) -> None:
         self._mujoco = mujoco
@@ -98,13 +92,7 @@ TURNING = 3
 
 
 class States:
-    """What a state says of a world.
-
-    Args:
-        mujoco: the library module.
-        world: world.
-        models: its models.
-    """
+    """What a state says of a world."""
 
     def __init__(self, mujoco: ModuleType, world: World, models: Models) -> None:
         structure, model = models.structure, models.structure.model
@@ -155,3 +143,71 @@ class States:
         state = np.empty(mujoco.mj_stateSize(models.structure.model, full))
         mujoco.mj_getState(models.structure.model, data, state, full)
         return state
+
+
+class Memory:
+    """An array for the results of calls, which each call overwrites; it begins with zeros."""
+
+    def __init__(self) -> None:
+        self._kept = np.zeros(0)
+
+    def __call__(self, *shape: int) -> FloatArray:
+        """Return an array of a shape, in the memory of the last call if it is large enough."""
+        if self._kept.size < prod(shape):
+            self._kept = np.zeros(prod(shape))
+        return self._kept[: prod(shape)].reshape(shape)
+
+
+class Controls:
+    """The targets of the actuators of worlds of one structure."""
+
+    def __init__(self, world: World, structure: Structure) -> None:
+        joints = [world.joints.index(joint) for joint in world.actuators]
+        self._dofs = consecutive(structure.dofs[joints].tolist())
+        self.width = int(structure.model.nv)
+        self._world = world
+        self._memory = Memory()
+
+    def of(self, motions: Sequence[Motion], steps: int, delays: Sequence[Delays | None]) -> FloatArray:
+        """Return `(n · m, steps, degrees of freedom)`: the targets of n motions in each step, in m worlds.
+
+        They are in the memory of the last call if it is large enough; what no motor drives stays zero in it.
+
+        Raises:
+            PluginBroken: the targets of a motion are not those of the actuators.
+        """
+        controls, now = self._memory(len(motions) * len(delays), steps, self.width), np.arange(steps)
+        for motion, each in zip(motions, controls.reshape(len(motions), len(delays), steps, self.width), strict=True):
+            check_targets(motion, self._world)
+            at = np.rint(motion.times_s / self._world.time_step_s).astype(int)
+            for late, columns in grouped(delays):
+                targets = held(at, motion.targets, now, late)
+                for column in columns:
+                    self.put(each[column], targets)
+        return controls
+
+    def put(self, controls: FloatArray, targets: FloatArray) -> None:
+        """Write targets `(..., a)` into controls `(..., degrees of freedom)`."""
+        controls[..., self._dofs] = targets
+
+
+def held(at: Steps, targets: FloatArray, now: Steps, delays: Delays | None) -> FloatArray:
+    """Return `(..., s, a)`: the targets that motors follow in steps `(s,)`, given steps and targets of commands.
+
+    Commands are at ascending steps `(k,)`, with targets `(..., k, a)`; without delays, motors follow at once.
+    """
+    if delays is None:
+        return targets.take(at.searchsorted(now, side="right") - 1, axis=-2)
+    latest = at.searchsorted(now[:, None] - np.array(delays.steps), side="right") - 1
+    known = targets[..., np.maximum(latest, 0), np.arange(targets.shape[-1])]
+    return np.where(latest < 0, delays.first, known)
+
+
+def grouped(delays: Sequence[Delays | None]) -> list[tuple[Delays | None, list[int] | list[slice]]]:
+    """Return the different delays of worlds, each with the indices of the worlds that have it."""
+    if all(each is None for each in delays):
+        return [(None, [slice(None)])]
+    found: dict[int, tuple[Delays | None, list[int]]] = {}
+    for column, each in enumerate(delays):
+        found.setdefault(id(each), (each, []))[1].append(column)
+    return [(each, columns) for each, columns in found.values()]

@@ -1,4 +1,4 @@
-"""PhysX through SAPIEN: the paper's own engine. Read `engine` first, then `scene`, then `robot`."""
+"""PhysX through SAPIEN: the paper's own engine. Read `engine` first, then `robot`."""
 
 from gaplab.services.engines.physx.engine import PhysX
 

@@ -1,4 +1,4 @@
-"""PyBullet: the default engine. Read `engine` first, then `scene`, then `robot`."""
+"""PyBullet: the default engine. Read `engine` first, then `robot`."""
 
 from gaplab.services.engines.pybullet.engine import PyBullet
 

@@ -6,8 +6,11 @@ are links without mass, welded to it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from inspect import isbuiltin
 from types import ModuleType
 from typing import Any, NamedTuple, TypeAlias
+from weakref import finalize
 
 import numpy as np
 
@@ -45,16 +48,26 @@ NO_SHAPE = -1
 NO_JOINT = -1
 
 
+class Server:
+    """Bullet's functions, each call of which goes to one server; a server that nothing refers to closes by itself."""
+
+    def __init__(self, bullet: ModuleType) -> None:
+        self._bullet = bullet
+        self.client: int = bullet.connect(bullet.DIRECT)
+        self.close = finalize(self, bullet.disconnect, physicsClientId=self.client)
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - Bullet has no types
+        found = getattr(self._bullet, name)
+        bound = partial(found, physicsClientId=self.client) if isbuiltin(found) else found
+        setattr(self, name, bound)
+        return bound
+
+
 @dataclass(frozen=True)
 class Link:
-    """A link in Bullet: a body, or a further shape of one.
+    """A link of Bullet's: a body, or a further shape of one, without mass, that is welded to it.
 
-    Attributes:
-        body: the body that it is, or that it is welded to.
-        part: its shape; None without.
-        welded: true if it is a further shape of its body, without mass.
-        parent: number of its parent's link, counted from 0 for the base.
-        joint: number of its joint; `NO_JOINT` for the base and a welded link.
+    Its parent is the number of a link, 0 for the base; it has a joint's number unless it is the base, or welded.
     """
 
     body: Body
@@ -88,17 +101,17 @@ class PyBulletRobot:
         }
 
 
-def build_robot(bullet: ModuleType, client: int, world: World) -> PyBulletRobot:
-    """Build the robot of a world at its start, in the server `client`."""
+def build_robot(bullet: Server, world: World) -> PyBulletRobot:
+    """Build the robot of a world at its start."""
     links = links_of(world)
-    robot = _create(bullet, client, world, links)
+    robot = _create(bullet, world, links)
     joints = tuple(next(i for i, link in enumerate(links) if link.joint == n) + BASE for n in range(len(world.joints)))
     made = PyBulletRobot(robot, links, joints)
-    _finish(bullet, client, world, made)
+    _finish(bullet, world, made)
     return made
 
 
-def set_masses(bullet: ModuleType, client: int, made: PyBulletRobot, world: World) -> None:
+def set_masses(bullet: Server, made: PyBulletRobot, world: World) -> None:
     """Set masses and inertia.
 
     Bullet computes the inertia of a link from its shape whenever its mass is set: right for boxes and spheres alone.
@@ -107,14 +120,14 @@ def set_masses(bullet: ModuleType, client: int, made: PyBulletRobot, world: Worl
     for index, link in enumerate(made.links, start=BASE):
         if not link.welded and not (world.fixed and index == BASE):
             body = bodies[link.body.name]
-            bullet.changeDynamics(made.robot, index, mass=body.mass_kg, physicsClientId=client)
-            _set_inertia(bullet, client, made.robot, index, body)
+            bullet.changeDynamics(made.robot, index, mass=body.mass_kg)
+            _set_inertia(bullet, made.robot, index, body)
 
 
-def _set_inertia(bullet: ModuleType, client: int, robot: int, index: int, body: Body) -> None:
+def _set_inertia(bullet: Server, robot: int, index: int, body: Body) -> None:
     if not _is_bullets(body):
         moments = inertia_of(body).moments_kg_m2
-        bullet.changeDynamics(robot, index, localInertiaDiagonal=moments, physicsClientId=client)
+        bullet.changeDynamics(robot, index, localInertiaDiagonal=moments)
 
 
 def _is_bullets(body: Body) -> bool:
@@ -155,21 +168,21 @@ def _first(body: Body) -> Part | None:
     return None if isinstance(body.shape, tuple) else body.parts[0]
 
 
-def _create(bullet: ModuleType, client: int, world: World, links: tuple[Link, ...]) -> int:
+def _create(bullet: Server, world: World, links: tuple[Link, ...]) -> int:
     base, *others = links
     frames = [(ORIGIN, UNTURNED) if link.welded else inertial_frame(link.body) for link in links]
     joints = [world.joints[link.joint] if link.joint >= 0 else None for link in others]
     kinds = {True: bullet.JOINT_PRISMATIC, False: bullet.JOINT_REVOLUTE}
     robot: int = bullet.createMultiBody(
         baseMass=0.0 if world.fixed else base.body.mass_kg,  # Bullet fixes a base without mass
-        baseCollisionShapeIndex=_shape(bullet, client, base, *frames[0]),
+        baseCollisionShapeIndex=_shape(bullet, base, *frames[0]),
         basePosition=(0.0, 0.0, world.start_height_m),
         baseOrientation=world.start_turn,
         baseInertialFramePosition=frames[0][0],
         baseInertialFrameOrientation=frames[0][1],
         linkMasses=[0.0 if link.welded else link.body.mass_kg for link in others],
         linkCollisionShapeIndices=[
-            _shape(bullet, client, link, *frame) for link, frame in zip(others, frames[1:], strict=True)
+            _shape(bullet, link, *frame) for link, frame in zip(others, frames[1:], strict=True)
         ],
         linkVisualShapeIndices=[NO_SHAPE] * len(others),
         linkPositions=[joint.origin_m if joint else ORIGIN for joint in joints],
@@ -179,12 +192,11 @@ def _create(bullet: ModuleType, client: int, world: World, links: tuple[Link, ..
         linkParentIndices=[link.parent for link in others],
         linkJointTypes=[kinds[joint.slides] if joint else bullet.JOINT_FIXED for joint in joints],
         linkJointAxis=[joint.axis if joint else (0.0, 0.0, 1.0) for joint in joints],
-        physicsClientId=client,
     )
     return robot
 
 
-def _shape(bullet: ModuleType, client: int, link: Link, center: Vector, turn: Quaternion) -> int:
+def _shape(bullet: Server, link: Link, center: Vector, turn: Quaternion) -> int:
     """Create the shape of a link whose centre of mass and principal axes are given.
 
     A hull is put into the inertial frame: Bullet keeps only a shape in this place plain, and a plain one can do
@@ -193,7 +205,7 @@ def _shape(bullet: ModuleType, client: int, link: Link, center: Vector, turn: Qu
     part = link.part
     if part is None:
         return NO_SHAPE
-    options: dict[str, Any] = {"collisionFramePosition": part.center_m, "physicsClientId": client}
+    options: dict[str, Any] = {"collisionFramePosition": part.center_m}
     if part.turn != UNTURNED:
         options["collisionFrameOrientation"] = part.turn
     match part.shape:
@@ -218,25 +230,24 @@ def _in_frame(part: Part, points: FloatArray, center: Vector, turn: Quaternion) 
     return rotated(product(back, np.array(part.turn)), points) + rotated(back, np.subtract(part.center_m, center))
 
 
-def _finish(bullet: ModuleType, client: int, world: World, made: PyBulletRobot) -> None:
+def _finish(bullet: Server, world: World, made: PyBulletRobot) -> None:
     """Remove damping, margins and unwanted collisions; set inertia, limits and starts; free the joints."""
     robot = made.robot
     for index, link in enumerate(made.links, start=BASE):
-        bullet.changeDynamics(robot, index, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+        bullet.changeDynamics(robot, index, linearDamping=0.0, angularDamping=0.0)
         if link.part is not None and not link.part.collides:
-            bullet.setCollisionFilterGroupMask(robot, index, 0, 0, physicsClientId=client)
+            bullet.setCollisionFilterGroupMask(robot, index, 0, 0)
         if link.part is not None and isinstance(link.part.shape, Hull):
-            bullet.changeDynamics(robot, index, collisionMargin=0.0, physicsClientId=client)
+            bullet.changeDynamics(robot, index, collisionMargin=0.0)
         if not link.welded and not (world.fixed and index == BASE):
-            _set_inertia(bullet, client, robot, index, link.body)
+            _set_inertia(bullet, robot, index, link.body)
     for index, joint in zip(made.joints, world.joints, strict=True):
-        bullet.setJointMotorControl2(robot, index, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
+        bullet.setJointMotorControl2(robot, index, bullet.VELOCITY_CONTROL, force=0.0)
         if joint.limits is not None:
             lower, upper = joint.limits
-            options = {"jointLowerLimit": lower, "jointUpperLimit": upper, "physicsClientId": client}
-            bullet.changeDynamics(robot, index, **options)
+            bullet.changeDynamics(robot, index, jointLowerLimit=lower, jointUpperLimit=upper)
         if joint.start:
-            bullet.resetJointState(robot, index, joint.start, physicsClientId=client)
+            bullet.resetJointState(robot, index, joint.start)
 
 
 States: TypeAlias = tuple[tuple[float, ...], ...]
@@ -254,9 +265,7 @@ class _Resisted(NamedTuple):
     """A joint's law, and what resists it; with damping, a joint that coasts at c ends the step at c · share.
 
     Attributes:
-        law: law of its motor.
         kick: speed by torque at the end of a step, without damping.
-        damping: torque by speed.
         share: 1 / (1 + kick · damping).
         friction_nm: largest torque of its dry friction, if no motor of Bullet's is free for it.
     """
@@ -273,9 +282,6 @@ class Torques:
 
     They are those of the end of the step, if the joint moved alone under the load of the step before. The load is what
     else accelerates the joint: the change of its speed in that step, less what these torques did.
-
-    Args:
-        world: world.
 
     Attributes:
         joints: numbers of the joints.
@@ -307,11 +313,7 @@ class Torques:
         return self._motors_nm[self._places[joint]] if joint in self._places else 0.0
 
     def of(self, states: States) -> list[float]:
-        """Return the torques of the joints in a step, and remember those of their motors.
-
-        Args:
-            states: of the joints at the start of the step.
-        """
+        """Return the torques of the joints in a step with these states at its start, and remember those of motors."""
         total = []
         for place, (target, state, resisted) in enumerate(zip(self._targets, states, self._resisted, strict=True)):
             angle, speed = state[0], state[1]

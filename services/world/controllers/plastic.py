@@ -119,11 +119,8 @@ class Plastic(Controller):
 def _changes(genes: FloatArray, weights: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     """Return the changes of weights `(n, neurons, inputs)`.
 
-    Args:
-        genes: `(n, 3 · neurons)`: sign, rule and rate of each neuron.
-        weights: `(n, neurons, inputs)`.
-        x: `(n, 1, inputs)`: activities before the synapses.
-        y: `(n, neurons, 1)`: activities after them.
+    Genes `(n, 3 · neurons)` are sign, rule and rate of each neuron. Activities before the synapses are x,
+    `(n, 1, inputs)`, those after them y, `(n, neurons, 1)`.
     """
     grown = (1 - weights) * x * y
     alike = np.tanh(4 * (1 - np.abs(x - y)) - 2)

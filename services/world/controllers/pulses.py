@@ -101,11 +101,6 @@ class Pulses:
         genes: number of genes: gene 2i is the phase of actuator i, gene 2i + 1 the width of its pulse.
         wraps: `(genes,)`: whether each gene wraps around.
         known: `(genes,)`: a trot in which all joints of a limb move at once.
-
-    Args:
-        world: robot.
-        period_s: period of all pulses.
-        amplitude: factor of each joint's usual swing.
     """
 
     def __init__(self, world: World, period_s: float, amplitude: float) -> None:

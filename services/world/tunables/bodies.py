@@ -67,6 +67,19 @@ class Mass(BodyTunable):
         return edited.edited("body.inertia") if stated else edited
 
 
+class OfBodies(Tunable):
+    """A tunable of the bodies whose names match a pattern."""
+
+    options: "CenterOptions | LengthOptions"
+
+    def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
+        """Return, if the robot has no such body, a sentence and the names of its bodies."""
+        return lacking("body", self.options.of, [body.name for body in world.bodies])
+
+    def _chosen(self, world: World) -> tuple[str, ...]:
+        return matching(self.options.of, [body.name for body in world.bodies])
+
+
 class CenterOptions(Frozen):
     """Options of the tunable `center_of_mass`."""
 
@@ -74,7 +87,7 @@ class CenterOptions(Frozen):
     along: Literal["x", "y", "z"] = Field(default="x", description="axis of the body's frame")
 
 
-class CenterOfMass(Tunable):
+class CenterOfMass(OfBodies):
     """Shift of the centre of mass of bodies along an axis of their frame; shape and inertia about the centre stay."""
 
     name = "center_of_mass"
@@ -96,7 +109,7 @@ class CenterOfMass(Tunable):
         """Return the world with shifted centres of mass."""
         if not value:
             return world
-        chosen = matching(self.options.of, [body.name for body in world.bodies])
+        chosen = self._chosen(world)
         axis = "xyz".index(self.options.along)
 
         def shifted(body: Body) -> Body:
@@ -108,10 +121,6 @@ class CenterOfMass(Tunable):
 
         parted = _parted(world, chosen)
         return parted.edited(self.field, bodies=tuple(map(shifted, parted.bodies)))
-
-    def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
-        """Return, if the robot has no such body, a sentence and the names of its bodies."""
-        return lacking("body", self.options.of, [body.name for body in world.bodies])
 
 
 def _parted(world: World, chosen: tuple[str, ...]) -> World:
@@ -139,7 +148,7 @@ class LengthOptions(Frozen):
     )
 
 
-class LengthScale(Tunable):
+class LengthScale(OfBodies):
     """Factor of the dimensions of bodies at the same mass; the robot starts as high above the ground as before.
 
     A stated inertia grows with the square of the factor, unless only places or shapes are scaled. An engine builds a
@@ -162,7 +171,7 @@ class LengthScale(Tunable):
 
     def edit(self, world: World, value: float) -> World:
         """Return the world with bodies of other dimensions."""
-        chosen = matching(self.options.of, [body.name for body in world.bodies])
+        chosen = self._chosen(world)
         if value == 1.0 or not chosen:
             return world
         factor = float(value)
@@ -173,10 +182,6 @@ class LengthScale(Tunable):
             return edited
         turn = np.array(world.start_turn)
         return replace(edited, start_height_m=world.start_height_m + lowest_m(world, turn) - lowest_m(edited, turn))
-
-    def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
-        """Return, if the robot has no such body, a sentence and the names of its bodies."""
-        return lacking("body", self.options.of, [body.name for body in world.bodies])
 
     def _scaled(self, body: Body, factor: float) -> Body:
         place = 1.0 if self.options.what == "shapes" else factor

@@ -22,14 +22,10 @@ def plain_name(label: str) -> str:
 
 
 def tunable_of(label: str, pointer: str = "") -> Tunable:
-    """Return the tunable of a label.
-
-    Args:
-        label: its name, and in parentheses its options.
-        pointer: place in the spec, for errors.
+    """Return the tunable of a label, which is its name, and in parentheses its options.
 
     Raises:
-        InvalidSpec: no tunable has this name, or it refuses the options.
+        InvalidSpec: no tunable has this name, or it refuses the options; the pointer is its place in the spec.
     """
     name, options = plain_name(label), _options(label, pointer)
     if not 1 <= len(name) <= LONGEST_NAME:
