@@ -71,7 +71,7 @@ class TunableRef(Named):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Return a JSON Schema with both spellings; the object may have options."""
+        """Return a JSON Schema of both ways to write a tunable: its label, or an object with `options`."""
         schema = super().__get_pydantic_json_schema__(core, handler)
         options = {
             "type": "object",

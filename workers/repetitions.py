@@ -204,7 +204,7 @@ class Repetitions:
         self._drop_all_but([*held, *(run.claim for run in self.runs if run not in noted)])
 
     def _permit(self, but: Collection[Run] = ()) -> None:
-        """Permit the measurements that are noted to move hardware, for a part of the lease since its renewal."""
+        """Let measurements whose beginning is stored move hardware, for a part of the lease; none of the runs `but`."""
         if self._permits is not None:
             able = (run for run in self.runs if run.permits is not None and run not in but)
             keys = [(run.claim.id, run.claim.epoch, run.measuring) for run in able if run.measuring is not None]

@@ -106,7 +106,8 @@ def _robot_file(spec: ResolvedSpec, robot: "Robot") -> "RobotFile":
 
     driver, task = spec.controller or robot.usual_controller, spec.task or robot.usual_task
     if driver is None or task is None or not robot.world.bodies:
-        raise InvalidRobot([f"the robot {spec.robot.name} has no bodies, or brings a controller of its own"])
+        why = "it has no bodies, or no controller that a file can name"
+        raise InvalidRobot([f"the robot {spec.robot.name} cannot be written as a file: {why}"])
     known = robot_file(spec.robot.options.get("sha256", ""))
     if known is None:
         return RobotFile(name=spec.robot.name, usual_controller=driver, usual_task=task, world=robot.world)

@@ -92,7 +92,7 @@ def compares_by_rank(plugin: Plugin) -> None:
 
 
 def lets_nan_never_win(plugin: Plugin) -> None:
-    """Lets nan and infinities never win."""
+    """Ranks a candidate whose fitness is nan or infinite below all others."""
     for bad in (np.nan, np.inf, -np.inf):
         hill = Hill(partial(_spoilt, bad=bad))
         found = searched(plugin, hill, 500)

@@ -132,7 +132,7 @@ def copes_with_failed_measurements(plugin: Plugin) -> None:
 
 
 def searches_as_it_says(plugin: Plugin) -> None:
-    """Searches once, or never with `searches = False`."""
+    """Calls its search once, or never if it has `searches = False`."""
     strategy = plugin()
     if not strategy.takes_samples:
         return

@@ -186,7 +186,10 @@ class Answers:
 
 
 def pack(answers: Iterable[Answer]) -> bytes:
-    """Return the answers as bytes: 16 for each key, 8 for each fitness, and 8 for each run of equally long rows."""
+    """Return simulated fitnesses as bytes, for a checkpoint.
+
+    The digest of a genome and its simulators takes 16 bytes, a number 8, and a run of answers with as many numbers 8.
+    """
     packed = []
     for width, group in groupby(answers, key=lambda answer: len(answer[1])):
         keys, rows = zip(*group, strict=True)

@@ -120,7 +120,8 @@ def repetition(
     Args:
         setting: setting of the repetition.
         log: steps so far.
-        answers: returns the answers of the next step; default: those of the setting.
+        answers: returns the simulators' answers for the next step, which count its rollouts; default:
+            `setting.answers`.
 
     Raises:
         RealityAwaited: reality is physical; the repetition goes on after a log with the answer.

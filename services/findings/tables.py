@@ -101,7 +101,7 @@ def tests(names: Mapping[str, str], pairs: Sequence[Comparison], what: str) -> G
 
 
 def pooled(names: Mapping[str, str], pairs: Sequence[Comparison], what: str) -> Grid:
-    """Return the paper's tests of all pairs over a range."""
+    """Return the paper's tests of all pairs that have them, each repetition as its mean over a range of evaluations."""
     rows = tuple(
         (_pair(names, pair), found.sizes, found.difference_text, *_p_of(found, UNPAIRED))
         for pair in pairs

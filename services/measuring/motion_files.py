@@ -53,8 +53,8 @@ def written(spec: ResolvedSpec, genome: FloatArray, form: MotionFormat) -> str:
     """
     robot = robot_of(spec)
     if form not in forms_of(robot, genome):
-        positions = "a JointTrajectory has positions, and these motors follow others"
-        raise Conflict(_why_none(robot, genome) or f"{positions}: {', '.join(_others(robot))}; take csv")
+        positions = "a JointTrajectory has positions only, and these motors follow something else"
+        raise Conflict(_why_none(robot, genome) or f"{positions}: {', '.join(_others(robot))}; take the format csv")
     motion, world = open_loop(robot.motion(genome)), robot.world
     if form == "csv":
         return _csv(motion, world)

@@ -223,6 +223,9 @@ def sent(spec: ResolvedSpec) -> SentSpec:
 
 
 def received(spec: SentSpec) -> ResolvedSpec:
-    """Return the spec that was sent, in a process that has imported its plug-ins and no others."""
+    """Return the spec that was sent, and let this process know its robot.
+
+    The process must have imported the spec's plug-ins and no others.
+    """
     robot_library.learn(spec.robots)
     return ResolvedSpec.model_validate_json(spec.text)

@@ -118,7 +118,7 @@ LEAST_IN_UNIT = 3.0
 def cost_axis(store: Store, curves: Sequence[Curve], cost: Cost, *, cost_s: float = 0.0) -> CostAxis:
     """Return the horizontal axis for curves that are drawn against the rollouts, or the time, that they took so far.
 
-    Each real-world evaluation takes `cost_s` seconds. A level has no place on the axis.
+    Each real-world evaluation takes `cost_s` seconds. The level of a strategy without samples has no place on it.
     """
     with store.reading() as session:
         costs = results.iteration_costs(session, [curve.experiment for curve in curves if not curve.level])

@@ -192,7 +192,9 @@ def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
         raise InvalidSpec([Violation(pointer, ref.name, message, able)])
     if not engine.available():
         installed = [name for name in able if engines[name].available()]
-        raise InvalidSpec([Violation(pointer, ref.name, f"not installed: {engine.install}", installed)])
+        raise InvalidSpec(
+            [Violation(pointer, ref.name, f"the engine {ref.name} is not installed here: {engine.install}", installed)]
+        )
     return engine
 
 

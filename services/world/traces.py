@@ -318,7 +318,7 @@ def unlikely(trace: Trace, expected: Trace, alignment: Alignment) -> Iterator[st
 
 
 def _holes(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
-    """Yield the longest time without a pose, and the longest with one pose."""
+    """Yield sentences: where poses are missing or stay the same for too long, or that the base never moves."""
     if len(times_s) < 2:
         return
     steps = np.diff(times_s)

@@ -74,7 +74,7 @@ def test_each_target_has_the_unit_of_what_its_motor_follows(put: Any) -> None:
     assert heading == ["time_s", *(f"{name} ({unit})" for name, unit in zip(plain["actuators"], UNITS, strict=True))]
     assert [float(cell) for cell in rest] == [-1.0, *[0.0] * 8]
     assert [float(target) for target in first[1:]] == plain["targets"][0] == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]
-    with pytest.raises(Conflict, match=r"follow others: velocity hinge \(velocity\), .*, torque slide \(torque\)"):
+    with pytest.raises(Conflict, match=r"something else: velocity hinge \(velocity\), .*, torque slide \(torque\)"):
         written("mixed", "ros2")
 
 

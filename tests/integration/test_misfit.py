@@ -63,7 +63,7 @@ def test_advice_counts_samples_and_not_iterations(store: Store) -> None:
     spec = toy(repetitions=5, reality={"kind": "physical", "samples": known})
     experiment = submit_one(store, spec).id
     for number, claim in enumerate(execution.claim(store, "me", 5)):
-        found = Simulator([0.3 * number, 0.2 * number], 0.04)  # type: ignore[arg-type]
+        found = Simulator(np.array([0.3 * number, 0.2 * number]), 0.04)
         for step in some_log():
             execution.record(store, claim, replace(step, simulators=(found,)) if isinstance(step, Tuned) else step)
 
@@ -77,13 +77,13 @@ def test_advice_counts_samples_and_not_iterations(store: Store) -> None:
 def test_a_coefficient_at_its_bound_is_remarked_on(store: Store) -> None:
     experiment = submit_one(store, toy(repetitions=1, iterations=1)).id
     (claim,) = execution.claim(store, "me", 1)
-    simulators = (Simulator([1.5, 0.7], 0.04),)  # type: ignore[arg-type]
+    simulators = (Simulator(np.array([1.5, 0.7]), 0.04),)
     log = [
         *some_log(0),
-        Selected(1, [0.5]),  # type: ignore[arg-type]
-        Measured(1, Sample([0.5], 0.3)),  # type: ignore[arg-type]
+        Selected(1, np.array([0.5])),
+        Measured(1, Sample(np.array([0.5]), 0.3)),
         Tuned(1, simulators),
-        Transferred(1, [0.1], 0.5),  # type: ignore[arg-type]
+        Transferred(1, np.array([0.1]), 0.5),
     ]
     for step in log:
         execution.record(store, claim, step)

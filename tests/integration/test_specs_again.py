@@ -195,9 +195,9 @@ def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
     assert said.code == document.code == again.code == 0
     assert "2 of 2 repetitions have the same bits." in said.out
     assert json.loads(document.out)["same"] == 2
-    spec = gaplab("spec", again.out.strip()).out
-    assert spec == gaplab("spec", study.id).out
-    assert stored(json.loads(spec)) == stored(SMALL | {"repetitions": 1})
+    spec, before = (json.loads(gaplab("spec", id_).out) for id_ in (again.out.strip(), study.id))
+    assert spec == before
+    assert stored(spec) == stored(SMALL | {"repetitions": 1})
 
 
 @pytest.mark.release

@@ -54,7 +54,7 @@ class Tuner(Plugin):
         return (optimizer.diverse(ensemble) if ensemble > 1 else optimizer).least_evaluations
 
     def divisor(self, samples: int) -> int:  # noqa: ARG002 - for those that need it
-        """Return the number that divides the evaluations of a tuning on some samples, by default 1."""
+        """Return by what `simulator_evaluations` is divided for a tuning on so many samples; by default 1."""
         return 1
 
     @classmethod

@@ -82,7 +82,7 @@ def _font() -> "FT2Font":
 
 
 def legend_name(name: str) -> str:
-    """Return the name for matplotlib's legend, which leaves out names that begin with an underscore."""
+    """Return a name that matplotlib's legend shows: with a space before an underscore; an empty one is left out."""
     return f" {name}" if name.startswith("_") else name or "_nothing"
 
 

@@ -68,7 +68,10 @@ def content_of(session: Session, id_: str) -> bytes:
 
 
 def insert_unless_there(session: Session, rows: Iterable[dict[str, Any]]) -> None:
-    """Insert files with their contents; one that is there already stays as it is, until the transaction has ended."""
+    """Insert files with their contents.
+
+    One that is there already stays as it is, and nobody can delete it before this transaction ends.
+    """
     for row in rows:
         if not present(session, [row["id"]]):
             session.execute(insert_new(session, AttachmentRow).values({"created_at": now()} | row))

@@ -53,7 +53,7 @@ def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None
 
 
 def forget(session: Session, repetitions: Sequence[int]) -> None:
-    """Delete the parts of steps that are recorded or abandoned, so that part 0 is the next."""
+    """Delete the checkpoints of repetitions whose step was recorded or given up; the next one is number 0 again."""
     if repetitions:
         session.execute(delete(CheckpointRow).where(CheckpointRow.repetition_id.in_(repetitions)))
         session.execute(update(RepetitionRow).where(RepetitionRow.id.in_(repetitions)).values(checkpoints=0))

@@ -48,7 +48,7 @@ def _friction(world: World) -> str:
 
 
 def _response(world: World) -> tuple[str, ...]:
-    """Return the label of the number that decides how most motors respond."""
+    """Return the label of the tunable that decides how most motors respond, like `kp`; empty without motors."""
     motors = [joint.motor for joint in world.actuators]
     if not motors:
         return ()

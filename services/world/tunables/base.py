@@ -66,7 +66,7 @@ class Tunable(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return field, unit and bounds without options, for the catalogue."""
+        """Return the field of the World that it edits, its unit and bounds, with default options, for the catalogue."""
         tunable = cls()
         names = ("field", "unit", "lower", "upper", "least", "greatest")
         return {name: getattr(tunable, name) for name in names}
@@ -152,7 +152,7 @@ class ScaleOptions(Frozen):
 
 
 class ValueOptions(Frozen):
-    """Options of a group's number that is often 0, and usually set."""
+    """Options of a tunable of several bodies or joints whose quantity is often 0: by default set, and not scaled."""
 
     of: Pattern = Field(default="*", description=ALL)
     how: Literal["scale", "value"] = Field(default="value", alias="as", description=HOW)
