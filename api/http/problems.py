@@ -165,7 +165,7 @@ def _of_framework(request: Request, error: Exception) -> Response:
 
 
 def _of_bug(request: Request, error: Exception) -> Response:
-    """Answer an unexpected error without its message, which goes to the log under the same number.
+    """Answer an unexpected error with the number of an incident, under which the log has its message.
 
     Its cause is the service, or an external plug-in, which is named with the line that raised the error.
     """

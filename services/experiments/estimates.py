@@ -58,8 +58,10 @@ def estimate(
     )
 
 
-def check_cost(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
-    """Refuse a cost above the limit, unless the request confirms it; `done` rollouts of it are completed.
+def check_cost(
+    session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, rollouts: int, done: int
+) -> None:
+    """Refuse a cost above the limit, unless the request confirms it; `done` of its rollouts are completed.
 
     Raises:
         CostUnconfirmed: the message has the cost and the limit.
@@ -67,7 +69,6 @@ def check_cost(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
     if admitted.limits is None or admitted.cost_known:
         return
     limit = admitted.limits.unconfirmed_core_hours
-    rollouts = sum(expected_rollouts(each) * each.repetitions for each in specs)
     if (rollouts - done) * SLOWEST_ROLLOUT_S <= limit * 3_600:
         return
     measured = _measured(costs.latest(session, LATEST))

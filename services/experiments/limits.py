@@ -11,7 +11,6 @@ from gaplab.schemas.lifecycle import OPEN
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import InvalidSpec, LimitReached, Violation
 from gaplab.services.settings import Limits, variable_of
-from gaplab.services.specs.resolution import expected_rollouts
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.requests import bench_key, spellings
 from gaplab.services.store.session import Session
@@ -71,8 +70,8 @@ def check_extent(specs: Sequence[ResolvedSpec], limits: Limits | None) -> None:
         raise InvalidSpec(violations)
 
 
-def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
-    """Refuse a submission, of which `done` rollouts are completed, that would exceed the work in progress.
+def check_load(session: Session, admitted: Admission, *, experiments: int, rollouts: int) -> None:
+    """Refuse a submission of so many experiments and rollouts if it would exceed the work in progress.
 
     The transaction is the one that inserts it.
 
@@ -82,12 +81,11 @@ def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
     if (limits := admitted.limits) is None:
         return
     wait_for_others(session, _LOCK)
-    experiments, rollouts = _load(session)
-    more = max(0, sum(expected_rollouts(each) * each.repetitions for each in specs) - done)
-    _check("experiments_per_token", experiments[admitted.token], len(specs), limits)
-    _check("rollouts_per_token", rollouts[admitted.token], more, limits)
-    _check("experiments", experiments.total(), len(specs), limits)
-    _check("rollouts", rollouts.total(), more, limits)
+    present, left = _load(session)
+    _check("experiments_per_token", present[admitted.token], experiments, limits)
+    _check("rollouts_per_token", left[admitted.token], rollouts, limits)
+    _check("experiments", present.total(), experiments, limits)
+    _check("rollouts", left.total(), rollouts, limits)
 
 
 def _load(session: Session) -> tuple[Counter[str | None], Counter[str | None]]:

@@ -66,8 +66,9 @@ def admit(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, 
         LimitReached: too much work is in progress.
     """
     check_extent(specs, admitted.limits)
-    check_cost(session, specs, admitted, done=done)
-    check_load(session, specs, admitted, done=done)
+    rollouts = sum(expected_rollouts(each) * each.repetitions for each in specs)
+    check_cost(session, specs, admitted, rollouts=rollouts, done=done)
+    check_load(session, admitted, experiments=len(specs), rollouts=max(0, rollouts - done))
 
 
 def extent_of(spec: ResolvedSpec) -> Extent:

@@ -244,7 +244,8 @@ def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -
         _LEASES.end(session, done, Change(State.COMPLETED, Ending.COMPLETED, values={"owner": None}))
         handed_back = Change(State.QUEUED, Ending.HANDED_BACK, values={"owner": None})
         _LEASES.end(session, row.id.in_(leaving), handed_back)
-    waiting = wait(session, {claim: item for claim, item in asked.items() if claim.id not in leaving})
+    asking = {claim: item for claim, item in asked.items() if claim.id not in leaving}
+    waiting = wait(session, asking) if asking else ()
     return tuple(claim for claim in held if claim.id not in leaving and claim not in waiting)
 
 

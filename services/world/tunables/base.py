@@ -120,7 +120,7 @@ class MaterialTunable(Tunable):
         return float(sum(values) / len(values))
 
     def edit(self, world: World, value: float) -> World:
-        """Return the world with the coefficient replaced."""
+        """Return the world whose chosen surfaces have a value as the coefficient of this tunable."""
         if not self.options.of:
             return replace(world, material=self.changed(world.material, value))
         chosen = matching(self.options.of, [name for name, _ in world.surfaces])
@@ -130,7 +130,7 @@ class MaterialTunable(Tunable):
         return world.edited("surfaces", surfaces=surfaces)
 
     def changed(self, material: Material, value: float) -> Material:
-        """Return a material with the coefficient replaced."""
+        """Return a material whose coefficient of this tunable has a value."""
         change = {self._coefficient: float(value)}
         return replace(material, **change)
 
