@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable
 from math import inf
 from time import sleep
+from typing import Any
 
 from sqlalchemy import select
 
@@ -14,9 +15,10 @@ from gaplab.services.running.execution import Claim
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.session import Store
+from gaplab.workers.process_tasks import NoChecks
 from gaplab.workers.repetitions import Repetitions
 from gaplab.workers.supervisor import Supervisor
-from gaplab.workers.task import Run, delivered
+from gaplab.workers.task import Batch, delivered
 
 SPEC = ExperimentSpec.model_validate(
     {
@@ -36,31 +38,42 @@ ROUNDS = 2_000
 """More than any run takes."""
 
 
-class HereRun(Run):
-    """A run whose repetition is computed by this process."""
+class HereTask:
+    """A repetition that this process computes as its batches are taken."""
 
-    def receive(self) -> None:
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+
+    def take(self) -> Batch | None:
         """The next batch, or the end."""
-        batch = next(self.stream, None)
-        self.ended = batch is None
-        self.take(batch or ())
+        batch: Batch | None = next(self.stream, None)
+        return batch
 
     def cancel(self) -> None:
         """What computes it ends with its next delivery."""
         self.stream.close()
 
 
-class NoChecks:
-    """Sensitivity checks are left to Ray."""
+class HereTasks:
+    """Tasks that this process computes."""
 
-    def step(self) -> None:
-        """None runs."""
+    def __init__(self) -> None:
+        self.versions: dict[str, str] = {}
 
-    def heartbeat(self) -> None:
-        """None is held."""
+    def start(self, claim: Claim, expected: Any, checkpoint_s: float) -> HereTask:
+        """Compute it in this process."""
+        return HereTask(delivered(lambda: setting(claim.spec, claim.number), claim, checkpoint_s))
 
-    def hand_back(self) -> None:
-        """None was taken."""
+    def ready(self, tasks: Any, longest_s: float) -> Any:
+        """Each has a batch, once it is computed."""
+        return tasks
+
+    def permit(self, keys: Any, until: float) -> None:
+        """Nothing moves."""
+
+    def checks(self, *_: Any) -> NoChecks:
+        """They are left to Ray."""
+        return NoChecks()
 
 
 class HereRepetitions(Repetitions):
@@ -71,27 +84,15 @@ class HereRepetitions(Repetitions):
         self._looked = -inf
         super().claim(capacity)
 
-    def launch(self, claim: Claim) -> Run:
-        """Compute the repetition in this process."""
-        stream = delivered(lambda: setting(claim.spec, claim.number), claim, self._checkpoint_s)
-        return HereRun(claim, stream)
-
-    def receive(self) -> None:
-        """Take the next batch of each run."""
-        for run in self.runs:
-            if not run.over:
-                run.receive()
-
 
 class Here(Supervisor):
     """The supervisor as it is, but for Ray: each round has a heartbeat, each answer of a simulator is a checkpoint."""
 
-    repetitions: type[HereRepetitions] = HereRepetitions
+    tasks: type[HereTasks] = HereTasks
 
     def __init__(self, store: Store, checkpoint_s: float = 0.0) -> None:
-        super().__init__(store, lambda: 2)
-        self._repetitions = self.repetitions(store, self._owner, {}, checkpoint_s)
-        self._checks = NoChecks()  # type: ignore[assignment]
+        super().__init__(store, lambda: 2, self.tasks())
+        self._repetitions = HereRepetitions(store, self._owner, self.tasks(), checkpoint_s)
 
     def _heartbeat(self) -> None:
         self._beat = -inf

@@ -61,6 +61,7 @@ def _work(store: Store, settings: Settings, pulse: PulsePipe) -> None:
         StoreChanged: the database has another schema, or is another one than at the start.
     """
     from gaplab.workers.cluster import cluster  # Ray takes a second to import
+    from gaplab.workers.ray_tasks import RayTasks
     from gaplab.workers.supervisor import Stop, Supervisor
     from gaplab.workers.task import Patience
 
@@ -74,7 +75,8 @@ def _work(store: Store, settings: Settings, pulse: PulsePipe) -> None:
         logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
         start_s = inf if settings.ray_address else Patience.start_s
         patience = Patience(settings.rollout_limit_s, settings.step_limit_s, start_s)
-        supervisor = Supervisor(store, joined.capacity, joined.versions, lease_s=settings.lease_s, patience=patience)
+        tasks = RayTasks(joined.versions)
+        supervisor = Supervisor(store, joined.capacity, tasks, lease_s=settings.lease_s, patience=patience)
         supervisor.serve(stop, pulse)
 
 

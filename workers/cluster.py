@@ -24,7 +24,8 @@ from ray.exceptions import RayError
 from gaplab.arithmetic import chosen
 from gaplab.services.settings import Settings
 from gaplab.workers.errors import ClusterUnusable, RayGone
-from gaplab.workers.nodes import Versions, check_nodes, versions
+from gaplab.workers.expected import Versions, versions
+from gaplab.workers.nodes import check_nodes
 
 try:
     import fcntl

@@ -9,3 +9,7 @@ class ClusterUnusable(GaplabError):
 
 class RayGone(ClusterUnusable):
     """The Ray of this process died or does not answer; calls to it may never return."""
+
+
+class TaskLost(GaplabError):
+    """The process that computed a repetition is gone, and another must continue it; the message says how it ended."""

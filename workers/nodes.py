@@ -1,79 +1,26 @@
-"""Versions that all nodes of a cluster must share, so that a repetition has the same numbers on each of them.
+"""The nodes of a cluster, each of which must have the versions of this process, and their processes."""
 
-gaplab and its libraries concern all work: a node that has others ends the supervisor. An external plug-in concerns
-only the experiments that name it: a process that has another version refuses them, and does the others.
-"""
-
-import platform
-import sys
-from collections.abc import Mapping
-from hashlib import sha256
-from typing import Any, TextIO
+from typing import Any
 
 import ray
-from ray.exceptions import RayError
+from ray.exceptions import RayError, RayTaskError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from gaplab.schemas.plugin import PluginRef
-from gaplab.schemas.provenance import Provenance
-from gaplab.services.plugins import folders
-from gaplab.services.plugins.external import unavailable
-from gaplab.services.plugins.folders import PluginDiffers
-from gaplab.services.running.versions import Versions as Versions
-from gaplab.services.running.versions import named_versions, plugin_versions
-from gaplab.services.running.versions import versions as versions
-from gaplab.services.world import robot_library
+from gaplab.services.specs.blame import describe
 from gaplab.workers.errors import ClusterUnusable
+from gaplab.workers.expected import Versions, compare, plugins_of, versions
 
 ANSWER_S = 60.0
 """Longest wait for a node to start a process and name its versions."""
 
-PLUGIN = "plug-in "
-"""Begins the names of external plug-ins among versions."""
-
 IMPORTED = "GAPLAB_PLUGINS_IMPORTED"
 """Variable of a process that imports external plug-ins; Ray gives a task only a process with the same variables."""
-
-ROBOT = "robot "
-"""Begins the names of robot files, whose texts are among versions."""
-
-
-def with_plugins(shared: Versions, under: Provenance, spec: Mapping[str, Any]) -> Versions:
-    """Return what a process must have for work on a spec that was claimed under a provenance.
-
-    These are the shared versions of gaplab and its libraries, those of its plug-ins, and robot files.
-    """
-    files = robot_library.needed_by(PluginRef.model_validate(spec["robot"]))
-    plugins = {f"{PLUGIN}{plugin}": text for plugin, text in named_versions(under, spec).items()}
-    return shared | plugins | {f"{ROBOT}{place}": text for place, text in enumerate(files)}
 
 
 def process_for(expected: Versions) -> dict[str, Any]:
     """Return Ray's options for a task, and actors that it starts, in processes of these plug-ins and no others."""
-    plugins = sorted(text for name, text in expected.items() if name.startswith(PLUGIN))
-    digest = sha256(repr(plugins).encode()).hexdigest()
-    return {"runtime_env": {"env_vars": {IMPORTED: digest}}} if plugins else {}
-
-
-def check_here(expected: Versions) -> None:
-    """Check that this process has the expected versions, and learn the robot files that came with them.
-
-    It imports the expected plug-ins and no others; their files only if they are the expected ones.
-
-    Raises:
-        ClusterUnusable: it lacks versions of gaplab or its libraries; the message says which.
-        PluginDiffers: it lacks versions of plug-ins.
-    """
-    limit_prints()
-    shared = {name: text for name, text in expected.items() if not name.startswith((PLUGIN, ROBOT))}
-    wanted = {name.removeprefix(PLUGIN): text for name, text in expected.items() if name.startswith(PLUGIN)}
-    _compare(platform.node(), versions(), shared)
-    folders.use(wanted)
-    found = plugin_versions()
-    if wrong := [plugin for plugin in wanted if found.get(plugin) != wanted[plugin]]:
-        texts = {each: unavailable(each) or folders.differs(found.get(each, "none"), wanted[each]) for each in wrong}
-        raise PluginDiffers(texts, wanted)
-    robot_library.learn(text for name, text in expected.items() if name.startswith(ROBOT))
+    plugins = plugins_of(expected)
+    return {"runtime_env": {"env_vars": {IMPORTED: plugins}}} if plugins else {}
 
 
 def check_nodes() -> None:
@@ -92,7 +39,7 @@ def check_nodes() -> None:
         except RayError as error:
             msg = f"the node {name} cannot run gaplab, which every node needs: {_last_line(error)}"
             raise ClusterUnusable(msg) from error
-        _compare(name, found, versions())
+        compare(name, found, versions())
 
 
 def _versions_here() -> Versions:
@@ -102,41 +49,11 @@ def _versions_here() -> Versions:
 _versions_of_node = ray.remote(num_cpus=0, max_retries=0)(_versions_here)  # which Ray sends by its name
 
 
-def _compare(node: str, found: Versions, expected: Versions) -> None:
-    wrong = [name for name in expected if found.get(name) != expected[name]]
-    if wrong:
-        theirs, ours = (", ".join(f"{name} {has.get(name, 'none')}" for name in wrong) for has in (found, expected))
-        msg = (
-            f"the node {node} has {theirs} where the supervisor has {ours}: install the same on all nodes, "
-            "or start the supervisor again if files were changed since it started"
-        )
-        raise ClusterUnusable(msg)
-
-
 def _last_line(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if lines else type(error).__name__
 
 
-LONGEST = 1_000_000
-"""Characters of what is printed at once: Ray never cuts a line."""
-
-
-def limit_prints() -> None:
-    """Cut the long texts that this process prints from now on."""
-    for stream in (sys.stdout, sys.stderr):
-        if not hasattr(stream, "is_limited"):
-            _limit(stream)
-
-
-def _limit(stream: TextIO) -> None:
-    write = stream.write
-
-    def write_short(text: str) -> int:
-        if len(text) <= LONGEST:
-            return write(text)
-        write(f"{text[:LONGEST]}… ({len(text) - LONGEST:,} more characters)\n")
-        return len(text)
-
-    stream.write = write_short  # type: ignore[method-assign]
-    stream.is_limited = True  # type: ignore[attr-defined]
+def told(error: RayTaskError) -> str:
+    """Return the sentence of an error that a task raised; one that could not be sent is a text already."""
+    return describe(error.cause if isinstance(error.cause, Exception) else error)

@@ -1,15 +1,11 @@
 """Permits to move hardware: short, renewed with each heartbeat, so that a holder that loses its lease stops in time."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from threading import Event, Thread
 from time import monotonic, sleep
-from typing import Any, TypeAlias
-
-import ray
-from ray.exceptions import RayError
-from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+from typing import TypeAlias
 
 from gaplab.services.core.arrays import Genome
 from gaplab.services.core.ports import Reality
@@ -21,50 +17,8 @@ PERMIT_SHARE = 0.8
 POLL_S = 0.25
 """Seconds between questions for a permit."""
 
-ANSWER_S = 0.5
-"""Seconds that an answer may take; a process that stands still gives none, and the permit must expire all the same."""
-
 Key: TypeAlias = tuple[int, int, int]
 """A repetition's id, the epoch of its lease, and the place in its log of the step whose measurement is permitted."""
-
-Handle: TypeAlias = Any
-"""A handle of a Permits actor, which Ray does not type."""
-
-
-@ray.remote(num_cpus=0, max_restarts=-1)
-class Permits:
-    """The permits of one supervisor, in a separate process: they expire even if the supervisor is stopped.
-
-    It runs on the supervisor's node, with which it shares the monotonic clock. So permits that arrive late, because
-    this process or the network stood still, expire in time all the same.
-
-    If the process dies, Ray starts another. It permits nothing until the next heartbeat renews the permits.
-    """
-
-    def __init__(self) -> None:
-        self._until: dict[Key, float] = {}
-
-    def renew(self, keys: Sequence[Key], until: float) -> None:
-        """Permit these measurements, and no others, to move hardware until a time of the monotonic clock."""
-        self._until = dict.fromkeys(keys, until)
-
-    def left(self, key: Key) -> float:
-        """Return the seconds for which the measurement may still move hardware; 0 or less if it may not."""
-        return self._until.get(key, 0.0) - monotonic()
-
-
-def permits_here() -> Handle:
-    """Start the process of the permits on this process's node."""
-    here = NodeAffinitySchedulingStrategy(ray.get_runtime_context().get_node_id(), soft=False)
-    return Permits.options(scheduling_strategy=here).remote()  # type: ignore[attr-defined]  # Ray adds it
-
-
-def asking(permits: Handle, id_: int, epoch: int) -> Callable[[int], float]:
-    """Return a function that asks for the seconds that are left of a permit, given the place of the step in the log.
-
-    It raises GetTimeoutError if there is no answer in time, and another RayError if the permits' process died.
-    """
-    return lambda step: float(ray.get(permits.left.remote((id_, epoch, step)), timeout=ANSWER_S))
 
 
 class PermittedReality:
@@ -73,7 +27,7 @@ class PermittedReality:
     Args:
         reality: the hardware.
         stop: stops the hardware at once; called from another thread.
-        left: returns the seconds until the permit of a step expires, or raises as `asking` says.
+        left: returns the seconds until the permit of a step expires; raises TimeoutError if nobody answers.
         end: ends this process.
         poll_s: seconds between questions for a permit.
     """
@@ -111,7 +65,7 @@ class PermittedReality:
     def _expiry(self, step: int, known: float) -> float:
         """Return when the permit expires; the last known time, if the permits' process does not answer or has died."""
         asked = monotonic()
-        with suppress(RayError):
+        with suppress(TimeoutError):
             return asked + self._left(step)
         return known
 

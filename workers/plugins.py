@@ -13,7 +13,7 @@ from gaplab.services.running.provenance import tell_refused
 from gaplab.services.running.versions import provenance
 from gaplab.services.store.lease import Claim
 from gaplab.services.store.session import Store
-from gaplab.workers.nodes import Versions, with_plugins
+from gaplab.workers.expected import Versions, with_plugins
 
 FIRST_S = 30.0
 """First wait before a refused plug-in is tried again; the wait doubles with each refusal."""

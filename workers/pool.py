@@ -20,7 +20,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Outcomes, Parameters
 from gaplab.services.core.ports import Sense, Simulate
 from gaplab.services.specs.assembly import simulated
-from gaplab.workers.nodes import Versions, check_here
+from gaplab.workers.expected import Versions, check_here
 
 CHECK_S = 1.0
 """Interval between checks for idle cores."""

@@ -6,8 +6,6 @@ from contextlib import suppress
 from threading import Event
 from time import monotonic
 
-import ray
-
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.lease_ends import Silences
 from gaplab.services.running import execution
@@ -16,12 +14,10 @@ from gaplab.services.specs.resolution import hardware_of
 from gaplab.services.store.database_errors import StoreUnavailable
 from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store
-from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
-from gaplab.workers.nodes import Versions, process_for
-from gaplab.workers.permits import PERMIT_SHARE, Handle, permits_here
+from gaplab.workers.permits import PERMIT_SHARE
 from gaplab.workers.plugins import Plugins
-from gaplab.workers.task import Patience, Run
+from gaplab.workers.task import Patience, Run, Tasks
 
 WAIT_S = 0.2
 """Longest wait for a delivery."""
@@ -38,14 +34,14 @@ log = logging.getLogger("gaplab.supervisor")
 class Repetitions:
     """The claimed repetitions of one supervisor. All methods raise StoreUnavailable; no delivery is lost then.
 
-    Nodes must have the versions to run them. After `lease_s` without a heartbeat, others may take the claims.
+    `tasks` computes them. After `lease_s` without a heartbeat, others may take the claims.
     """
 
     def __init__(
         self,
         store: Store,
         owner: str,
-        versions: Versions,
+        tasks: Tasks,
         checkpoint_s: float = CHECKPOINT_S,
         patience: Patience | None = None,
         lease_s: float = execution.STALE_AFTER_S,
@@ -53,24 +49,19 @@ class Repetitions:
         self.runs: list[Run] = []
         self._store = store
         self._owner = owner
-        self._plugins = Plugins(versions)
+        self._tasks, self._plugins = tasks, Plugins(tasks.versions)
         self._checkpoint_s = checkpoint_s
         self._patience = patience or Patience()
         self._lease_s = lease_s
         self._looked = -LOOK_S
         self._unsure = False
-        self._permits: Handle | None = None
         self._renewed = -lease_s
         self._silences = Silences[int]()
 
     def launch(self, claim: Claim) -> Run:
-        """Give a claimed repetition to a Ray task."""
-        hardware = hardware_of(claim.spec) is not None
-        if hardware and self._permits is None:
-            self._permits = permits_here()
-        permits, expected = self._permits if hardware else None, self._plugins.expected(claim.spec)
-        run = task.run.options(**process_for(expected))
-        return Run(claim, run.remote(claim, expected, self._checkpoint_s, permits), permits)
+        """Start to compute a claimed repetition."""
+        task = self._tasks.start(claim, self._plugins.expected(claim.spec), self._checkpoint_s)
+        return Run(claim, task, hardware=hardware_of(claim.spec) is not None)
 
     def heartbeat(self) -> None:
         """Renew the claims, stop the runs whose claim is no longer valid, and end those that hang."""
@@ -110,15 +101,14 @@ class Repetitions:
 
     def receive(self) -> None:
         """Wait shortly for deliveries, and take the ready ones."""
-        streams = {run.stream: run for run in self.runs if not run.over}
-        if not streams:
+        runs = [run for run in self.runs if not run.over]
+        if not runs:
             Event().wait(WAIT_S)
             return
-        ready, _ = ray.wait(list(streams), num_returns=len(streams), timeout=0)
-        if not ready:
-            ready, _ = ray.wait(list(streams), num_returns=1, timeout=WAIT_S)
-        for stream in ready:
-            streams[stream].receive()
+        ready = self._tasks.ready([run.task for run in runs], WAIT_S)
+        for run in runs:
+            if any(run.task is task for task in ready):
+                run.receive()
 
     def store_received(self) -> None:
         """Record the received deliveries and measurements that began; stop the runs whose claim is no longer valid."""
@@ -205,17 +195,16 @@ class Repetitions:
 
     def _permit(self, but: Collection[Run] = ()) -> None:
         """Let measurements whose beginning is stored move hardware, for a part of the lease; none of the runs `but`."""
-        if self._permits is not None:
-            able = (run for run in self.runs if run.permits is not None and run not in but)
-            keys = [(run.claim.id, run.claim.epoch, run.measuring) for run in able if run.measuring is not None]
-            self._permits.renew.remote(keys, self._renewed + PERMIT_SHARE * self._lease_s)
+        able = (run for run in self.runs if run.hardware and run not in but)
+        keys = [(run.claim.id, run.claim.epoch, run.measuring) for run in able if run.measuring is not None]
+        self._tasks.permit(keys, self._renewed + PERMIT_SHARE * self._lease_s)
 
     def _stop(self, runs: Collection[Run]) -> None:
         """End the tasks of these runs; one that may be moving hardware may stop it first."""
         self._permit(but=runs)
         for run in runs:
-            if run.permits is not None and run.measuring is not None:
-                run.wait_for_end(STOP_S)
+            if run.hardware and run.measuring is not None:
+                run.wait_for_end(self._tasks, STOP_S)
             run.cancel()
 
     def _complete(self, runs: list[Run]) -> None:

@@ -21,9 +21,10 @@ from gaplab.services.specs.blame import describe
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from gaplab.workers.errors import ClusterUnusable
-from gaplab.workers.nodes import Versions, check_here, process_for
+from gaplab.workers.expected import Versions, check_here
+from gaplab.workers.nodes import process_for, told
 from gaplab.workers.plugins import Plugins
-from gaplab.workers.task import Patience, give_back_memory, told
+from gaplab.workers.task import Patience, give_back_memory
 
 LOOK_S = 1.0
 """Shortest interval between checks of the queue."""

@@ -1,4 +1,4 @@
-"""The supervisor: it claims work, gives it to Ray tasks, and is the only writer of their deliveries.
+"""The supervisor: it claims work, gives it to tasks elsewhere, and is the only writer of their deliveries.
 
 It has no state of its own: killed at any moment and restarted, it continues from the stored steps.
 """
@@ -22,10 +22,8 @@ from gaplab.services.store.database_errors import StoreChanged, StoreUnavailable
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.errors import RayGone
-from gaplab.workers.nodes import Versions
 from gaplab.workers.repetitions import Repetitions
-from gaplab.workers.sensitivity import Checks
-from gaplab.workers.task import Patience, stuck
+from gaplab.workers.task import Patience, Tasks, stuck
 
 LOOK_S = 0.1
 """Longest time until a request to stop is noticed."""
@@ -67,15 +65,15 @@ log = logging.getLogger("gaplab.supervisor")
 class Supervisor:
     """Runs the queued work of a store.
 
-    Before each claim, `capacity` returns the number of repetitions to submit to Ray at once. Nodes must have the
-    versions to run them. All supervisors have the same `lease_s`: without a heartbeat for so long, one loses its work.
+    Before each claim, `capacity` returns the number of repetitions to give to `tasks` at once. All supervisors have the
+    same `lease_s`: without a heartbeat for so long, one loses its work.
     """
 
     def __init__(
         self,
         store: Store,
         capacity: Callable[[], int],
-        versions: Versions | None = None,
+        tasks: Tasks,
         *,
         checkpoint_s: float = CHECKPOINT_S,
         lease_s: float = execution.STALE_AFTER_S,
@@ -84,10 +82,11 @@ class Supervisor:
         self._store = store
         self._capacity = capacity
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
-        self._repetitions = Repetitions(store, self._owner, versions or {}, checkpoint_s, patience, lease_s)
-        self._checks = Checks(store, self._owner, lease_s, versions, patience)
+        patience = patience or Patience()
+        self._repetitions = Repetitions(store, self._owner, tasks, checkpoint_s, patience, lease_s)
+        self._checks = tasks.checks(store, self._owner, lease_s, patience)
         self._takes = Silences[str]()
-        self._lease_s, self._start_s = lease_s, (patience or Patience()).start_s
+        self._lease_s, self._start_s = lease_s, patience.start_s
         self._beat = -lease_s
         self._noted: datetime | None = None
         self._pulse = PulsePipe()
@@ -108,7 +107,7 @@ class Supervisor:
         """
         self._pulse = pulse or self._pulse
         self._pulse.name(self._owner)
-        ending = self._hand_back
+        ending = self.hand_back
         try:
             while not stop.is_set():
                 try:
@@ -127,7 +126,7 @@ class Supervisor:
         finally:
             ending()
 
-    def _hand_back(self) -> None:
+    def hand_back(self) -> None:
         """Return all leases, and forget this supervisor."""
         self._repetitions.hand_back(self._repetitions.runs)
         with suppress(StoreUnavailable):  # then their leases will run out

@@ -1,30 +1,30 @@
-"""A claimed repetition in Ray: the task that runs it on one core, its deliveries, and the limits of time for them."""
+"""A claimed repetition: the task that computes it elsewhere, its deliveries, and the limits of time for them.
+
+Two modules start such tasks: `ray_tasks` on a cluster, `process_tasks` in processes of this machine.
+"""
 
 import logging
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from ctypes import CDLL
 from dataclasses import dataclass, field, replace
 from time import monotonic, perf_counter
-from typing import TypeAlias
-
-import ray
-from ray import ObjectRefGenerator
-from ray.exceptions import RayError, RayTaskError
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from gaplab.services.core.answers import BLOCK
 from gaplab.services.core.loop import Setting
-from gaplab.services.core.ports import Reality
 from gaplab.services.core.types import Measured, Probed
 from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.specs.assembly import RealityFailed, engine_of, setting
 from gaplab.services.specs.blame import describe, raised
 from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, Requested, TimedStep
 from gaplab.workers.checkpoints import recorded
-from gaplab.workers.errors import ClusterUnusable
-from gaplab.workers.nodes import Versions, check_here
-from gaplab.workers.permits import Handle, PermittedReality, asking
-from gaplab.workers.pool import Pool
+from gaplab.workers.errors import TaskLost
+from gaplab.workers.expected import Versions
+from gaplab.workers.permits import Key, PermittedReality
+
+if TYPE_CHECKING:
+    from gaplab.services.store.session import Store  # a worker has no database
 
 BATCH_S = 0.2
 """Shorter steps are delivered in batches; an answer of reality is delivered at once."""
@@ -33,23 +33,6 @@ Batch: TypeAlias = tuple[Delivered | Pulse | Failure, ...]
 """The items that a worker sends at once."""
 
 log = logging.getLogger("gaplab.worker")
-
-
-@ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-def run(claim: Claim, expected: Versions, checkpoint_s: float, permits: Handle | None) -> Iterator[Batch]:
-    """Yield the steps that follow the claim's log, in batches; the first batch is empty, and shows that the task runs.
-
-    Ray never retries the task: a repetition continues from its stored log, not from its beginning. The worker process
-    keeps the engine loaded from task to task. An error is delivered as a text, because not every error can be sent.
-
-    Raises:
-        ClusterUnusable: this node lacks the expected versions.
-        PluginDiffers: this process lacks those of the plug-ins.
-    """
-    check_here(expected)
-    yield ()
-    yield from delivered(lambda: _prepared(claim, expected, permits), claim, checkpoint_s)
-    give_back_memory()
 
 
 def give_back_memory() -> None:
@@ -66,18 +49,14 @@ def delivered(prepare: Callable[[], Setting], claim: Claim, checkpoint_s: float)
         yield (failure_of(error),)
 
 
-def _prepared(claim: Claim, expected: Versions, permits: Handle | None) -> Setting:
+def prepared(claim: Claim, left: Callable[[int], float] | None) -> Setting:
+    """Return the setting of a claim; hardware needs permits, of which `left` tells as `PermittedReality` says."""
     alone = setting(claim.spec, claim.number)
-    if permits is not None:
-        alone = replace(alone, reality=_permitted(alone.reality, claim, permits))
-    pool = Pool(claim.spec, alone.simulate, alone.batch_size(), expected, alone.sense)
-    return replace(alone, simulate=pool, sense=pool.sense, batch_size=pool.batch_size)
-
-
-def _permitted(reality: Reality, claim: Claim, permits: Handle) -> PermittedReality:
+    if left is None:
+        return alone
     ref = claim.spec.reality.engine
     assert ref is not None, "permits are for hardware behind an engine"
-    return PermittedReality(reality, engine_of(ref).stop, asking(permits, claim.id, claim.epoch))
+    return replace(alone, reality=PermittedReality(alone.reality, engine_of(ref).stop, left))
 
 
 def failure_of(error: BaseException) -> Failure:
@@ -87,11 +66,6 @@ def failure_of(error: BaseException) -> Failure:
         return Failure(describe(error))
     cause = error.__cause__ or error
     return Failure(f"reality failed: {raised(cause)}", f"reality failed: {describe(cause)}", of_reality=True)
-
-
-def told(error: RayTaskError) -> str:
-    """Return the sentence of an error that a task raised; one that could not be sent is a text already."""
-    return describe(error.cause if isinstance(error.cause, Exception) else error)
 
 
 def batches(deliveries: Iterator[Delivered | Pulse]) -> Iterator[Batch]:
@@ -107,6 +81,57 @@ def batches(deliveries: Iterator[Delivered | Pulse]) -> Iterator[Batch]:
             begun = perf_counter()
     if batch:
         yield tuple(batch)
+
+
+class Task(Protocol):
+    """A repetition that is computed elsewhere."""
+
+    def take(self) -> Batch | None:
+        """Return the next batch once it is ready; None at the end.
+
+        Raises:
+            PluginDiffers: its process has other plug-ins, and did not begin it.
+            ClusterUnusable: its process has other versions of gaplab or its libraries, and did not begin it.
+            TaskLost: its process is gone.
+        """
+
+    def cancel(self) -> None:
+        """End it at once."""
+
+
+class Checks(Protocol):
+    """The sensitivity checks of a supervisor."""
+
+    def step(self) -> None:
+        """Store the result of the check that has ended, or start a queued one."""
+
+    def heartbeat(self) -> None:
+        """Renew the claim on the running check."""
+
+    def hand_back(self) -> None:
+        """Hand back the unfinished check."""
+
+
+class Tasks(Protocol):
+    """What computes the claimed work of a supervisor.
+
+    Attributes:
+        versions: those of gaplab and its libraries that a process must have.
+    """
+
+    versions: Versions
+
+    def start(self, claim: Claim, expected: Versions, checkpoint_s: float) -> Task:
+        """Start to compute a claimed repetition, in a process with the expected versions."""
+
+    def ready(self, tasks: Sequence[Any], longest_s: float) -> Sequence[Task]:
+        """Return the tasks that have a batch, an end or an error; wait for one if none has."""
+
+    def permit(self, keys: Sequence[Key], until: float) -> None:
+        """Permit these measurements, and no others, to move hardware until a time of the monotonic clock."""
+
+    def checks(self, store: "Store", owner: str, lease_s: float, patience: "Patience") -> Checks:
+        """Return the sensitivity checks of a supervisor."""
 
 
 CHECK_ROLLOUTS = 60
@@ -151,12 +176,12 @@ def stuck(runs: Collection["Run"], longest_s: float) -> str:
 
 @dataclass(eq=False)
 class Run:
-    """A claimed repetition that was submitted to Ray.
+    """A claimed repetition whose task was started.
 
     Attributes:
         claim: claim of the repetition.
-        stream: batches of steps and checkpoints from the task.
-        permits: actor that gives the permit to move hardware; None if reality is only computed.
+        task: what computes it.
+        hardware: whether it moves hardware, for which it needs permits.
         received: deliveries that are not stored yet.
         begun: true once the task has a core.
         asks: true once it has requested a measurement; the task then ends by itself.
@@ -170,8 +195,8 @@ class Run:
     """
 
     claim: Claim
-    stream: ObjectRefGenerator
-    permits: Handle | None = None
+    task: Task
+    hardware: bool = False
     received: list[Delivered] = field(default_factory=list)
     begun: bool = False
     asks: bool = False
@@ -184,20 +209,16 @@ class Run:
     measuring: int | None = None
 
     def receive(self) -> None:
-        """Take the next batch if the stream has one, or its end, or its error."""
+        """Take the next batch if the task has one, or its end, or its error."""
         try:
-            self.take(ray.get(next(self.stream)))
-        except StopIteration:
-            self.ended = True
-        except RayTaskError as error:
-            if isinstance(error.cause, ClusterUnusable):
-                raise error.cause from error
-            if isinstance(error.cause, PluginDiffers):
-                self.refused = error.cause
-            else:
-                self.failed = Failure(told(error))
-        except RayError as error:
-            self.lost = f"the worker was lost: {type(error).__name__}"
+            batch = self.task.take()
+        except PluginDiffers as error:
+            self.refused = error
+        except TaskLost as error:
+            self.lost = str(error)
+        else:
+            self.ended = batch is None
+            self.take(batch or ())
 
     def take(self, batch: Batch) -> None:
         """Take a delivery: steps and checkpoints to store, a heartbeat, or the reason of a failure."""
@@ -216,19 +237,19 @@ class Run:
     def cancel(self) -> None:
         """End the task at once; one that ends by itself is left alone, since its process may have begun another."""
         if not (self.ended or self.asks):
-            ray.cancel(self.stream, force=True)
+            self.task.cancel()
 
-    def wait_for_end(self, longest_s: float) -> None:
+    def wait_for_end(self, tasks: Tasks, longest_s: float) -> None:
         """Wait until the task has ended, and take its last deliveries."""
         until = monotonic() + longest_s
         while not self.over and (left := until - monotonic()) > 0:
-            if ray.wait([self.stream], timeout=left)[0]:
+            if tasks.ready([self.task], left):
                 self.receive()
 
     def overdue(self, patience: Patience) -> str | None:
         """Return why the task counts as hung; None if it does not. Measurements by hardware have no limit."""
         since_s, pulse = monotonic() - self.heard_at, self.pulse
-        by_hardware = pulse is not None and pulse.measuring and self.permits is not None
+        by_hardware = pulse is not None and pulse.measuring and self.hardware
         if not self.begun or by_hardware:
             return None
         idle_s, permitted_s = since_s + (pulse.idle_s if pulse else 0.0), patience.idle_s
@@ -242,7 +263,7 @@ class Run:
 
     @property
     def over(self) -> bool:
-        """Whether the stream has ended, with or without an error."""
+        """Whether the task has ended, with or without an error."""
         return self.ended or any(reason is not None for reason in (self.failed, self.refused, self.lost))
 
     @property

@@ -63,7 +63,7 @@ def start_service(
         process = start(*(("gaplab", "serve") if workers else ("gaplab.api",)), environment=environment, log=output)
     try:
         _wait_until_ready(url, process, log)
-        return LocalService(url, process, _token(database_url))
+        return LocalService(url, process, token_of(database_url))
     except BaseException:
         end(process)
         raise
@@ -79,7 +79,7 @@ def _wait_until_ready(url: str, process: "subprocess.Popen[bytes]", log: Path) -
             time.sleep(0.2)
 
 
-def _token(database_url: str) -> str | None:
+def token_of(database_url: str) -> str | None:
     """Return None, for GAPLAB_TOKEN, if the database has tokens; else "", because it would refuse any token."""
     with Store(database_url) as store:
         try:

@@ -127,23 +127,23 @@ def is_over(row: Row) -> bool:
     return row["ended_at"] is not None and State(row.get("state", State.COMPLETED)).ended
 
 
-def resting(table: str, row: Row, on_bench: Collection[str], now: datetime | None = None) -> Row:
+def resting(table: str, row: Row, going_on: Collection[str], now: datetime | None = None) -> Row:
     """Return a row without the state of work that is under way.
 
-    It is CANCELLED, since the archive hides the parameters of reality. Where reality is a robot on a bench nothing is
-    hidden: an experiment is PAUSED, and its repetitions are QUEUED.
+    It is CANCELLED where the archive hides the parameters of reality. What can go on, since nothing is hidden, like a
+    robot on a bench, rests: an experiment is PAUSED, and its repetitions are QUEUED.
 
     Args:
         table: the row's table.
         row: the row.
-        on_bench: the experiments on a bench that have not ended.
+        going_on: the experiments that have not ended, and of whose reality nothing is hidden.
         now: when it ends; None if its end is not to be said.
     """
     if table not in {"experiment", "repetition", "attempt"} or is_over(row):
         return row
-    physical = owner_of(table, row) in on_bench
+    rests = owner_of(table, row) in going_on
     if table == "attempt":
-        return row | {"ending": Ending.HANDED_BACK if physical else Ending.CANCELLED, "ended_at": now}
-    if physical:
+        return row | {"ending": Ending.HANDED_BACK if rests else Ending.CANCELLED, "ended_at": now}
+    if rests:
         return row | {"state": State.PAUSED if table == "experiment" else State.QUEUED, "ended_at": None}
     return row | {"state": State.CANCELLED, "ended_at": now}

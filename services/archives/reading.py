@@ -74,14 +74,18 @@ class CheckedArchive:
     experiments: Mapping[str, Row]
 
     @property
-    def on_bench(self) -> frozenset[str]:
-        """The experiments that had not ended and whose reality is a robot on a bench."""
-        return frozenset(id_ for id_, row in self.experiments.items() if row["robot"] is not None and not is_over(row))
+    def going_on(self) -> frozenset[str]:
+        """The experiments that had not ended, and of whose reality nothing is hidden: they can go on here."""
+        return frozenset(
+            id_
+            for id_, row in self.experiments.items()
+            if not is_over(row) and None not in row["spec"]["reality"]["parameters"].values()
+        )
 
     @property
     def called_off(self) -> list[str]:
         """The other experiments that had not ended."""
-        return [id_ for id_, row in self.experiments.items() if id_ not in self.on_bench and not is_over(row)]
+        return [id_ for id_, row in self.experiments.items() if id_ not in self.going_on and not is_over(row)]
 
     def rows(self, session: Session, table: str) -> Iterator[Row]:
         """Yield the rows of a table; the session is of `store`."""
@@ -178,7 +182,7 @@ def _work_left(found: CheckedArchive, limits: Limits) -> list[ResolvedSpec]:
         if (size := len(json.dumps(row["spec"], separators=(",", ":")))) > most:
             permitted = f"{most:,} are permitted, twice {variable_of('body_bytes')}"
             raise InvalidArchive(f"the spec of experiment {id_!r} has {size:,} bytes; {permitted}")
-    going_on = [row for id_, row in found.experiments.items() if id_ in found.on_bench]
+    going_on = [row for id_, row in found.experiments.items() if id_ in found.going_on]
     return [resolve_experiment(spec_of(row["spec"])) for row in going_on]
 
 
@@ -220,7 +224,7 @@ def _arriving(found: CheckedArchive, table: str, row: Row, now: datetime) -> Row
         known, over = spec_of(spec), is_over(row)
         row |= {"spec": spec, "hardware": hardware_of(known), "paused_because": None if over else "it was imported"}
         row |= {} if over else {"rollouts": expected_rollouts(known)}
-    return resting(table, row, found.on_bench, now)
+    return resting(table, row, found.going_on, now)
 
 
 def _renamed(table: str, row: Row, ids: Mapping[str, str]) -> Row:

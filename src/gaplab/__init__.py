@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from gaplab.api.clients.errors import ServiceUnreachable as ServiceUnreachable
     from gaplab.api.clients.figures import Figure as Figure
     from gaplab.api.clients.results import Comparisons as Comparisons
+    from gaplab.api.library.running import Interrupted as Interrupted
+    from gaplab.api.library.running import Result as Result
+    from gaplab.api.library.running import run as run
     from gaplab.api.process.errors import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
     from gaplab.samples import read_samples as read_samples
@@ -45,14 +48,17 @@ _MODULES = {
     "ExperimentFailed": "gaplab.api.clients.errors",
     "ExtraMissing": "gaplab.api.clients.errors",
     "Figure": "gaplab.api.clients.figures",
+    "Interrupted": "gaplab.api.library.running",
     "InvalidSamples": "gaplab.schemas.samples",
     "InvalidSpec": "gaplab.services.core.errors",
     "MeasurementFailed": "gaplab.api.clients.drivers",
     "NotSubmitted": "gaplab.api.clients.confirmation",
+    "Result": "gaplab.api.library.running",
     "ServiceError": "gaplab.api.clients.errors",
     "ServiceUnreachable": "gaplab.api.clients.errors",
     "local_service": "gaplab.api.process.local_service",
     "read_samples": "gaplab.samples",
+    "run": "gaplab.api.library.running",
 }
 
 __all__ = sorted(_MODULES)

@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from ray.exceptions import ActorDiedError, ActorUnavailableError, GetTimeoutError
 from sqlalchemy import update
 
 from gaplab.schemas.lifecycle import Ending, State, Verb
@@ -42,7 +41,7 @@ from gaplab.workers.repetitions import Repetitions
 from gaplab.workers.task import Patience, Run, stuck
 from tests.experiments import submit_one
 from tests.fakes import flat, install
-from tests.without_ray import Here, HereRepetitions, HereRun
+from tests.without_ray import Here, HereTask, HereTasks
 
 POLL_S = 0.001
 CHECKPOINT_S = 60.0
@@ -161,40 +160,40 @@ def test_a_strategy_that_lies_fails_alone_and_is_named(store: Store, answer: Any
     assert stored(store, honest) == computed(small())
 
 
-class LeftOut(HereRepetitions):
+class LeftOut(HereTasks):
     """Repetition 1 leaves out a part of what it has done, in its first attempts."""
 
     part: ClassVar[Any]
     attempts: ClassVar[int]
 
-    def launch(self, claim: Claim) -> Run:
+    def start(self, claim: Claim, expected: Any, checkpoint_s: float) -> HereTask:
         def stream() -> Iterator[Any]:
             steps = [TimedStep(step, 0.0) for step in repetition(setting(claim.spec, claim.number), claim.log)]
             if claim.number == 1 and claim.epoch <= self.attempts:
                 del steps[self.part]
             yield tuple(steps)
 
-        return HereRun(claim, stream())  # type: ignore[arg-type]
+        return HereTask(stream())
 
 
-class Nonsense(HereRepetitions):
+class Nonsense(HereTasks):
     """Repetition 1 delivers a step that no table holds."""
 
-    def launch(self, claim: Claim) -> Run:
+    def start(self, claim: Claim, expected: Any, checkpoint_s: float) -> HereTask:
         if claim.number != 1:
-            return super().launch(claim)
+            return super().start(claim, expected, checkpoint_s)
         nonsense = TimedStep(Tuned(0, ("no simulator",)), 0.0)  # type: ignore[arg-type]
-        return HereRun(claim, (each for each in [(nonsense,)]))  # type: ignore[arg-type]
+        return HereTask(iter([(nonsense,)]))
 
 
-def with_repetitions(kind: type[HereRepetitions], store: Store) -> Here:
-    return type("Such", (Here,), {"repetitions": kind})(store, CHECKPOINT_S)  # type: ignore[no-any-return]
+def with_tasks(kind: type[HereTasks], store: Store) -> Here:
+    return type("Such", (Here,), {"tasks": kind})(store, CHECKPOINT_S)  # type: ignore[no-any-return]
 
 
 def test_what_cannot_be_stored_fails_its_repetition_alone(sqlite_store: Store) -> None:
     experiment = submit_one(sqlite_store, small()).id
 
-    work(sqlite_store, with_repetitions(Nonsense, sqlite_store))
+    work(sqlite_store, with_tasks(Nonsense, sqlite_store))
 
     states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
     assert states == [State.COMPLETED, State.FAILED]
@@ -212,7 +211,7 @@ def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store: S
     LeftOut.part, LeftOut.attempts = part, 1
     experiment = submit_one(sqlite_store, small()).id
 
-    work(sqlite_store, with_repetitions(LeftOut, sqlite_store))
+    work(sqlite_store, with_tasks(LeftOut, sqlite_store))
 
     first, second = reading.list_attempts(sqlite_store, experiment, 1)
     assert (first.ending, second.ending) == (Ending.LOST, Ending.COMPLETED)
@@ -225,7 +224,7 @@ def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlit
     LeftOut.part, LeftOut.attempts = slice(0, 1), 99
     experiment = submit_one(sqlite_store, small()).id
 
-    work(sqlite_store, with_repetitions(LeftOut, sqlite_store))
+    work(sqlite_store, with_tasks(LeftOut, sqlite_store))
 
     repetitions = reading.list_repetitions(sqlite_store, experiment)
     assert [each.state for each in repetitions] == [State.COMPLETED, State.FAILED]
@@ -444,7 +443,7 @@ def test_a_hung_rollout_and_a_hung_step_are_told_but_hardware_takes_as_long_as_i
     patience, hung = Patience(1.0, 1_000.0), Run(claim, None)  # type: ignore[arg-type]
 
     def reason(pulse: Pulse | None, **changes: Any) -> str | None:
-        for name, value in ({"begun": True, "pulse": pulse, "permits": None} | changes).items():
+        for name, value in ({"begun": True, "pulse": pulse, "hardware": False} | changes).items():
             setattr(hung, name, value)
         return hung.overdue(patience)
 
@@ -452,7 +451,7 @@ def test_a_hung_rollout_and_a_hung_step_are_told_but_hardware_takes_as_long_as_i
     assert reason(Pulse(3, False, 99.0, 99.0)) is None
     assert "no rollout ended for 101 s; GAPLAB_ROLLOUT_LIMIT_S is 1 s" in str(reason(Pulse(3, False, 101.0, 101.0)))
     assert "reality did not answer for 101 s" in str(reason(Pulse(3, True, 101.0, 101.0)))
-    assert reason(Pulse(3, True, 1e9, 1e9), permits=object()) is None
+    assert reason(Pulse(3, True, 1e9, 1e9), hardware=True) is None
     assert "a step took 1001 s; GAPLAB_STEP_LIMIT_S" in str(reason(Pulse(3, False, 0.0, 1_001.0)))
     assert reason(Pulse(3, False, 101.0, 101.0), begun=False) is None
 
@@ -538,7 +537,7 @@ def test_a_permit_is_for_one_measurement_and_comes_after_its_beginning_is_stored
         permitted.append(keys)
         ends.append(until)
 
-    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=renew))
+    handle: Any = SimpleNamespace(versions={}, permit=renew)
     held, moving = measuring(handle)
 
     def note(_: Any, claims: Any) -> Any:
@@ -559,9 +558,9 @@ def test_a_permit_is_for_one_measurement_and_comes_after_its_beginning_is_stored
 
 def measuring(handle: Any) -> "tuple[Repetitions, LastAnswers]":
     """A supervisor with one run, which permits hardware."""
-    repetitions, claim = Repetitions(None, "here", None), Claim(7, 1, "x", 0, None)  # type: ignore[arg-type]
-    run = LastAnswers(claim, None, permits=handle)  # type: ignore[arg-type]
-    repetitions._permits, repetitions.runs = handle, [run]
+    repetitions, claim = Repetitions(None, "here", handle), Claim(7, 1, "x", 0, None)  # type: ignore[arg-type]
+    run = LastAnswers(claim, None, hardware=True)  # type: ignore[arg-type]
+    repetitions.runs = [run]
     return repetitions, run
 
 
@@ -571,7 +570,7 @@ class LastAnswers(Run):
     last: tuple[Any, ...] = ()
     waits: int = 0
 
-    def wait_for_end(self, longest_s: float) -> None:
+    def wait_for_end(self, tasks: Any, longest_s: float) -> None:
         """Take the last deliveries."""
         self.waits += 1
         self.take(self.last)
@@ -582,7 +581,7 @@ class LastAnswers(Run):
 
 def test_no_robot_moves_for_an_experiment_that_was_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
     permitted: list[Any] = []
-    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: permitted.extend(keys)))
+    handle: Any = SimpleNamespace(versions={}, permit=lambda keys, until: permitted.extend(keys))
     held, moving = measuring(handle)
     freed: list[Any] = []
     monkeypatch.setattr(execution, "note_measuring", lambda store, claims: ())
@@ -598,7 +597,7 @@ def test_no_robot_moves_for_an_experiment_that_was_cancelled(monkeypatch: pytest
 def test_only_a_run_that_may_move_hardware_is_waited_for(
     monkeypatch: pytest.MonkeyPatch, measures: int | None, waits: int
 ) -> None:
-    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: None))
+    handle: Any = SimpleNamespace(versions={}, permit=lambda keys, until: None)
     held, run = measuring(handle)
     monkeypatch.setattr(execution, "hand_back", lambda store, claim: (claim,))
     run.measuring = measures
@@ -613,8 +612,8 @@ def test_an_answer_of_reality_that_arrives_during_the_hand_back_is_stored(store:
     (claim,) = execution.claim(store, "me", 1)
     steps = steps_to_the_first_answer(claim)
     execution.record_all(store, [(claim, [TimedStep(step, 0.0) for step in steps[:-1]])])
-    handle: Any = SimpleNamespace(renew=SimpleNamespace(remote=lambda keys, until: None))
-    held, run = Repetitions(store, "me", {}), LastAnswers(claim, None, permits=handle)  # type: ignore[arg-type]
+    handle: Any = SimpleNamespace(versions={}, permit=lambda keys, until: None)
+    held, run = Repetitions(store, "me", handle), LastAnswers(claim, None, hardware=True)  # type: ignore[arg-type]
     run.last, run.measuring = (TimedStep(steps[-1], 1.0),), len(steps) - 1
     held.runs = [run]
 
@@ -684,7 +683,7 @@ def test_a_permit_runs_out_although_nobody_answers() -> None:
     def silent(_: int) -> float:
         if answers:
             return answers.pop()
-        raise GetTimeoutError
+        raise TimeoutError
 
     reality = permits.PermittedReality(
         lambda _: Outcome(float(ended.wait(60))), lambda: None, silent, ended.set, POLL_S
@@ -695,7 +694,7 @@ def test_a_permit_runs_out_although_nobody_answers() -> None:
 
 
 def test_a_measurement_waits_for_permits_whose_process_has_died() -> None:
-    answers: list[Any] = [1e9, ActorUnavailableError("it starts again", None), ActorDiedError()]
+    answers: list[Any] = [1e9, TimeoutError("it starts again"), TimeoutError("it died")]
 
     def answering(_: int) -> float:
         answer = answers.pop() if answers else 1e9

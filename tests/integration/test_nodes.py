@@ -23,9 +23,10 @@ from gaplab.schemas.lifecycle import State
 from gaplab.services.experiments import reading
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
-from gaplab.workers import task
+from gaplab.workers import ray_tasks
 from gaplab.workers.cluster import cluster
 from gaplab.workers.errors import ClusterUnusable
+from gaplab.workers.ray_tasks import RayTasks
 from gaplab.workers.supervisor import Supervisor
 from tests.arithmetic import told
 from tests.experiments import submit_one
@@ -77,14 +78,14 @@ def in_one_process() -> Any:
 @pytest.fixture
 def ran_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The ids of the nodes on which a repetition was begun; the latest is the last."""
-    alone = task.run._function  # type: ignore[attr-defined]
+    alone = ray_tasks.run._function  # type: ignore[attr-defined]
 
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
     def noted(*given: Any) -> Iterator[Any]:
         (tmp_path / ray.get_runtime_context().get_node_id()).touch()
         yield from alone(*given)
 
-    monkeypatch.setattr(task, "run", noted)
+    monkeypatch.setattr(ray_tasks, "run", noted)
     return lambda: [path.name for path in sorted(tmp_path.glob("?" * 56), key=lambda path: path.stat().st_mtime_ns)]
 
 
@@ -93,7 +94,7 @@ def test_without_cores_what_waits_is_a_demand_that_an_autoscaler_sees_and_runs_o
     joined: Any, head: Any, sqlite_store: Store
 ) -> None:
     experiment = submit_one(sqlite_store, toy()).id
-    supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions)
+    supervisor = Supervisor(sqlite_store, joined.capacity, RayTasks(joined.versions))
     gcs = GcsClient(address=head.address)
 
     run(supervisor, sqlite_store, experiment, until=lambda: demanded(gcs))
@@ -117,7 +118,7 @@ def test_the_numbers_do_not_depend_on_how_many_nodes_there_are(
     count = request.node.callspec.params["joined"]
     experiment = submit_one(sqlite_store, SPEC).id
 
-    run(Supervisor(sqlite_store, joined.capacity, joined.versions), sqlite_store, experiment)
+    run(Supervisor(sqlite_store, joined.capacity, RayTasks(joined.versions)), sqlite_store, experiment)
 
     assert joined.capacity() == 2 * count
     assert len(ran_on()) == count
@@ -134,7 +135,7 @@ def test_a_node_lost_in_the_middle_costs_no_result(
     joined: Any, head: Any, sqlite_store: Store, ran_on: Any, in_one_process: Any
 ) -> None:
     experiment = submit_one(sqlite_store, SPEC).id
-    supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions)
+    supervisor = Supervisor(sqlite_store, joined.capacity, RayTasks(joined.versions))
     run(supervisor, sqlite_store, experiment, until=lambda: len(ran_on()) == 4)
 
     (busy,) = (node for node in head.worker_nodes if node.node_id == ran_on()[-1])
@@ -152,7 +153,7 @@ def test_a_node_that_joins_with_other_versions_ends_the_work_before_a_step_of_it
     joined: Any, sqlite_store: Store
 ) -> None:
     experiment = submit_one(sqlite_store, toy()).id
-    supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions | {"gaplab": "0.0.1"})
+    supervisor = Supervisor(sqlite_store, joined.capacity, RayTasks(joined.versions | {"gaplab": "0.0.1"}))
 
     with pytest.raises(ClusterUnusable, match=r"the supervisor has gaplab 0\.0\.1"):
         supervisor.serve(Event())

@@ -26,7 +26,9 @@ from gaplab.services.world.robots import robots
 from gaplab.workers import nodes
 from gaplab.workers.cluster import cluster
 from gaplab.workers.errors import ClusterUnusable
+from gaplab.workers.expected import check_here
 from gaplab.workers.plugins import FIRST_S, LONGEST_S, Plugins
+from gaplab.workers.ray_tasks import RayTasks
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import some_log, submit_one, toy
 from tests.fakes import CAREFUL
@@ -117,20 +119,20 @@ def test_a_process_is_refused_for_an_edit_of_a_plug_in_that_the_spec_names_and_d
     wanted, others = expected(), expected("random")
     (home / "brave.py").write_text("class Brave(")
     process(home)
-    nodes.check_here(wanted)
+    check_here(wanted)
 
     (home / "careful.py").write_text(EDITED)
-    nodes.check_here(wanted)  # this process has imported it
+    check_here(wanted)  # this process has imported it
     process(home)
     with pytest.raises(PluginDiffers) as refused:
-        nodes.check_here(wanted)
+        check_here(wanted)
 
     assert "gaplab_plugins.careful" not in sys.modules
     assert set(refused.value.differences) == {"strategy careful"}
     assert wanted["plug-in strategy careful"] in str(refused.value)
     assert "start the service again if it was edited" in str(refused.value)
     assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)
-    nodes.check_here(others)
+    check_here(others)
     assert "careful" not in strategies
 
 
@@ -146,7 +148,7 @@ def test_a_process_that_cannot_import_a_named_plug_in_says_why(
     process(home)
 
     with pytest.raises(PluginDiffers, match="No module named 'of_the_head'"):
-        nodes.check_here(wanted)
+        check_here(wanted)
 
 
 def test_a_process_imports_what_the_spec_needs_alone(put: Any, process: Any, tmp_path: Path) -> None:
@@ -157,8 +159,8 @@ def test_a_process_imports_what_the_spec_needs_alone(put: Any, process: Any, tmp
     (tmp_path / "imports").unlink()
     process(home)
 
-    nodes.check_here(wanted)
-    nodes.check_here(wanted)
+    check_here(wanted)
+    check_here(wanted)
 
     assert ("careful" in strategies, "brave" in strategies) == (True, False)
     assert (tmp_path / "imports").read_text() == "x"
@@ -210,7 +212,7 @@ def test_a_plug_in_that_changes_gaplab_changes_no_number_of_specs_that_do_not_na
     monkeypatch.setenv("CHANGES_GAPLAB", "in the processes of Ray")
     with cluster(Settings(workers=1)) as joined:
         monkeypatch.delenv("CHANGES_GAPLAB")
-        supervisor = Supervisor(sqlite_store, lambda: 1, joined.versions)
+        supervisor = Supervisor(sqlite_store, lambda: 1, RayTasks(joined.versions))
         changed, plain = (toy(strategy=each, repetitions=1) for each in ("careful", "simulated_fit"))
         ids = [submit_one(sqlite_store, spec).id for spec in (changed, plain)]
         for each in ids:
@@ -225,7 +227,7 @@ def test_versions_of_gaplab_concern_all_work(put: Any) -> None:
     put(careful=CAREFUL)
 
     with pytest.raises(ClusterUnusable, match=r"the supervisor has gaplab 0\.0\.1"):
-        nodes.check_here(expected() | {"gaplab": "0.0.1"})
+        check_here(expected() | {"gaplab": "0.0.1"})
 
 
 def test_an_edit_holds_up_the_experiments_that_name_the_plug_in_and_no_other(store: Store, put: Any) -> None:

@@ -13,7 +13,7 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.workers import task
+from gaplab.workers import ray_tasks
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.pool import Pool, SharedCall, sizes
 from tests.processes import processes_of_ray
@@ -155,7 +155,7 @@ def test_a_task_computes_every_step_of_a_repetition() -> None:
     )
     claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=spec)
 
-    stream = task.run.remote(claim, {}, CHECKPOINT_S, None)
+    stream = ray_tasks.run.remote(claim, {}, CHECKPOINT_S, None)
 
     steps = [each for batch in stream for each in ray.get(batch) if isinstance(each, TimedStep)]  # type: ignore[attr-defined]
     assert len(steps) == sum(1 for _ in repetition(setting(spec, 0)))

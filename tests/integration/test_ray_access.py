@@ -24,7 +24,7 @@ from gaplab.workers.__main__ import choose_authentication
 choose_authentication(Settings())
 import ray
 from gaplab.workers.cluster import cluster
-from gaplab.workers.nodes import limit_prints
+from gaplab.workers.expected import limit_prints
 
 def listening():
     sockets = {}

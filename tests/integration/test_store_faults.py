@@ -26,10 +26,11 @@ from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from gaplab.workers import sensitivity as checking
 from gaplab.workers import supervisor
+from gaplab.workers.errors import TaskLost
 from gaplab.workers.task import delivered
 from tests.experiments import submit_one
 from tests.fakes import flat
-from tests.without_ray import OPEN, SPEC, Here, HereRepetitions, HereRun, Stop
+from tests.without_ray import OPEN, SPEC, Here, HereTask, HereTasks, Stop
 
 MODULES = {"execution": execution, "sensitivity": sensitivity}
 
@@ -45,43 +46,34 @@ def asked_by_the_supervisor() -> Any:
     return sorted(found - {("execution", "free_hardware")})  # what it leaves undone, the end of the lease does
 
 
-class Troubled(HereRun):
-    """A run whose worker is lost, or whose code raises."""
-
-    def __init__(self, claim: Any, stream: Any, trouble: Any) -> None:
-        super().__init__(claim, stream)
-        self.trouble = trouble
-
-    def receive(self) -> None:
-        self.begun = True
-        self.lost, self.failed = (
-            ("the worker was lost", None) if self.trouble == "lost" else (None, Failure("it is broken"))
-        )
-
-
 def measuring(claim: Any) -> Iterator[Any]:
     """What a worker delivers that waits for reality at first."""
     yield (Pulse(len(claim.log), measuring=True, idle_s=0.0, step_s=0.0),)
     yield from delivered(lambda: setting(claim.spec, claim.number), claim, 0.0)
 
 
-class TryingRepetitions(HereRepetitions):
+def lost() -> Iterator[Any]:
+    """What is taken from a worker that is gone."""
+    raise TaskLost("the worker was lost")
+    yield ()
+
+
+class TryingTasks(HereTasks):
     """Everything that may happen to a repetition: the second of the first experiment loses its first worker."""
 
-    def launch(self, claim: Any) -> Any:
-        stream = measuring(claim)
+    def start(self, claim: Any, expected: Any, checkpoint_s: float) -> HereTask:
         if claim.spec.name == "broken":
-            return Troubled(claim, stream, "failed")
+            return HereTask(iter([(Failure("it is broken"),)]))
         if claim.number == 1 and not Trying.lost:
             Trying.lost = True
-            return Troubled(claim, stream, "lost")
-        return HereRun(claim, stream)
+            return HereTask(lost())
+        return HereTask(measuring(claim))
 
 
 class Trying(Here):
     """A supervisor of such repetitions, and of sensitivity checks."""
 
-    repetitions = TryingRepetitions
+    tasks = TryingTasks
     lost = False
     late: ClassVar = set()  # type: ignore[var-annotated]
     """The modules whose leases have run out: much time passes before each supervisor, and none while it works."""

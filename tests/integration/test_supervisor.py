@@ -33,6 +33,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers import cluster
 from gaplab.workers.cluster import PREFIX, ray_folder
 from gaplab.workers.errors import ClusterUnusable, RayGone
+from gaplab.workers.ray_tasks import RayTasks
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import submit_one, toy
 from tests.integration.test_bench import bench, compute, pending
@@ -219,7 +220,7 @@ def owners(store: Store) -> set[str]:
 def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_is_set_to(store: Store) -> None:
     submit_one(store, toy(repetitions=1, strategy="direct"))  # without a sensitivity check
     (claim,) = execution.claim(store, "silent", 1)
-    patient, hasty = (Supervisor(store, lambda: 0, lease_s=lease_s) for lease_s in (600, 0.2))
+    patient, hasty = (Supervisor(store, lambda: 0, RayTasks(), lease_s=lease_s) for lease_s in (600, 0.2))
     time.sleep(0.5)
 
     patient.step()
@@ -239,7 +240,7 @@ def test_a_time_in_which_nobody_could_show_a_sign_of_life_ends_no_take(
     (request,) = pending(sqlite_store)
     taking.take(sqlite_store, request.id, TakeSpec(operator="Ada"), FREELY)
     clock, stop = [0.0], Event()
-    supervisor = Supervisor(sqlite_store, lambda: 0, lease_s=0.0)
+    supervisor = Supervisor(sqlite_store, lambda: 0, RayTasks(), lease_s=0.0)
     supervisor._takes = Silences(lambda: clock[0])
     supervisor.step()
     assert sqlite_store.file is not None

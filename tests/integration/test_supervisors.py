@@ -26,6 +26,7 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
+from gaplab.workers.ray_tasks import RayTasks
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import cancel, submit_one
 from tests.fakes import flat
@@ -76,7 +77,7 @@ def attempts(store: Store, experiment: Any, repetitions: Any) -> Any:
 
 def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numbers(store: Store) -> None:
     experiment = submit_one(store, spec(3)).id
-    supervisor = Supervisor(store, lambda: 3)
+    supervisor = Supervisor(store, lambda: 3, RayTasks())
     wait_until(lambda: len(stored(store, experiment)[0]) > 1, meanwhile=supervisor.step)
 
     lifecycle.ask(store, experiment, Verb.PAUSE)
@@ -97,7 +98,7 @@ def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numb
 @pytest.mark.release
 def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sqlite_store: Store) -> None:
     experiment = submit_one(sqlite_store, spec(3)).id
-    supervisor = Supervisor(sqlite_store, lambda: 3)
+    supervisor = Supervisor(sqlite_store, lambda: 3, RayTasks())
     done = lambda: reading.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
     wait_until(done, meanwhile=supervisor.step)
 
@@ -114,7 +115,7 @@ def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sq
 @pytest.mark.release
 def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite_store: Store) -> None:
     large = submit_one(sqlite_store, spec(8)).id
-    supervisor = Supervisor(sqlite_store, lambda: 4)
+    supervisor = Supervisor(sqlite_store, lambda: 4, RayTasks())
     wait_until(lambda: len(stored(sqlite_store, large)[0]) > 1, meanwhile=supervisor.step)
     small = submit_one(sqlite_store, spec(1, controller_evaluations=100)).id
 
@@ -131,7 +132,7 @@ def test_two_supervisors_on_one_database_do_nothing_twice(store: Store) -> None:
     stop = Event()
 
     with ThreadPoolExecutor(2) as pool:
-        ends = [pool.submit(Supervisor(store, lambda: 2).serve, stop) for _ in range(2)]
+        ends = [pool.submit(Supervisor(store, lambda: 2, RayTasks()).serve, stop) for _ in range(2)]
         try:
             wait_until(lambda: all(state(store, each).ended for each in ids))
         finally:
@@ -185,7 +186,7 @@ def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(
     wait_until(lambda: len(stored(store, experiment)[0]) > 1)
 
     stop_outside_transactions(store, process.pid)
-    ours = Supervisor(store, lambda: 2)
+    ours = Supervisor(store, lambda: 2, RayTasks())
     wait_until(lambda: state(store, experiment).ended, meanwhile=ours.step)
     ended = stored(store, experiment)
     os.kill(process.pid, signal.SIGCONT)

@@ -17,6 +17,7 @@ from gaplab.services.experiments import reading
 from gaplab.services.running import execution
 from gaplab.services.store.models import CheckpointRow
 from gaplab.services.store.session import Store
+from gaplab.workers.ray_tasks import RayTasks
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import listed, submit_one
 from tests.numbers.keep import CHECKPOINTS
@@ -59,7 +60,7 @@ def test_any_number_of_workers_computes_the_kept_numbers(store: Store, store_url
     studies = [tables(archive(name)) for name in ("analytic", "cma_es", "options")]
     ids = [submit(store, found) for found in studies]
 
-    run(Supervisor(store, lambda: at_once), store, [each for own in ids for each in own])
+    run(Supervisor(store, lambda: at_once, RayTasks()), store, [each for own in ids for each in own])
 
     for own, found in zip(ids, studies, strict=True):
         assert {reading.read_experiment(store, each).state for each in own} == {State.COMPLETED}
@@ -71,7 +72,7 @@ def test_a_robot_among_idle_workers_has_the_kept_numbers(sqlite_store: Store) ->
     found = tables(archive("elsewhere"))
     ids = submit(sqlite_store, found)
 
-    run(Supervisor(sqlite_store, lambda: 1), sqlite_store, ids)
+    run(Supervisor(sqlite_store, lambda: 1, RayTasks()), sqlite_store, ids)
 
     assert_kept(stored(sqlite_store, ids), numbers(found))
 
@@ -79,7 +80,7 @@ def test_a_robot_among_idle_workers_has_the_kept_numbers(sqlite_store: Store) ->
 def test_workers_killed_in_the_middle_of_a_step_cost_no_number(store: Store) -> None:
     found = tables(archive("long"))
     ids = submit(store, found)
-    supervisor = Supervisor(store, lambda: 2, checkpoint_s=0.01)
+    supervisor = Supervisor(store, lambda: 2, RayTasks(), checkpoint_s=0.01)
     run(supervisor, store, ids, until=lambda: in_the_middle(store))
 
     for pid in processes_of_ray("run"):
@@ -108,7 +109,7 @@ def test_a_database_of_a_killed_supervisor_ends_with_the_kept_numbers(tmp_path: 
     ids = [each.id for each in listed(store)]
     execution.requeue_lost(store, stale_after_s=-1)
 
-    run(Supervisor(store, lambda: 2), store, ids)
+    run(Supervisor(store, lambda: 2, RayTasks()), store, ids)
 
     assert_kept(stored(store, ids), numbers(tables(archive("long"))))
     store.dispose()

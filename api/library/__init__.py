@@ -1,0 +1,1 @@
+"""gaplab in one process: the same use cases, without a server and without Ray."""
