@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -11,6 +12,8 @@ from rich.markup import escape
 
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.confirmation import confirm, sentence
+from gaplab.api.clients.errors import format_of
+from gaplab.api.clients.figures import FORMATS
 from gaplab.api.clients.progress import state_text
 from gaplab.api.clients.screen import console
 from gaplab.api.commands import completion, tables
@@ -25,6 +28,38 @@ from gaplab.schemas.records import StudyRead
 from gaplab.services.findings.tables import sensitivity as effects
 
 SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - for standard input")]
+
+
+@command(SPECS)
+def run(
+    spec: Annotated[
+        str,
+        typer.Argument(metavar="SPEC", help="a JSON file, or - for standard input; an archive or a database goes on"),
+    ],
+    out: Annotated[
+        list[Path] | None,
+        typer.Option("--out", "-o", help=f"file: an archive (.zip) or a figure ({', '.join(FORMATS)}); repeatable"),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="processes; left out: one for each core")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compute a study here, without a service: the numbers are the same. Print its curves and the verdict."""
+    from gaplab.api.library import running  # computes here
+
+    archives = [file for file in out or [] if format_of(file, (*FORMATS, "zip")) == "zip"]
+    given = read_spec(spec) if spec == "-" else spec
+    try:
+        result = running.run(given, workers=workers, progress=True)
+    except running.Interrupted as stopped:
+        kept = [stopped.result.save(file) for file in archives] or [stopped.result.path]
+        msg = f"interrupted; what is complete is in {kept[0]}, and `gaplab run {quote(str(kept[0]))}` goes on"
+        raise CommandError(msg, Exit.INTERRUPTED) from None
+    for file in out or []:
+        result.save(file) if file in archives else result.figure().save(file)
+    curves = result.client.curves(result.id)
+    if not as_json:
+        console().print(tables.curves(curves), *tables.baselines(curves), *result.verdict.sentences)
+    _print_end(result.study, as_json=as_json)
 
 
 @command(SPECS)
@@ -101,6 +136,11 @@ def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  
     except KeyboardInterrupt:
         msg = f"the service continues with it; `gaplab watch {id}` shows the progress again"
         raise CommandError(msg, Exit.INTERRUPTED) from None
+    _print_end(record, as_json=as_json)
+
+
+def _print_end(record: StudyRead, *, as_json: bool) -> None:
+    """Print how a study ended; exit with an error if an experiment did not complete."""
     print_result(record, f"{record.name}: {state_text(record)}; {record.progress.text}.", as_json=as_json)
     for reason in sorted({reason for experiment in record.experiments for reason in experiment.reasons}):
         echo(f"  {reason}", err=True)

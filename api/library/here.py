@@ -17,7 +17,8 @@ class InProcess(httpx2.BaseTransport):
     def __init__(self, store: Store) -> None:
         self._app = httpx2.ASGITransport(create_app(store), raise_app_exceptions=False)
         self._loop = asyncio.new_event_loop()
-        Thread(target=self._loop.run_forever, name="service", daemon=True).start()
+        self._thread = Thread(target=self._loop.run_forever, name="service", daemon=True)
+        self._thread.start()
 
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
         """Return the answer to a request, once all of it is there."""
@@ -26,6 +27,8 @@ class InProcess(httpx2.BaseTransport):
     def close(self) -> None:
         """End the thread."""
         self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
 
     async def _answer(self, request: httpx2.Request, content: bytes) -> httpx2.Response:
         asked = httpx2.Request(request.method, request.url, headers=request.headers, content=content)

@@ -6,7 +6,7 @@ import sys
 import tempfile
 from collections import deque
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
 from shutil import copyfileobj, rmtree
@@ -53,7 +53,12 @@ RESTS = (State.PAUSED, State.WAITING)
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C ended `gaplab.run`; the message names the database with all that is complete, from which it goes on."""
+    """Ctrl-C ended `gaplab.run`; the message says how to go on with what is complete, which is in `result`."""
+
+    def __init__(self, result: "Result") -> None:
+        self.result = result
+        kept = str(result.path)
+        super().__init__(f"what is complete is in {kept}, and gaplab.run({kept!r}) goes on")
 
 
 def run(
@@ -84,18 +89,19 @@ def run(
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
         new_database(file)
-    store = Store(url_of(file))
+    with ExitStack() as refused:
+        if path is None:
+            refused.callback(rmtree, file.parent, ignore_errors=True)
+        store = refused.enter_context(Store(url_of(file)))
+        result = Result(store, file, _study(store, file, given))
+        refused.pop_all()
     try:
         with in_use(store.file):
-            result = Result(store, file, _study(store, file, given))
             _compute(result, workers, progress=progress)
     except KeyboardInterrupt:
-        msg = f"everything that is complete is in {file}; gaplab.run({str(file)!r}) goes on"
-        raise Interrupted(msg) from None
-    except BaseException:
-        _forget(store, None if path is not None else file.parent)
-        raise
-    finalize(result, _forget, store, None if path is not None else file.parent)
+        raise Interrupted(result) from None
+    if path is None:
+        finalize(result, rmtree, file.parent, ignore_errors=True)
     return result
 
 
@@ -109,20 +115,19 @@ class Result:
 
     def __init__(self, store: Store, path: Path, id: str) -> None:
         self.path, self.id = path, id
-        self._store = store
+        self._store, self._open = store, ExitStack()
+        self._open.callback(store.dispose)
+        finalize(self, self._open.close)
 
     def __repr__(self) -> str:
         return f"<result of {self.study!r}>"
-
-    def _repr_html_(self) -> str:
-        return self.study._repr_html_()
 
     @cached_property
     def client(self) -> "Client":
         """A client of a service in this process, which has all that is known about the study."""
         from gaplab.api.library.here import client_of  # takes a second, and runs need no API
 
-        return client_of(self._store, url_of(self.path))
+        return self._open.enter_context(client_of(self._store, url_of(self.path)))
 
     @property
     def study(self) -> StudyRead:
@@ -199,12 +204,6 @@ def _begins(path: Path, mark: bytes) -> bool:
 
 def _temporary() -> Path:
     return Path(tempfile.mkdtemp(prefix="gaplab-run-")) / "study.db"
-
-
-def _forget(store: Store, folder: Path | None) -> None:
-    store.dispose()
-    if folder is not None:
-        rmtree(folder, ignore_errors=True)
 
 
 def _study(store: Store, file: Path, given: Any) -> str:  # noqa: ANN401 - a spec in any form, or a path

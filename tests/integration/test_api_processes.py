@@ -367,10 +367,10 @@ def test_children_read_the_same_settings() -> None:
 def test_a_client_of_ones_own_service_shows_the_token_of_the_environment_only_if_there_are_tokens(
     sqlite_url: str, sqlite_store: Store
 ) -> None:
-    without = local_service._token(sqlite_url)
+    without = local_service.token_of(sqlite_url)
     create_token(sqlite_store, Role.READER)
 
-    assert (without, local_service._token(sqlite_url)) == ("", None)
+    assert (without, local_service.token_of(sqlite_url)) == ("", None)
 
 
 @pytest.mark.release

@@ -27,6 +27,7 @@ from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, reading
 from gaplab.services.findings.sensitivity import Effort, check
 from gaplab.services.running import sensitivity
+from gaplab.services.running.versions import versions
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
