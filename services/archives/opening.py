@@ -17,7 +17,6 @@ from typing import IO, Any
 from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile
 from zlib import error as ZlibError  # noqa: N812 - it is an error
 
-from gaplab.migrations import upgrade
 from gaplab.services.archives.columns import LEFT_OUT
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.settings import variable_of
@@ -171,6 +170,8 @@ def _revision(connection: sqlite3.Connection) -> str:
 def _migrate(database: Path, revision: str, problem: str) -> None:
     try:
         with _MIGRATING:
+            from gaplab.migrations import upgrade  # Alembic takes half a second, and few archives are earlier ones
+
             upgrade(url_of(database), to=revision)
     except StoreUnavailable as error:
         raise InvalidArchive(f"{problem}: {error}"[:300]) from error

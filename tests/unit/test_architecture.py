@@ -91,8 +91,12 @@ ARROWS = {
         ("schemas", "services.settings", "services.csv_tables", "services.findings.tables", "api.clients"),
         ON_DEMAND | {"httpx2", "pydantic", "rich"},
     ),
+    "api/library": (
+        ("schemas", "services", "workers", "api.app", "api.clients", "api.process", "api.library"),
+        ON_DEMAND | {"httpx2", "numpy", "pydantic"},
+    ),
     "api/commands": (
-        ("schemas", "services", "api.clients", "api.process", "api.commands"),
+        ("schemas", "services", "api.clients", "api.library", "api.process", "api.commands"),
         {"typer", "rich", "httpx2", "pydantic"},
     ),
     "api": (("services", "api.process"), set()),

@@ -12,8 +12,11 @@ import pytest
 PARTS = {"scipy.stats", "scipy.special", "scipy.spatial", "scipy.signal", "scipy.linalg"}
 
 UNUSED = {
+    "gaplab": {"numpy", "pydantic", "sqlalchemy", "httpx2", "rich", "ray"},
+    "gaplab.api.library.running": {*PARTS, "fastapi", "alembic", "matplotlib", "pandas", "pybullet", "mujoco", "ray"},
+    "gaplab.workers.process_tasks": {"scipy", "sqlalchemy", "psycopg", "pybullet", "mujoco", "sapien", "ray"},
     "gaplab.api.commands.cli": {"numpy", "scipy", "sqlalchemy", "psycopg", "fastapi", "ray"},
-    "gaplab.api.app": {*PARTS, "matplotlib", "plotly", "ray"},
+    "gaplab.api.app": {*PARTS, "alembic", "matplotlib", "plotly", "ray"},
     "gaplab.workers.task": {"scipy", "sqlalchemy", "psycopg", "pybullet", "mujoco", "sapien"},
     "gaplab.services.engines.mujoco, gaplab.services.engines.pybullet, gaplab.services.engines.physx, "
     "gaplab.services.core.tuners.gauss_newton": {*PARTS, "mujoco", "numba", "pybullet", "sapien"},
