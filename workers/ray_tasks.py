@@ -15,12 +15,12 @@ from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.specs.resolution import hardware_of
 from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store
-from gaplab.workers import sensitivity
 from gaplab.workers.errors import ClusterUnusable, TaskLost
 from gaplab.workers.expected import Versions, check_here
 from gaplab.workers.nodes import process_for, told
 from gaplab.workers.permits import Key
 from gaplab.workers.pool import Pool
+from gaplab.workers.sensitivity import Checks
 from gaplab.workers.task import Batch, Patience, delivered, give_back_memory, prepared
 
 ANSWER_S = 0.5
@@ -150,6 +150,6 @@ class RayTasks:
         if self._permits is not None:
             self._permits.renew.remote(keys, until)
 
-    def checks(self, store: Store, owner: str, lease_s: float, patience: Patience) -> sensitivity.Checks:
+    def checks(self, store: Store, owner: str, lease_s: float, patience: Patience) -> Checks:
         """Return the sensitivity checks of a supervisor."""
-        return sensitivity.Checks(store, owner, lease_s, self.versions, patience)
+        return Checks(store, owner, lease_s, self.versions, patience)

@@ -183,7 +183,7 @@ class Nonsense(HereTasks):
         if claim.number != 1:
             return super().start(claim, expected, checkpoint_s)
         nonsense = TimedStep(Tuned(0, ("no simulator",)), 0.0)  # type: ignore[arg-type]
-        return HereTask(iter([(nonsense,)]))
+        return HereTask(each for each in [(nonsense,)])
 
 
 def with_tasks(kind: type[HereTasks], store: Store) -> Here:
