@@ -16,7 +16,7 @@ from gaplab.services.core.arrays import Genome
 from gaplab.services.core.errors import TryAgain
 from gaplab.services.core.loop import Setting, repetition
 from gaplab.services.core.ports import RealityAwaited
-from gaplab.services.core.types import Outcome, Selected, Step, Tuned
+from gaplab.services.core.types import Outcome, Selected, Step, Tuned, next_place
 from gaplab.services.specs.assembly import RealityFailed
 from gaplab.services.store.lease import Checkpoint, Delivered, Pulse, Requested, TimedStep
 from gaplab.workers.permits import PermittedReality
@@ -157,7 +157,7 @@ class StepRecorder:
         """Return the request for the measurement that the log needs next, with its safety forecast."""
         last = self._log[-1]
         kind = MeasurementKind.SAMPLE if isinstance(last, Selected) else MeasurementKind.PROBE
-        return Requested(len(self._log), last.iteration, kind, genome, self._forecast(setting, genome))
+        return Requested(next_place(self._log), last.iteration, kind, genome, self._forecast(setting, genome))
 
     def _forecast(self, setting: Setting, genome: Genome) -> dict[str, Any] | None:
         """Return the forecast of the latest simulators for a genome, as JSON; None if there is none."""
@@ -178,21 +178,21 @@ class StepRecorder:
         """Return a heartbeat."""
         now = perf_counter()
         step_s = self._before_s + now - self._begun
-        return Pulse(len(self._log), self._measuring, max(0.0, now - self._progressed), step_s)
+        return Pulse(next_place(self._log), self._measuring, max(0.0, now - self._progressed), step_s)
 
     def _measured(self, setting: Setting, genome: Genome) -> Outcome:
         self._measuring, self._progressed = True, perf_counter()
         try:
             if isinstance(setting.reality, PermittedReality):
                 self._emit(self.pulse())  # it waits for a permit, which is given once the beginning is stored
-                return setting.reality(genome, len(self._log))
+                return setting.reality(genome, next_place(self._log))
             return setting.reality(genome)
         finally:
             self._measuring = False
 
     def _checkpoint(self, now: float, budget: int) -> None:
         rollouts = min(budget, self._rollouts + (self._parts[-1].rollouts if self._parts else 0))  # some are not needed
-        place, seconds = (len(self._log), len(self._parts)), now - self._last
+        place, seconds = (next_place(self._log), len(self._parts)), now - self._last
         checkpoint = Checkpoint(*place, pack(self._answers), seconds, rollouts, budget)
         self._emit(checkpoint)
         self._parts.append(checkpoint)

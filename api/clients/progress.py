@@ -91,7 +91,7 @@ def in_notebook() -> bool:
 def show(snapshots: Iterable[Snapshot], console: Console, *, keep: bool = False) -> StudyRead:
     """Show snapshots until the last, and return its study; a terminal may `keep` it on the screen."""
     if in_notebook():
-        return _replace(snapshots, _cell())
+        return _replace(snapshots, cell())
     if not console.is_terminal:
         return log(snapshots, console)
     with Live(console=console, auto_refresh=False, transient=not keep) as live:
@@ -175,13 +175,15 @@ def _replace(snapshots: Iterable[Snapshot], place: Callable[[RenderableType], ob
     return snapshot.study
 
 
-def _cell() -> Callable[[RenderableType], object]:
+def cell() -> Callable[[RenderableType], object]:
     """Return a function that shows a text in a notebook's cell, in place of the one before."""
     ipython: Any = import_module("IPython.display")
     handle = ipython.display(ipython.HTML(""), display_id=True)
 
     def place(text: RenderableType) -> None:
-        page = Console(record=True, force_terminal=True, file=StringIO(), width=140, highlight=False)
+        page = Console(
+            record=True, force_terminal=True, force_jupyter=False, file=StringIO(), width=140, highlight=False
+        )
         page.print(text)
         handle.update(ipython.HTML(page.export_html(inline_styles=True, code_format="<pre>{code}</pre>")))
 

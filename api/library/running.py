@@ -83,9 +83,9 @@ def run(
     """
     folders.load()
     given = _read(spec) if isinstance(spec, str | Path) else spec
-    if isinstance(given, Path) and _begins(given, SQLITE):
+    if isinstance(given, Path) and begins(given, SQLITE):
         path = given
-    file = Path(path).absolute() if path is not None else _temporary()
+    file = Path(path).absolute() if path is not None else temporary()
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
         new_database(file)
@@ -93,7 +93,7 @@ def run(
         if path is None:
             refused.callback(rmtree, file.parent, ignore_errors=True)
         store = refused.enter_context(Store(url_of(file)))
-        result = Result(store, file, _study(store, file, given))
+        result = Result(store, file, study_of(store, file, given))
         refused.pop_all()
     try:
         with in_use(store.file):
@@ -189,7 +189,7 @@ class Result:
 def _read(spec: str | Path) -> Any:  # noqa: ANN401 - any JSON
     """Return the content of a JSON file, or the path of an archive or a database."""
     path = Path(spec)
-    if _begins(path, ZIP) or _begins(path, SQLITE):
+    if begins(path, ZIP) or begins(path, SQLITE):
         return path
     try:
         return json.loads(path.read_bytes())
@@ -197,16 +197,18 @@ def _read(spec: str | Path) -> Any:  # noqa: ANN401 - any JSON
         raise ValueError(f"{path} is neither an archive, nor a database, nor JSON: {error}") from error
 
 
-def _begins(path: Path, mark: bytes) -> bool:
+def begins(path: Path, mark: bytes) -> bool:
+    """Return whether a file begins with these bytes."""
     with path.open("rb") as file:
         return file.read(len(mark)) == mark
 
 
-def _temporary() -> Path:
+def temporary() -> Path:
+    """Return the path of a database in a new folder."""
     return Path(tempfile.mkdtemp(prefix="gaplab-run-")) / "study.db"
 
 
-def _study(store: Store, file: Path, given: Any) -> str:  # noqa: ANN401 - a spec in any form, or a path
+def study_of(store: Store, file: Path, given: Any) -> str:  # noqa: ANN401 - a spec in any form, or a path
     """Return the id of the study to compute: a submitted one, an imported one, or the newest of the database."""
     if isinstance(given, Path) and given.absolute() == file:
         if not (found := list_studies(store, limit=1).items):

@@ -67,6 +67,7 @@ class _Simulator(_Checked):
 
 class _Body(_Checked):
     genome: list[float] = []
+    told: bool = False
     readings: list[float | None] = []
     repeats: list[float] = []
     simulators: list[_Simulator] = []

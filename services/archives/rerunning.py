@@ -20,9 +20,9 @@ from gaplab.schemas.archives import Outcome, RepetitionRerun, RerunRead
 from gaplab.schemas.provenance import Provenance
 from gaplab.services.archives.reading import CheckedArchive, checked_archive
 from gaplab.services.core.errors import Conflict, NotFound
-from gaplab.services.core.loop import repetition
+from gaplab.services.core.loop import Setting, repetition
 from gaplab.services.core.ports import Reality
-from gaplab.services.core.types import Measured, Probed, Step, Transferred
+from gaplab.services.core.types import Measured, Probed, Selected, Step, Transferred
 from gaplab.services.engines import engines
 from gaplab.services.experiments.reading import read_spec
 from gaplab.services.plugins import folders
@@ -64,11 +64,14 @@ def rerun(recorded: Recorded) -> RepetitionRerun:
     try:
         if (obstacle := _obstacle(recorded)) is not None:
             return result_of(recorded, "not computed", same, obstacle)
-        computed = _computed(recorded)
-        for stored in recorded.log:
+        computes = _computed(recorded)
+        computed = repetition(computes)
+        for number, stored in enumerate(recorded.log):
             if time() > recorded.until:
                 return result_of(recorded, "same" if same else "not computed", same, "the time was over")
-            if (found := _difference(stored, next(computed, None), same)) is not None:
+            if isinstance(stored, Selected) and stored.told:
+                computed = repetition(computes, recorded.log[: number + 1])
+            elif (found := _difference(stored, next(computed, None), same)) is not None:
                 return result_of(recorded, "different", same, found)
             same += 1
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
@@ -89,12 +92,12 @@ def result_of(recorded: Recorded, outcome: Outcome, steps: int, reason: str | No
     )
 
 
-def _computed(recorded: Recorded) -> Iterator[Step]:
+def _computed(recorded: Recorded) -> Setting:
     robot_library.learn(recorded.robots)
     found = setting(spec_of(recorded.spec), recorded.number)
     if recorded.spec["reality"]["kind"] == "physical":
         found = replace(found, reality=_stored_answers(recorded.log))
-    return repetition(found)
+    return found
 
 
 def _stored_answers(log: Sequence[Step]) -> Reality:

@@ -161,11 +161,11 @@ def _drawn(setting: Setting, iteration: int) -> tuple[Simulator, ...]:
     return tuple(Simulator(space.check(parameters, source)) for parameters in drawn)
 
 
-def _keeps(setting: Setting, history: History) -> bool:
-    """Return whether simulators and controller stay, since the strategy tunes nothing on the latest sample."""
-    if len(history.samples) == len(setting.known_samples):
-        return False
-    return all(each is not history.samples[-1] for each in setting.strategy.lessons(history.samples))
+def _keeps(setting: Setting, history: History, kind: type[Step]) -> bool:
+    """Return whether the latest result of a kind of step stays, since the strategy learns nothing from what is new."""
+    newest = history.samples[history.seen.get(kind, len(history.samples)) :]
+    lessons = setting.strategy.lessons(history.samples) if newest else ()
+    return bool(newest) and not any(each is sample for each in lessons for sample in newest)
 
 
 def _belief(setting: Setting, history: History) -> Belief:
@@ -209,7 +209,7 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     seen, unseen = split(history.samples, setting.held_out)
     evaluations = setting.budget.simulator_evaluations // setting.tuner.divisor(len(seen))
     ensemble, answers.budget = strategy.ensemble, evaluations * len(seen) + len(unseen)
-    if _keeps(setting, history):
+    if _keeps(setting, history, Tuned):
         return Tuned(iteration, history.simulators, answers.cost)
     samples, tests = learnable(strategy.lessons(seen)), learnable(unseen)
     if not samples:
@@ -232,7 +232,7 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
     """Return the controller that the strategy transfers, from a search if it has one."""
     strategy, evaluations = setting.strategy, setting.budget.controller_evaluations
     allowance = Allowance.of_transfer(strategy, evaluations, setting.parameters.size)
-    if (last := history.transferred) is not None and _keeps(setting, history):
+    if (last := history.transferred) is not None and _keeps(setting, history, Transferred):
         return Transferred(iteration, last.genome, last.fitness, Cost(saved=allowance.rollouts))
     belief = _belief(setting, history)
     search = _search(setting, belief, answers, allowance, setting.stream(iteration, "transfer"))
@@ -245,6 +245,6 @@ def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -
     """Return the probe of the transferred controller; one that was kept is not measured again."""
     if setting.probes == "never" or (setting.probes == "last" and iteration < setting.iterations):
         return probe_of(history, iteration, nan, left_out=True)
-    if (last := history.probed) is not None and not last.left_out and _keeps(setting, history):
+    if (last := history.probed) is not None and not last.left_out and _keeps(setting, history, Probed):
         return probe_of(history, iteration, last.fitness, last.readings, last.repeats)
     return probe_of(history, iteration, *setting.reality(genome))

@@ -1,6 +1,6 @@
 """The values of the algorithm: immutable, self-checking, compared by content; and what a log of steps adds up to."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeAlias
 
@@ -165,11 +165,16 @@ class Cost:
 
 @dataclass(frozen=True, eq=False)
 class Selected:
-    """The strategy chose the genome to try in reality next."""
+    """The genome to try in reality next.
+
+    Attributes:
+        told: true if it does not follow from the steps before, since a person chose it; false if the strategy did.
+    """
 
     iteration: int
     genome: Genome
     cost: Cost = field(default_factory=Cost)
+    told: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +231,31 @@ class Probed:
 
 Step: TypeAlias = Selected | Measured | Tuned | Transferred | Probed
 
+_ORDER = (Selected, Measured, Tuned, Transferred, Probed)
+
+LENGTH = len(_ORDER)
+"""Places of an iteration in a log."""
+
+
+def place_of(step: Step) -> int:
+    """Return the step's fixed place in a log, from 0. Iteration 0 has no Selected and no Measured."""
+    return LENGTH * step.iteration + _ORDER.index(type(step)) - _ORDER.index(Tuned)
+
+
+def next_place(log: Sequence[Step]) -> int:
+    """Return the place after the last step of a log."""
+    return place_of(log[-1]) + 1 if log else 0
+
+
+def may_follow(step: Step, place: int) -> bool:
+    """Return whether a step may follow a log whose next place is this one.
+
+    That of this place may. So may a sample that a person chose, in place of what tuning, transfer and probe would have
+    been, which nobody has asked for.
+    """
+    left_out = place_of(step) - place
+    return left_out == 0 or (isinstance(step, Selected) and step.told and 0 < left_out <= LENGTH - 2)
+
 
 @dataclass(frozen=True, eq=False)
 class History:
@@ -238,6 +268,7 @@ class History:
         transferred: the latest transferred controller.
         probed: its latest probe.
         scale: absolute fitness in simulation of the first transferred controller that has one; None without any.
+        seen: number of samples before the latest step of each kind.
     """
 
     last: Step | None = None
@@ -246,19 +277,21 @@ class History:
     transferred: Transferred | None = None
     probed: Probed | None = None
     scale: float | None = None
+    seen: Mapping[type[Step], int] = field(default_factory=dict)
 
     def after(self, step: Step) -> "History":
         """Return the history with one more step."""
+        now = replace(self, last=step, seen={**self.seen, type(step): len(self.samples)})
         match step:
             case Measured(sample=sample):
-                return replace(self, last=step, samples=(*self.samples, sample))
+                return replace(now, samples=(*self.samples, sample))
             case Tuned(simulators=simulators):
-                return replace(self, last=step, simulators=simulators)
+                return replace(now, simulators=simulators)
             case Transferred(fitness=fitness):
-                return replace(self, last=step, transferred=step, scale=self.scale or _size(fitness))
+                return replace(now, transferred=step, scale=self.scale or _size(fitness))
             case Probed():
-                return replace(self, last=step, probed=step)
-        return replace(self, last=step)
+                return replace(now, probed=step)
+        return now
 
 
 def _size(fitness: float) -> float | None:

@@ -196,7 +196,7 @@ def _extend(session: Session, larger: Sequence[tuple[ExperimentRow, ResolvedSpec
     done = sum(tally.rollouts_done + tally.rollouts_saved for tally in computed)
     admit(session, specs, admitted, done=done)
     for experiment, spec in growing:
-        _grow(session, experiment, spec)
+        grow(session, experiment, spec)
     return True
 
 
@@ -206,7 +206,8 @@ def _has_work(session: Session, experiment: ExperimentRow, spec: ResolvedSpec) -
     return spec.repetitions > len(repetitions) or any(unfinished)
 
 
-def _grow(session: Session, experiment: ExperimentRow, spec: ResolvedSpec) -> None:
+def grow(session: Session, experiment: ExperimentRow, spec: ResolvedSpec) -> None:
+    """Give a locked experiment the size of a larger spec, and queue again what has ended and is unfinished then."""
     extent, present, row = extent_of(spec), len(repetitions_of(session, experiment.id)), RepetitionRow
     waits_for_retry = row.state == State.FAILED
     unfinished = (row.experiment_id == experiment.id) & ~waits_for_retry & (row.iterations_done < extent.iterations)

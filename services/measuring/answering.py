@@ -1,6 +1,6 @@
 """Answers to requests. Each is checked, and kept: it counts, or it is a conflict that a person decides."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from gaplab.schemas.events import EventKind
@@ -54,27 +54,23 @@ def answer(
 def _answer(
     session: Session, id_: str, spec: MeasurementSpec, traces: TracesRead | None, token: str | None
 ) -> AnswerRead:
-    if traces is not None and traces.doubts and not spec.confirmed:
-        raise Conflict(f"{'; '.join(traces.doubts)}. Look at the traces; if they are right, send `confirmed` with them")
-    spec = spec if traces is None else _with_values(spec, traces)
+    spec = with_values(spec, traces)
     row, repetition = requests.locked(session, id_)
     experiment = session.get_one(ExperimentRow, repetition.experiment_id)
-    check_values(spec_of(experiment.spec), spec.values, spec.readings, spec.unit)
+    resolved = spec_of(experiment.spec)
+    check_values(resolved, spec.values, spec.readings, spec.unit, resolved.reality.repeats)
     check_attachments(session, spec.attachments)
     answered = row.state in requests.ANSWERED
     counted = requests.counted_answer(session, row) if answered else None
     if row.state is RequestState.WITHDRAWN or (answered and counted is None):
         msg = f"request {row.id} is no longer needed: its experiment has ended, or a correction closed its branch"
         raise Conflict(msg)
-    if counted is not None and _says_nothing_new(counted, spec):
+    if counted is not None and says_nothing_new(counted, spec):
         counted.doubts = None if spec.confirmed else counted.doubts
         return view_answer(counted)
     latest = (spec.take or row.takes) >= row.takes if row.state is not RequestState.TAKEN else spec.take == row.takes
     counts = counted is None and latest
-    given = insert_answer(session, row, spec, AnswerState.COUNTED if counts else AnswerState.CONFLICT, token)
-    if traces is not None:
-        kept = set(TraceRead.model_fields)
-        given.traces = [trace.model_dump(mode="json", include=kept) for trace in traces.traces]
+    given = insert_answer(session, row, spec, AnswerState.COUNTED if counts else AnswerState.CONFLICT, token, traces)
     if counts:
         told = () if spec.confirmed else doubts(session, repetition, row, spec.values)
         given.doubts = list(told) or None
@@ -85,14 +81,27 @@ def _answer(
     return view_answer(given)
 
 
-def _with_values(spec: MeasurementSpec, traces: TracesRead) -> MeasurementSpec:
-    """Return an answer with the values and readings of its traces."""
+def with_values(spec: MeasurementSpec, traces: TracesRead | None) -> MeasurementSpec:
+    """Return an answer with the values and readings of its traces, if it has any.
+
+    Raises:
+        Conflict: they are doubtful and not confirmed.
+    """
+    if traces is None:
+        return spec
+    if traces.doubts and not spec.confirmed:
+        raise Conflict(f"{'; '.join(traces.doubts)}. Look at the traces; if they are right, send `confirmed` with them")
     named = dict.fromkeys((*spec.attachments, *(trace.attachment for trace in traces.traces)))
     return spec.model_copy(update={"values": traces.values, "readings": traces.readings, "attachments": tuple(named)})
 
 
 def insert_answer(
-    session: Session, row: RequestRow, spec: MeasurementSpec, state: AnswerState, token: str | None
+    session: Session,
+    row: RequestRow,
+    spec: MeasurementSpec,
+    state: AnswerState,
+    token: str | None,
+    traces: TracesRead | None = None,
 ) -> AnswerRow:
     """Store an answer as it was given; without an operator, the holder of its take, if that is the latest one."""
     parts, holder = _parts(spec), row.taken_by if spec.take == row.takes else None
@@ -106,6 +115,9 @@ def insert_answer(
         at=moment(session),
         **parts | {"operator": parts["operator"] or holder or UNKNOWN},
     )
+    if traces is not None:
+        kept = set(TraceRead.model_fields)
+        given.traces = [trace.model_dump(mode="json", include=kept) for trace in traces.traces]
     session.add(given)
     session.flush()
     return given
@@ -142,7 +154,7 @@ def _parts(spec: MeasurementSpec) -> dict[str, Any]:
     return {name: storable(part) if isinstance(part, str) else part or None for name, part in given}
 
 
-def _says_nothing_new(counted: AnswerRow, spec: MeasurementSpec) -> bool:
+def says_nothing_new(counted: AnswerRow, spec: MeasurementSpec) -> bool:
     """Return whether each part of an answer is in the one that counts already, as of an answer that is sent again."""
     parts = _parts(spec)
     attached = set(parts.pop("attachments") or ()) <= set(counted.attachments or ())
@@ -158,8 +170,9 @@ def check_values(
     values: Sequence[float] | None,
     readings: Sequence[Table] | None,
     unit: str | None,
+    repeats: int | None = None,
 ) -> None:
-    """Refuse values of another unit or number than the experiment asks for, and readings of another shape.
+    """Refuse values of another unit or number than `repeats`, if that is given, and readings of another shape.
 
     If the experiment tunes on readings, values without any that it compares are refused too. An answer about a probe
     is no exception, since it also counts for a later sample of the same controller.
@@ -168,7 +181,12 @@ def check_values(
         InvalidSpec: with every violation.
     """
     robot = robot_of(spec)
-    violations = list(_violations(spec, values, unit, robot.unit))
+    violations = list(unit_violations(label_of(spec.robot), unit, robot.unit))
+    if values is not None and len(values) != (repeats or len(values)):
+        message = (
+            f"the experiment asks for {repeats} value{'' if repeats == 1 else 's'} a measurement, not {len(values)}"
+        )
+        violations.append(Violation("/values", list(values), message, f"exactly {repeats}"))
     if readings is not None:
         violations += readings_violations(readings, None if values is None else len(values), robot.sensors)
     if values is not None and not violations:
@@ -186,11 +204,3 @@ def check_attachments(session: Session, hashes: Sequence[str]) -> None:
     """
     if missing := attachments.missing(session, hashes, "/attachments"):
         raise InvalidSpec(missing)
-
-
-def _violations(spec: ResolvedSpec, values: Sequence[float] | None, unit: str | None, own: str) -> Iterator[Violation]:
-    yield from unit_violations(label_of(spec.robot), unit, own)
-    if values is not None and len(values) != spec.reality.repeats:
-        wanted = spec.reality.repeats
-        message = f"the experiment asks for {wanted} value{'' if wanted == 1 else 's'} a measurement, not {len(values)}"
-        yield Violation("/values", list(values), message, f"exactly {wanted}")

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from gaplab.schemas.corrections import ConflictSpec, Consequences, CorrectionSpec, VoidSpec
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import AnswerState, MeasurementSpec
+from gaplab.schemas.traces import TracesRead
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import Admission
@@ -78,14 +79,30 @@ def _correct(session: Session, id_: str, spec: CorrectionSpec, token: str | None
     spec = _with_readings(spec, row)
     _check(session, repetition, spec)
     found = consequences(session, request, repetition, "correct")
-    answer = MeasurementSpec(values=spec.values, readings=spec.readings, failed=spec.failed, operator=spec.operator)
-    judge(session, row, AnswerState.REPLACED, spec.reason)
-    new = insert_answer(session, request, answer, AnswerState.COUNTED, token)
-    new.replaces, new.attachments, new.note = row.id, row.attachments, row.note
-    settle_request(session, request, new)
-    note_answer(session, EventKind.CORRECTED, request, repetition, row, spec.operator)
+    kept = {"attachments": tuple(row.attachments or ()), "note": row.note}
+    answer = MeasurementSpec(**spec.model_dump(include={"values", "readings", "failed", "operator"}), **kept)
+    new = replace(session, row, answer, spec.reason, token)
     branch = apply(session, request, repetition, new, spec.reason)
     return found.model_copy(update={"answer": new.id, "branch": branch})
+
+
+def replace(
+    session: Session,
+    row: AnswerRow,
+    spec: MeasurementSpec,
+    reason: str,
+    token: str | None,
+    traces: TracesRead | None = None,
+) -> AnswerRow:
+    """Let another answer count in place of a row that counts; no step is changed yet."""
+    request = session.get_one(RequestRow, row.request_id)
+    repetition = session.get_one(RepetitionRow, row.repetition_id)
+    judge(session, row, AnswerState.REPLACED, reason)
+    new = insert_answer(session, request, spec, AnswerState.COUNTED, token, traces)
+    new.replaces = row.id
+    settle_request(session, request, new)
+    note_answer(session, EventKind.CORRECTED, request, repetition, row, spec.operator)
+    return new
 
 
 def _void(session: Session, id_: str, spec: VoidSpec) -> Consequences:
@@ -177,5 +194,5 @@ def _with_readings(spec: CorrectionSpec, row: AnswerRow) -> CorrectionSpec:
 
 
 def _check(session: Session, repetition: RepetitionRow, spec: CorrectionSpec) -> None:
-    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
-    check_values(spec_of(experiment.spec), spec.values, spec.readings, spec.unit)
+    resolved = spec_of(session.get_one(ExperimentRow, repetition.experiment_id).spec)
+    check_values(resolved, spec.values, spec.readings, spec.unit, resolved.reality.repeats)

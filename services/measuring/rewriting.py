@@ -3,9 +3,11 @@
 The steps after a corrected sample leave the log as a closed branch, and stay readable; the repetition goes on.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from itertools import pairwise
+from operator import attrgetter
+from typing import Any, Literal, TypeAlias
 
 from sqlalchemy import func, insert, select, update
 
@@ -13,7 +15,17 @@ from gaplab.schemas.corrections import BranchRead, Consequences
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.measurements import RequestState
 from gaplab.schemas.records import MeasurementKind
-from gaplab.services.core.types import History, Measured, Probed, recorded_fitness
+from gaplab.services.core.types import (
+    LENGTH,
+    History,
+    Measured,
+    Probed,
+    Selected,
+    Step,
+    next_place,
+    place_of,
+    recorded_fitness,
+)
 from gaplab.services.experiments.editing import show_again
 from gaplab.services.experiments.lease_ends import take_back
 from gaplab.services.experiments.states import move, settle
@@ -47,7 +59,7 @@ def recorded(session: Session, request: RequestRow, repetition: RepetitionRow) -
     return tuple(
         each
         for each in requests.requests_of(session, repetition.id)
-        if (each.same_as or each.id) == request.id and each.branch is None and each.place < len(log)
+        if (each.same_as or each.id) == request.id and each.branch is None and each.place < next_place(log)
     )
 
 
@@ -65,7 +77,7 @@ def consequences(
         return nothing_follows(request, repetition, "it belongs to a closed branch, so no step follows from it")
     (log,) = logs(session, [repetition.id]).values()
     leading = rows if verb == "void" else samples_among(rows)
-    later = log[leading[0].place + 1 :] if leading else ()
+    later = _closing(log, leading[0].place + 1, NONE if verb == "void" else was_told)[0] if leading else ()
     measured = [step for step in later if isinstance(step, Measured | Probed)]
     measurements = sum(not (isinstance(step, Probed) and step.left_out) for step in measured)
     words = "nothing follows from it"
@@ -92,23 +104,45 @@ def nothing_follows(request: RequestRow, repetition: RepetitionRow, words: str) 
     )
 
 
-def close(session: Session, repetition: RepetitionRow, place: int, iteration: int, reason: str) -> int | None:
+Stays: TypeAlias = Callable[[Selected], bool]
+"""Whether a sample stays in the log when a step before it changes, by how it was selected."""
+
+NONE: Stays = lambda _: False  # noqa: E731 - a value, like the others
+
+was_told: Stays = attrgetter("told")
+"""What a person chose to measure does not follow from the steps before it."""
+
+
+def _closing(log: Sequence[Step], place: int, stays: Stays) -> tuple[list[Step], list[int]]:
+    """Return the steps from a place on that are to be closed, and the iterations of the samples that stay."""
+    later = [step for step in log if place_of(step) >= place]
+    samples = (first for first, second in pairwise(later) if isinstance(second, Measured))
+    kept = [each.iteration for each in samples if isinstance(each, Selected) and stays(each)]
+    gone = (step for step in later if step.iteration not in kept or not isinstance(step, Selected | Measured))
+    return list(gone), kept
+
+
+def close(
+    session: Session, repetition: RepetitionRow, place: int, iteration: int, reason: str, stays: Stays = NONE
+) -> int | None:
     """Close the steps of a log from a place on, and return the number of their branch; None if no step is closed.
 
     A worker that computes further steps loses its lease. The caller has locked the experiment, and settles it.
-    `iteration` is that of the measurement that was corrected.
+    `iteration` is that of the measurement that was corrected. Samples that stay are the next ones of the log.
     """
     take_back(session, repetition, State.QUEUED, Ending.HANDED_BACK, "a measurement was corrected")
     checkpoints.forget(session, [repetition.id])
     number = None
-    if repetition.steps > place:
+    (log,) = logs(session, [repetition.id]).values()
+    gone, kept = _closing(log, place, stays)
+    if gone:
         of_it = select(func.max(BranchRow.number)).where(BranchRow.repetition_id == repetition.id)
         number = 1 + (session.scalar(of_it) or 0)
         values = {"repetition_id": repetition.id, "number": number, "iteration": iteration, "reason": reason}
         session.execute(insert(BranchRow).values(**values))
-        steps.close(session, repetition.id, place, number)
+        steps.close(session, repetition.id, place, number, kept)
         session.refresh(repetition)
-    _withdraw(session, repetition.id, place, number)
+    _withdraw(session, repetition.id, place, number, kept if gone else ())
     return number
 
 
@@ -141,26 +175,35 @@ def _shown(step: StepRow) -> dict[str, Any]:
     return found | ({"recorded_fitness": step.recorded} if step.kind is StepKind.PROBED else {})
 
 
-def _withdraw(session: Session, repetition: int, place: int, branch: int | None) -> None:
+def _withdraw(session: Session, repetition: int, place: int, branch: int | None, kept: Sequence[int]) -> None:
     """Withdraw what the closed steps still wait for, and assign the answered requests to the branch."""
     row = RequestRow
     later = (row.repetition_id == repetition) & (row.place >= place) & row.branch.is_(None)
     requests.withdraw(session, later)
-    session.execute(update(row).where(later).values(branch=branch))
+    sample = (row.kind == MeasurementKind.SAMPLE) & row.iteration.in_(kept)
+    session.execute(update(row).where(later, ~sample).values(branch=branch))
+    for old, new in steps.renumbered(place, kept):
+        moved = {"iteration": new, "place": row.place + (new - old) * LENGTH}
+        session.execute(update(row).where(later, sample, row.iteration == old).values(moved))
 
 
 def apply(
-    session: Session, request: RequestRow, repetition: RepetitionRow, answer: AnswerRow, reason: str
+    session: Session,
+    request: RequestRow,
+    repetition: RepetitionRow,
+    answer: AnswerRow,
+    reason: str,
+    stays: Stays = was_told,
 ) -> int | None:
     """Write the new values into the steps that the answer is, and close what follows from the first sample."""
     branch = None
     if samples := samples_among(recorded(session, request, repetition)):
-        branch = close(session, repetition, samples[0].place + 1, samples[0].iteration, reason)
+        branch = close(session, repetition, samples[0].place + 1, samples[0].iteration, reason, stays)
     experiment = session.get_one(ExperimentRow, repetition.experiment_id)
     for each in recorded(session, request, repetition):
         steps.rewrite(session, repetition.id, step_of(session, experiment, each, answer), answer.operator)
     _rewrite_records(session, repetition)
-    _continue(session, repetition, closed=branch is not None)
+    go_on(session, repetition, closed=branch is not None)
     return branch
 
 
@@ -176,7 +219,7 @@ def _rewrite_records(session: Session, repetition: RepetitionRow) -> None:
         history = history.after(step)
 
 
-def _continue(session: Session, repetition: RepetitionRow, *, closed: bool) -> None:
+def go_on(session: Session, repetition: RepetitionRow, *, closed: bool) -> None:
     """Queue a repetition that had ended or waits for nothing, if steps were closed; and bring its experiment back."""
     session.refresh(repetition)
     if (repetition.state is State.COMPLETED and closed) or _waits_for_nothing(session, repetition):

@@ -80,7 +80,7 @@ def compute_replay(request: ReplayRequest) -> bytes:
     robot = robot_of(spec)
     genome = np.array(request.genome)
     observed = robot.motion(genome).observe_s
-    times = np.arange(int(min(LONGEST_S, observed[-1]) * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S
+    times = frame_times(min(LONGEST_S, observed[-1]))
     simulation = reality = readings = None
     if request.parameters is not None:
         simulate = simulation_of(spec, robot)
@@ -144,11 +144,7 @@ def _shown(robot: Robot, engine: str, world: World, recording: Recording, record
     )
     if not np.isfinite(fitness) or not np.all(np.isfinite(recording.poses)):
         return found
-    bare, angles = world, recording.angles_rad
-    if angles is None:  # the base alone is known
-        bare = replace(world, bodies=world.bodies[:1], joints=(), observed="", origin=None, edits=frozenset())
-        angles = np.zeros((len(recording.times_s), 0))
-    positions, orientations = body_poses(bare, recording.poses, angles)
+    bare, positions, orientations = poses_of(world, recording)
     followed = positions[:, observed_of(bare)]
     return found.model_copy(
         update={
@@ -163,6 +159,23 @@ def _shown(robot: Robot, engine: str, world: World, recording: Recording, record
             ),
         }
     )
+
+
+def frame_times(end_s: float) -> FloatArray:
+    """Return the times `(k,)` of the frames of a motion."""
+    return np.asarray(np.arange(int(end_s * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S)
+
+
+def poses_of(world: World, recording: Recording) -> tuple[World, FloatArray, FloatArray]:
+    """Return what is known of a world, and positions `(k, bodies, 3)` and orientations `(k, bodies, 4)` of its bodies.
+
+    If the engine tells no angles of joints, that is the base alone.
+    """
+    angles = recording.angles_rad
+    if angles is None:
+        world = replace(world, bodies=world.bodies[:1], joints=(), observed="", origin=None, edits=frozenset())
+        angles = np.zeros((len(recording.times_s), 0))
+    return world, *body_poses(world, recording.poses, angles)
 
 
 def _framing(*worlds: ReplayWorld | None) -> Framing:

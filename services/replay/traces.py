@@ -11,6 +11,7 @@ from gaplab.schemas.traces import AlignedTrace, TracesRead, TracesSpec
 from gaplab.services.core.arrays import FloatArray, frozen, known
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.replay.process import RolloutProcess, SentSpec, received, sent
+from gaplab.services.replay.rollout import frame_times
 from gaplab.services.specs.assembly import simulation_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
@@ -23,9 +24,6 @@ from gaplab.services.world.motions import Trajectory
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.traces import Alignment, TooShort, Trace, align, placed, read_trace, unlikely
 from gaplab.services.world.world import World
-
-FRAMES_PER_S = 50
-"""Frames of the expected motion."""
 
 LONGEST_PLOT_S = 20.0
 """Longest part of a motion whose alignment is shown."""
@@ -109,7 +107,7 @@ def expected_in(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return times `(k,)`, poses `(k, 7)` and fitness of a genome in a simulator; nan if the physics failed."""
     end_s = float(robot.motion(genome).observe_s[-1])
-    times = np.unique(np.append(np.arange(int(end_s * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S, end_s))
+    times = np.unique(np.append(frame_times(end_s), end_s))
     _, recording = simulation.record(genome, parameters, times)
     return times, recording.poses, float(robot.fitness(recording.trajectory))
 

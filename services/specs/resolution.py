@@ -83,7 +83,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     physical = spec.reality.kind == "physical"
     real = simulated if physical else spec.reality.engine or simulated
     place = "/reality/engine" if spec.reality.engine and not physical else "/engine"
-    engine, reality_engine = gather(lambda: _engine(simulated, robot, "/engine"), lambda: _engine(real, robot, place))
+    engine, reality_engine = gather(lambda: usable(simulated, robot, "/engine"), lambda: usable(real, robot, place))
     budget, iterations = _budget(spec, preset), preset.iterations if spec.iterations is None else spec.iterations
     divisor = tuner.divisor(seen_of(iterations + len(spec.reality.samples), spec.held_out))
     if violations := [
@@ -183,7 +183,12 @@ def takes_samples(spec: ExperimentSpec) -> bool:
     return spec.strategy.name not in strategies or strategies[spec.strategy.name].takes_samples
 
 
-def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
+def usable(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
+    """Return an engine that can run a robot's world here.
+
+    Raises:
+        InvalidSpec: it is unknown, not installed, or cannot run it; the pointer is its place in the spec.
+    """
     engine, _ = engines.check(ref, pointer)
     able = [name for name, each in engines.items() if runs(each, robot.world)]
     if ref.name not in able:

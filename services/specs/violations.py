@@ -139,8 +139,18 @@ def reality_violations(
     if strategy.in_reality and engine is not simulated and not engine.repeatable:
         message = f"{strategy.name} evolves in reality itself, and the engine {engine.name!r} may move hardware"
         yield Violation("/strategy", strategy.name, message, "another strategy, or an engine with `repeatable = True`")
-    for name, value in spec.reality.parameters.items():
-        pointer = pointer_to(["reality", "parameters", name])
+    yield from parameter_violations(spec.reality.parameters, robot, engine, ("reality", "parameters"))
+
+
+def parameter_violations(
+    parameters: Mapping[str, float], robot: Robot, engine: type[Engine], place: Sequence[str | int]
+) -> Iterator[Violation]:
+    """Yield values of tunables that are unknown, out of range, of what the robot lacks, or ignored by the engine.
+
+    `place` are the names and numbers that lead to them.
+    """
+    for name, value in parameters.items():
+        pointer = pointer_to([*place, name])
         try:
             tunable = tunable_of(name, pointer)
         except InvalidSpec as error:

@@ -31,9 +31,12 @@ if TYPE_CHECKING:
     from gaplab.api.clients.errors import ServiceUnreachable as ServiceUnreachable
     from gaplab.api.clients.figures import Figure as Figure
     from gaplab.api.clients.results import Comparisons as Comparisons
+    from gaplab.api.library.robots import read_robot as read_robot
     from gaplab.api.library.running import Interrupted as Interrupted
     from gaplab.api.library.running import Result as Result
     from gaplab.api.library.running import run as run
+    from gaplab.api.library.simulating import simulate as simulate
+    from gaplab.api.library.tuning import Tuning as Tuning
     from gaplab.api.process.errors import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
     from gaplab.samples import read_samples as read_samples
@@ -42,8 +45,8 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "Client": "gaplab.api.clients.client",
-    "Comparisons": "gaplab.api.clients.results",
     "CommandError": "gaplab.api.process.errors",
+    "Comparisons": "gaplab.api.clients.results",
     "DriverMotion": "gaplab.api.clients.driving",
     "ExperimentFailed": "gaplab.api.clients.errors",
     "ExtraMissing": "gaplab.api.clients.errors",
@@ -56,9 +59,12 @@ _MODULES = {
     "Result": "gaplab.api.library.running",
     "ServiceError": "gaplab.api.clients.errors",
     "ServiceUnreachable": "gaplab.api.clients.errors",
+    "Tuning": "gaplab.api.library.tuning",
     "local_service": "gaplab.api.process.local_service",
+    "read_robot": "gaplab.api.library.robots",
     "read_samples": "gaplab.samples",
     "run": "gaplab.api.library.running",
+    "simulate": "gaplab.api.library.simulating",
 }
 
 __all__ = sorted(_MODULES)

@@ -5,31 +5,25 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from gaplab.api.library.robots import AnyRobot, read_robot
 from gaplab.schemas.measurements import KnownSample
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.samples import CellError, SamplesRead
 from gaplab.schemas.traces import TracesSpec
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.csv_tables import read_csv
-from gaplab.services.plugins import folders
 from gaplab.services.replay.traces import evaluated, expected_in, refuse_other_bodies
 from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.defaults import default_engine
-from gaplab.services.specs.robots import robot_of_file
 from gaplab.services.specs.sample_tables import checked, collected
 from gaplab.services.specs.sample_tables import read_samples as read_table
 from gaplab.services.specs.simulation import Simulation
-from gaplab.services.world.robot_files import read_robot_file
-from gaplab.services.world.robot_library import IMPORTED
-from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.traces import Trace, read_trace
 
 
-def read_samples(
-    path: str | Path, robot: str | Path, options: Mapping[str, Any] | None = None, *, confirmed: bool = False
-) -> list[dict[str, Any]]:
+def read_samples(path: str | Path, robot: AnyRobot, *, confirmed: bool = False) -> list[dict[str, Any]]:
     """Return the samples of a CSV file, for `reality.samples` of a spec.
 
         spec["reality"] = {"kind": "physical", "samples": gaplab.read_samples("runs.csv", "quadruped")}
@@ -41,25 +35,20 @@ def read_samples(
 
     Args:
         path: the file.
-        robot: name of the robot that was measured: gaplab's own, or one of GAPLAB_PLUGINS; or its robot file, like
-            `"my_bot.json"`. `client.bench.check_samples` knows the robots that a service has, and other controllers.
-        options: its options, which one from a file does not have; left out: their defaults.
+        robot: what was measured: its name; its robot file, URDF or MJCF; or a spec, like that of an experiment.
+            `client.bench.check_samples` knows the robots that a service has.
         confirmed: take traces that are unlikely: with gaps, with another start, or of another drive.
 
     Raises:
         InvalidSamples: the file or a trace has errors, or a trace is unlikely and not `confirmed`; all are named.
-        InvalidSpec: the robot does not exist, or refuses its options.
-        TypeError: the robot is neither a name nor a file.
+        InvalidSpec: the robot does not exist, or is refused.
+        TypeError: it is neither a name, a file nor a spec.
     """
-    if not isinstance(robot, str | Path):
-        raise TypeError(f"a robot is its name or its file, not {robot!r:.100}; give its options as `options`")
     file = Path(path)
-    folders.load()
-    measured = _robot(robot, dict(options or {}), file)
-    return _samples_of(file, measured, confirmed=confirmed).checked(file)
+    return samples_of(file, read_robot(robot), confirmed=confirmed).checked(file)
 
 
-def _samples_of(file: Path, robot: Robot, *, confirmed: bool) -> SamplesRead:
+def samples_of(file: Path, robot: Robot, *, confirmed: bool) -> SamplesRead:
     """Return the samples of a table, or everything that is wrong; of a trace that it names, what its code computes.
 
     The motion that is expected is that in the robot's own world and engine. A trace that is missing, wrong, or
@@ -104,24 +93,3 @@ def _measured(
     if found.doubts and not confirmed:
         raise ValueError(f"{'; '.join(found.doubts)}; if that is right, read with confirmed=True")
     return KnownSample(genome=tuple(genes), values=found.values, readings=found.readings)
-
-
-def _robot(robot: str | Path, options: dict[str, Any], table: Path) -> Robot:
-    """Return the robot of a table.
-
-    Raises:
-        InvalidSpec: it does not exist, or refuses its options.
-    """
-    if isinstance(robot, Path) or robot.endswith(".json"):
-        if options:
-            message = f"the robot of {robot} comes from a file, which has no options"
-            raise InvalidSpec([Violation("/robot/options", options, message, "left out")])
-        return robot_of_file(read_robot_file(Path(robot).read_bytes()))
-    if robot in robots or robot in robots.unusable:
-        return robots.create(PluginRef(name=robot, options=options), "/robot")
-    known = [name for name in robots if name != IMPORTED]
-    message = (
-        f"unknown robot {robot!r}: read_samples needs no service, and knows {', '.join(known)}, and robot files like "
-        f"'{robot}.json'; for a robot of a service use client.bench.check_samples({str(table)!r}, {robot!r})"
-    )
-    raise InvalidSpec([Violation("/robot", robot, message, tuple(known))])

@@ -130,11 +130,7 @@ def test_copies_of_errors_and_comparisons_are_what_they_were(
         assert copied.latex() == pairs.latex()
 
 
-def test_a_robot_of_samples_is_a_name_or_a_file(tmp_path: Path) -> None:
-    robot: Any = {"name": "toy_function"}
-
-    with pytest.raises(TypeError, match=r"a robot is its name or its file, not {'name': 'toy_function'}"):
-        gaplab.read_samples(tmp_path / "runs.csv", robot)
+def test_a_robot_of_samples_is_known_without_a_service(tmp_path: Path) -> None:
     (tmp_path / "runs.csv").write_text("gene_0,value\n0.5,0.5\n")
     with pytest.raises(InvalidSpec, match="unknown robot 'toy'"):
         gaplab.read_samples(tmp_path / "runs.csv", "toy")

@@ -14,9 +14,10 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from sqlalchemy import update
 
+import gaplab
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
-from gaplab.schemas.records import MeasurementKind
+from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
 from gaplab.schemas.replays import Replay
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
@@ -131,6 +132,31 @@ def test_a_transferred_controller_walks_in_its_simulator_and_in_reality_as_it_wa
         assert all(len(feet) > 2 for feet in world.contacts)
         counted = [speed for time, speed in zip(shown.times_s, world.speeds_m_s, strict=True) if time >= 0.5]
         assert np.mean(counted) == pytest.approx(world.fitness, rel=0.2)
+
+
+def test_simulate_gives_what_the_service_stores_and_shows(sqlite_store: Store, api: Any) -> None:
+    experiment, log, _ = walked(sqlite_store)
+    spec = api.get(f"/experiments/{experiment}").json()["spec"]
+    samples = [SampleRead(**each) for each in api.get(f"/experiments/{experiment}/samples?kind=sample").json()["items"]]
+    tuned = SimulatorRead(**api.get(f"/experiments/{experiment}/simulators").json()["items"][-1])
+    shown = Replay.model_validate_json(api.get(f"/experiments/{experiment}/replay?iteration=1&kind=transfer").content)
+
+    found = gaplab.simulate(spec, [sample.genome for sample in samples], [HIDDEN, tuned])
+    poses = found.trajectory(genome=0, simulator=1)
+
+    assert found.fitness[:, 0].tolist() == [sample.fitness for sample in samples]
+    assert tuned.parameters == dict(zip(HIDDEN, BEST, strict=True))
+    assert found.fitness[0, 1] == log[6].fitness == shown.simulation.fitness
+    for row, sample in zip(found.readings, samples, strict=True):
+        stored = np.array(sample.readings).reshape(row[0].shape) * found.robot.sensors.noises
+        assert np.array_equal(row[0], stored)
+    assert found.robot.sensors.names == shown.readings.sensors
+    assert tuple(poses.times_s) == shown.times_s
+    for places, shown_places, digits in (
+        (poses.positions_m, shown.simulation.positions_m, 3),
+        (poses.orientations, shown.simulation.orientations, 4),
+    ):
+        assert np.array_equal(np.round(places.swapaxes(0, 1).reshape(151, -1), digits), shown_places)
 
 
 def test_a_replay_has_what_the_sensors_said_in_both_worlds(sqlite_store: Store, api: Any) -> None:

@@ -92,8 +92,8 @@ ARROWS = {
         ON_DEMAND | {"httpx2", "pydantic", "rich"},
     ),
     "api/library": (
-        ("schemas", "services", "workers", "api.app", "api.clients", "api.process", "api.library"),
-        ON_DEMAND | {"httpx2", "numpy", "pydantic"},
+        ("schemas", "services", "workers", "samples", "api.app", "api.clients", "api.process", "api.library"),
+        ON_DEMAND | {"httpx2", "numpy", "pydantic", "rich"},
     ),
     "api/commands": (
         ("schemas", "services", "api.clients", "api.library", "api.process", "api.commands"),

@@ -204,8 +204,9 @@ def test_the_client_knows_robot_files_and_plug_ins(tmp_path: Path, put: Callable
     assert gaplab.read_samples(tmp_path / "runs.csv", "mine")[0]["values"] == [0.41]
     assert gaplab.read_samples(tmp_path / "bot.csv", file) == gaplab.read_samples(tmp_path / "bot.csv", str(file))
     assert gaplab.read_samples(tmp_path / "bot.csv", file)[0]["genome"] == [0.5] * genes
-    with pytest.raises(InvalidSpec, match="comes from a file, which has no options"):
-        gaplab.read_samples(tmp_path / "bot.csv", file, {"counted_s": 1.0})
+    spec = {"robot": str(file), "controller": "sine"}
+    with pytest.raises(gaplab.InvalidSamples, match="there is no column gene_24"):
+        gaplab.read_samples(tmp_path / "bot.csv", spec)
 
 
 def test_the_client_says_which_robots_it_knows_and_what_knows_others(tmp_path: Path) -> None:
@@ -215,9 +216,10 @@ def test_the_client_says_which_robots_it_knows_and_what_knows_others(tmp_path: P
         gaplab.read_samples(tmp_path / "runs.csv", "my_bot")
 
     said = str(refused.value)
-    assert said.startswith("/robot: unknown robot 'my_bot': read_samples needs no service, and knows ")
-    assert "robot files like 'my_bot.json'" in said
-    assert said.endswith("runs.csv', 'my_bot')")
+    assert said.startswith(
+        "/robot: unknown robot 'my_bot'; permitted: quadruped, toy_function, and files like 'my_bot.json'"
+    )
+    assert said.endswith("a service's own robots are known to the service alone")
     assert "robot_file" not in said
 
 

@@ -196,7 +196,7 @@ class RepetitionRow(LeasedRow):
 
     Attributes:
         losses: number of workers lost since a step or a checkpoint was last recorded.
-        steps: number of recorded steps, and so the position of the next one in the log.
+        steps: place of the next step in the log; so many are recorded, unless a person told samples in between.
         checkpoints: number of stored parts of the next step.
         seconds: seconds of work in the recorded steps.
         provenance_id: provenance of its latest claim.

@@ -75,6 +75,12 @@ def begun(session: Session, experiments: Sequence[str]) -> Iterator[tuple[str, S
     columns = of.experiment_id, of.number, row.step, row.rollouts, row.budget
     query = of_experiments(row, experiments, *columns).where(row.part == of.checkpoints - 1, row.budget > 0)
     for experiment, number, place, rollouts, budget in session.execute(query.order_by(of.number)):
-        iteration, kind = divmod(place + _KINDS.index("tuning"), len(_KINDS))
-        step = StepRead(repetition=number, iteration=iteration, kind=_KINDS[kind], rollouts=rollouts, budget=budget)
+        iteration, kind = kind_at(place)
+        step = StepRead(repetition=number, iteration=iteration, kind=kind, rollouts=rollouts, budget=budget)
         yield experiment, step
+
+
+def kind_at(place: int) -> tuple[int, str]:
+    """Return the iteration of the step at a place of a log, and what it does."""
+    iteration, kind = divmod(place + _KINDS.index("tuning"), len(_KINDS))
+    return iteration, _KINDS[kind]

@@ -23,10 +23,11 @@ from gaplab.services.core.types import (
     Step,
     Transferred,
     Tuned,
+    may_follow,
+    place_of,
 )
 from gaplab.services.store.models import LOG, BranchRow, StepKind, StepRow
 
-_ORDER = tuple(StepKind)
 _STEP = cast("Table", StepRow.__table__)
 
 
@@ -41,7 +42,7 @@ def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, 
 
 
 def is_whole(session: Session, repetition: int, length: int, at_once: int) -> bool:
-    """Return whether a log has this many steps in order, and each step, of branches too, is as it is stored here.
+    """Return whether a log is in order up to the place `length`, and each step, of branches too, is as stored here.
 
     `at_once` rows are in memory.
     """
@@ -53,9 +54,9 @@ def is_whole(session: Session, repetition: int, length: int, at_once: int) -> bo
             if any(getattr(each, name) != value for name, value in columns.items()):
                 return False
             if each.branch == LOG:
-                if each.place != count:
+                if not may_follow(step_of(each), count):
                     return False
-                count += 1
+                count = each.place + 1
     except (KeyError, ValueError, TypeError, AssertionError):  # steps check themselves
         return False
     return count == length
@@ -75,18 +76,13 @@ def kind_of(step: Step) -> StepKind:
     return StepKind(type(step).__name__.lower())
 
 
-def position(step: Step) -> int:
-    """Return the step's place in the log of its repetition, from 0. Iteration 0 has no Selected and no Measured."""
-    return len(_ORDER) * step.iteration + _ORDER.index(kind_of(step)) - _ORDER.index(StepKind.TUNED)
-
-
 def columns_of(step: Step) -> dict[str, Any]:
     """Return the columns of a step that say what it is; not whose it is, who measured it, and how long it took."""
     cost = getattr(step, "cost", Cost())
     return {
         "kind": kind_of(step),
         "iteration": step.iteration,
-        "place": position(step),
+        "place": place_of(step),
         "fitness": None,
         "recorded": None,
         "rollouts": int(cost.rollouts),
@@ -97,8 +93,8 @@ def columns_of(step: Step) -> dict[str, Any]:
 
 def _outcome(step: Step) -> dict[str, Any]:
     match step:
-        case Selected(genome=genome):
-            return {"body": {"genome": genome.tolist()}}
+        case Selected(genome=genome, told=told):
+            return {"body": {"genome": genome.tolist()} | ({"told": True} if told else {})}
         case Measured(sample=sample):
             return {"fitness": known(sample.fitness), "body": {"genome": sample.genome.tolist()} | _seen(sample)}
         case Tuned(simulators=simulators):
@@ -137,7 +133,7 @@ def step_of(row: StepRow | Row[Any]) -> Step:
     cost = Cost(row.rollouts, row.failures, row.saved)
     match row.kind:
         case StepKind.SELECTED:
-            return Selected(row.iteration, frozen(body["genome"]), cost)
+            return Selected(row.iteration, frozen(body["genome"]), cost, body.get("told", False))
         case StepKind.MEASURED:
             sample = Sample(frozen(body["genome"]), fitness, _vector(body, "readings"), _vector(body, "repeats"))
             return Measured(row.iteration, sample)

@@ -8,12 +8,12 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import Conflict
-from gaplab.services.core.types import Cost, Measured, Probed, Step
+from gaplab.services.core.types import LENGTH, Cost, Measured, Probed, Step, may_follow, next_place, place_of
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Claim, Delivered, TimedStep
-from gaplab.services.store.models import LOG, RepetitionRow, StepRow
+from gaplab.services.store.models import LOG, RepetitionRow, StepKind, StepRow
 from gaplab.services.store.queries import checkpoints, events
-from gaplab.services.store.queries.logs import columns_of, position
+from gaplab.services.store.queries.logs import columns_of, logs
 
 _REPETITION, _STEP = (cast("Table", each.__table__) for each in (RepetitionRow, StepRow))
 
@@ -76,25 +76,46 @@ def append(session: Session, repetition: RepetitionRow, timed: TimedStep, measur
     Raises:
         Conflict: a worker holds it, it has ended, or the step is not the next one.
     """
-    if repetition.state not in (State.WAITING, State.QUEUED) or position(timed.step) != repetition.steps:
-        msg = f"step {position(timed.step)} cannot be recorded: repetition {repetition.number} is {repetition.state} "
+    if repetition.state not in (State.WAITING, State.QUEUED) or not may_follow(timed.step, repetition.steps):
+        msg = f"step {place_of(timed.step)} cannot be recorded: repetition {repetition.number} is {repetition.state} "
         raise Conflict(msg + f"after {repetition.steps} steps")
     session.connection().execute(insert(_STEP), [_row(repetition.id, timed, measured_by)])
     row = RepetitionRow
-    values = {"steps": row.steps + 1, "losses": 0, "error": None}
+    values = {"steps": place_of(timed.step) + 1, "losses": 0, "error": None}
     session.execute(update(row).where(row.id == repetition.id).values(values))
     events.note_step(session, timed.step, repetition.experiment_id, repetition.number)
 
 
-def close(session: Session, repetition: int, place: int, branch: int) -> None:
-    """Move the steps of a log from a place on into a branch; they count nowhere from then on."""
-    row = StepRow
+def close(session: Session, repetition: int, place: int, branch: int, kept: Sequence[int] = ()) -> None:
+    """Move the steps of a log from a place on into a branch; they count nowhere from then on.
+
+    The samples of the `kept` iterations stay, as samples that were told: they follow what is before the place.
+    """
+    row, (log,) = StepRow, logs(session, [repetition]).values()
     of_it = (row.repetition_id == repetition) & (row.branch == LOG)
-    session.execute(update(row).where(of_it, row.place >= place).values(branch=branch))
+    sample = row.kind.in_((StepKind.SELECTED, StepKind.MEASURED)) & row.iteration.in_(kept)
+    session.execute(update(row).where(of_it, row.place >= place, ~sample).values(branch=branch))
+    for old, new in renumbered(place, kept):
+        pair = [place_of(step) for step in log if step.iteration == old][:2]
+        moved = {"iteration": new, "place": row.place + (new - old) * LENGTH}
+        session.execute(update(row).where(of_it, row.iteration == old, row.place.in_(pair)).values(moved))
+        chosen = select(row).where(of_it, row.iteration == new, row.kind == StepKind.SELECTED)
+        selected = session.scalars(chosen, execution_options={"populate_existing": True}).one()
+        selected.body = selected.body | {"told": True}
+    session.flush()
+    (left,) = logs(session, [repetition]).values()
     sums = (func.coalesce(func.sum(getattr(row, name)), 0) for name in (*_TALLIES.values(), "seconds"))
     found = session.execute(select(*sums).where(of_it)).one()
     values = dict(zip((*_TALLIES, "seconds"), found, strict=True))
-    session.execute(update(RepetitionRow).where(RepetitionRow.id == repetition).values(steps=place, **values))
+    session.execute(
+        update(RepetitionRow).where(RepetitionRow.id == repetition).values(steps=next_place(left), **values)
+    )
+
+
+def renumbered(place: int, kept: Sequence[int]) -> list[tuple[int, int]]:
+    """Return the old and the new iteration of samples that stay in a log when the steps from a place on leave it."""
+    first = (place + LENGTH + 1) // LENGTH
+    return list(zip(sorted(kept), range(first, first + len(kept)), strict=True))
 
 
 def rewrite(session: Session, repetition: int, step: Step, measured_by: str | None = None) -> None:
@@ -132,7 +153,7 @@ def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[Time
     for each in delivered:
         if not isinstance(each, TimedStep):
             continue
-        place, following = position(each.step), length + len(found)
+        place, following = place_of(each.step), length + len(found)
         if place > following:
             msg = f"step {place} of repetition {claim.number} cannot be recorded: the log has {following} steps"
             raise Conflict(msg)

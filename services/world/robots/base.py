@@ -6,6 +6,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
 from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import FloatArray, Genome
@@ -13,7 +15,7 @@ from gaplab.services.core.registry import Plugin
 from gaplab.services.core.space import Space
 from gaplab.services.world.controllers import controllers
 from gaplab.services.world.controllers.base import Controller
-from gaplab.services.world.kinematics import from_start, observes_base
+from gaplab.services.world.kinematics import from_start, observed_poses, observes_base
 from gaplab.services.world.motions import Loop, Motion, Trajectory
 from gaplab.services.world.sensing import Sensors as Sensors
 from gaplab.services.world.tasks import tasks
@@ -103,6 +105,33 @@ class Robot(Plugin):
         if observes_base(self.world):
             trajectory = replace(trajectory, orientations=from_start(self.world, trajectory.orientations))
         return self._task.sense(trajectory)
+
+    def rated(self, times_s: FloatArray, angles: Mapping[str, FloatArray]) -> float | tuple[float, FloatArray]:
+        """Return the fitness of a recorded motion on a fixed base, with readings `(r, s)` if the robot has sensors.
+
+        Args:
+            times_s: `(k,)`, ascending: seconds from the start of the motion.
+            angles: `(k,)` of each joint by its name, rad, or m if it slides; of those left out, they stay at the start.
+
+        Raises:
+            ValueError: the base moves, a joint is unknown, or the record ends before the last observation.
+        """
+        observe_s, joints = self.motion(self.known).observe_s, self.world.joints
+        unknown = sorted(angles.keys() - {joint.name for joint in joints})
+        if not self.world.fixed or unknown or times_s[-1] < observe_s[-1]:
+            why = (
+                f"it needs a fixed base, joints that it has, not {unknown}, and a record of {observe_s[-1]:g} s or more"
+            )
+            raise ValueError(f"the motion of the {self.label} does not follow from these angles: {why}")
+
+        def seen(at_s: FloatArray) -> Trajectory:
+            base = np.tile([0.0, 0.0, self.world.start_height_m, *self.world.start_turn], (len(at_s), 1))
+            rows = [angles.get(joint.name, np.full(len(times_s), joint.start)) for joint in joints]
+            poses = observed_poses(self.world, base, np.array([np.interp(at_s, times_s, row) for row in rows]).T)
+            return Trajectory(at_s, poses[:, :3], poses[:, 3:])
+
+        fitness = float(self.fitness(seen(observe_s)))
+        return (fitness, self.sense(seen(self.sensors.times_s))) if self.sensors.size else fitness
 
     @property
     def loops(self) -> bool:

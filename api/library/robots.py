@@ -1,0 +1,87 @@
+"""Robots by name, from files and of specs, in this process."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar
+
+from pydantic import ValidationError
+
+from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.spec import SharedSettings
+from gaplab.services.core.errors import InvalidRobot, InvalidSpec, Violation, unknown_name
+from gaplab.services.plugins import folders
+from gaplab.services.specs.robots import Driven, ref_of_file, robot_of, robot_of_file
+from gaplab.services.world.robot_files import read_robot_file
+from gaplab.services.world.robot_library import IMPORTED
+from gaplab.services.world.robots import robots
+from gaplab.services.world.robots.base import Robot
+
+S = TypeVar("S", bound=SharedSettings)
+
+AnyRobot: TypeAlias = str | Path | Mapping[str, Any] | SharedSettings
+"""A robot's name; its robot file, URDF or MJCF, which is imported as by `gaplab robot import`; or a spec."""
+
+Named: TypeAlias = str | Mapping[str, Any] | PluginRef | None
+"""A plug-in by its name, or as an object with its options; None: that of the spec, or the robot's."""
+
+
+def read_robot(robot: AnyRobot, *, controller: Named = None, task: Named = None) -> Robot:
+    """Return a robot; its `rated` computes fitness and readings from recorded angles of joints.
+
+    Raises:
+        InvalidSpec: robot, controller or task is unknown or refused, or the file cannot be imported.
+        EngineUnavailable: MuJoCo, which imports URDF and MJCF, is not installed.
+        OSError: the file cannot be read.
+        TypeError: it is neither a name, a file nor a spec.
+    """
+    asked = settings(SharedSettings, robot, controller=controller, task=task)
+    return robot_of(Driven(asked.robot, asked.controller, asked.task))
+
+
+def settings(kind: type[S], robot: AnyRobot, **others: Any) -> S:  # noqa: ANN401 - as in a spec
+    """Return what a robot, or a spec, says about what is simulated; others that are not None replace it.
+
+    Errors are those of `read_robot`.
+    """
+    folders.load()
+    spec = {"robot": robot} if isinstance(robot, str | Path) else robot
+    if not isinstance(spec, Mapping | SharedSettings):
+        raise TypeError(f"a robot is its name, its file or a spec, not {robot!r:.100}")
+    said = {name: each for name, each in dict(spec).items() if name in {"robot", "controller", "task", "engine"}}
+    if isinstance(named := said.get("robot"), str | Path):
+        said["robot"] = _of_file(Path(named)) if Path(named).suffix else _of_name(str(named))
+    try:
+        return kind.model_validate(said | {name: each for name, each in others.items() if each is not None})
+    except ValidationError as error:
+        raise invalid(error) from error
+
+
+def invalid(error: ValidationError) -> InvalidSpec:
+    """Return an error of a schema in the words of the service."""
+    found = map(dict, error.errors())
+    return InvalidSpec(
+        Violation(pointer_to(each["loc"]), each["input"], sentence(each), permitted_by(each)) for each in found
+    )
+
+
+def _of_name(name: str) -> PluginRef:
+    if name in robots or name in robots.unusable:
+        return PluginRef(name=name)
+    found = unknown_name("/robot", "robot", name, [each for each in robots if each != IMPORTED])
+    message = f"{found.message}, and files like '{name}.json'; a service's own robots are known to the service alone"
+    raise InvalidSpec([Violation("/robot", name, message, found.permitted, found.nearest)])
+
+
+def _of_file(path: Path) -> PluginRef:
+    """Return how specs name the robot of a file, which this process then knows."""
+    from gaplab.services.robots.importing import import_robot
+    from gaplab.services.robots.options import ImportOptions
+
+    try:
+        is_robot_file = path.suffix == ".json"
+        file = read_robot_file(path.read_bytes()) if is_robot_file else import_robot(path, ImportOptions()).robot
+    except InvalidRobot as error:
+        raise InvalidSpec(Violation("/robot", str(path), reason) for reason in error.reasons) from error
+    robot_of_file(file)
+    return ref_of_file(file.sha256, file.name)

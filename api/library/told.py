@@ -1,0 +1,97 @@
+"""What a person tells: one measurement, with its recordings, or a table of samples; in the words of the service."""
+
+from collections.abc import Mapping, Sequence
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from gaplab.api.clients.mcap_traces import mcap_to_csv
+from gaplab.api.library.robots import invalid
+from gaplab.samples import samples_of
+from gaplab.schemas.measurements import KnownSample, MeasurementSpec
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.traces import TracesRead, TracesSpec
+from gaplab.services.core.arrays import Genome, frozen
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.measuring.attachments import store_attachment
+from gaplab.services.measuring.telling import Told
+from gaplab.services.replay.process import sent
+from gaplab.services.replay.traces import refuse_other_bodies, said_by_files
+from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.sample_tables import read_samples
+from gaplab.services.store.session import Store
+
+
+def samples_in(table: Any, spec: ResolvedSpec, *, confirmed: bool) -> list[Told] | None:  # noqa: ANN401 - anything
+    """Return the samples of a file, a data frame or a list of samples; None if it is none of these.
+
+    Raises:
+        InvalidSamples: the table has errors; with all of them.
+        InvalidSpec: what is in a list is not a sample.
+    """
+    robot = robot_of(spec)
+    if isinstance(table, str | Path):
+        table = samples_of(Path(table), robot, confirmed=confirmed).checked(Path(table))
+    elif hasattr(table, "to_csv"):
+        table = read_samples(table.to_csv(index=False), robot).checked(Path("the data frame"))
+    elif not (isinstance(table, Sequence) and table and isinstance(table[0], Mapping)):
+        return None
+    try:
+        samples = [KnownSample.model_validate(each) for each in table]
+    except ValidationError as error:
+        raise invalid(error) from error
+    answers = (each.model_dump(exclude={"genome"}) | {"confirmed": confirmed} for each in samples)
+    found = zip(samples, answers, strict=True)
+    return [(frozen(each.genome), MeasurementSpec.model_validate(answer), None) for each, answer in found]
+
+
+def measured(fitness: float | Sequence[float | None] | None, readings: Any) -> dict[str, Any]:  # noqa: ANN401 - numbers
+    """Return values and readings of the repeats that succeeded, or that none did, as parts of an answer."""
+    if fitness is None:
+        return {}
+    values, tables = (fitness, readings) if hasattr(fitness, "__len__") else ([fitness], [readings])
+    kept = [place for place, value in enumerate(values) if value is not None and not isnan(value)]
+    if not kept:
+        return {"failed": "no repeat gave a fitness"}
+    found: dict[str, Any] = {"values": [float(values[place]) for place in kept]}
+    return found | ({} if readings is None else {"readings": [_numbers(tables[place]) for place in kept]})
+
+
+def _numbers(table: Any) -> list[list[float | None]]:  # noqa: ANN401 - numbers in whatever holds them
+    return [[None if each is None or isnan(each) else float(each) for each in row] for row in table]
+
+
+def sample_of(
+    store: Store,
+    spec: ResolvedSpec,
+    simulator: Sequence[float],
+    genome: Genome,
+    traces: Sequence[str | Path],
+    **parts: Any,  # noqa: ANN401 - of an answer
+) -> Told:
+    """Return one measurement of a genome `(g,)`, whose traces are stored, and read beside a simulator `(p,)`.
+
+    Raises:
+        InvalidSpec: it is not an answer, or a trace does not contain the motion; with every violation.
+    """
+    files = dict(_attached(store, Path(each)) for each in traces)
+    try:
+        answer = MeasurementSpec.model_validate(parts | ({"traces": tuple(files)} if files else {}))
+    except ValidationError as error:
+        raise invalid(error) from error
+    if answer.traces is None:
+        return genome, answer, None
+    refuse_other_bodies(robot_of(spec).world)
+    asked = TracesSpec(traces=answer.traces, lags_s=answer.lags_s)
+    found = said_by_files(sent(spec), genome.tolist(), simulator, asked, files)
+    if not isinstance(found, TracesRead):
+        raise InvalidSpec(found)
+    return genome, answer, found
+
+
+def _attached(store: Store, path: Path) -> tuple[str, bytes]:
+    """Store a recording as CSV, and return its hash and its content."""
+    content = mcap_to_csv(path).encode() if path.suffix.lower() == ".mcap" else path.read_bytes()
+    return store_attachment(store, content, path.with_suffix(".csv").name, "text/csv").id, content
