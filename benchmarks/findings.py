@@ -21,7 +21,7 @@ from gaplab.services.archives import import_archive
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.figures.kinds.curves import curves_figure
-from gaplab.services.figures.matplotlib.files import render_file
+from gaplab.services.figures.matplotlib.files import Look, render_file
 from gaplab.services.results.comparisons import compare
 from gaplab.services.results.curves import curves
 from gaplab.services.results.tuned_simulators import tuned_simulators
@@ -209,7 +209,7 @@ def main() -> None:
         if arguments.svg:
             drawn = curves(store, list(labels))
             named = [curve.model_copy(update={"name": labels[curve.experiment]}) for curve in drawn]
-            arguments.svg.write_bytes(render_file(curves_figure(named), "svg", width_in=WIDTH_IN))
+            arguments.svg.write_bytes(render_file(curves_figure(named), "svg", Look(WIDTH_IN)))
 
 
 if __name__ == "__main__":

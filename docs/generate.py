@@ -10,10 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import typer
+from pydantic import BaseModel
 
 from docs import typescript
 from gaplab.api.app import create_app
+from gaplab.api.clients.bench import Bench
 from gaplab.api.clients.client import Client
+from gaplab.api.clients.figures import Figure
+from gaplab.api.clients.objects import Study
 from gaplab.api.commands.cli import app
 from gaplab.api.commands.completion import KINDS
 from gaplab.api.commands.exit_codes import Exit
@@ -88,14 +92,16 @@ def plugins() -> Iterator[str]:
 
 
 def python() -> Iterator[str]:
-    """Yield every method of the client."""
+    """Yield every method of the client, and of what it returns."""
     yield "`from gaplab import Client`. Methods raise `ServiceError`, which has the service's `problem`, and"
     yield "`ServiceUnreachable`; some raise `ExperimentFailed` or `ExtraMissing`. Import all of them from `gaplab`.\n"
     yield f"## Client{_signature(Client.__init__)}\n\n{_docstring(Client)}\n"
-    with Client("http://127.0.0.1") as client:
-        methods = inspect.getmembers(client, inspect.ismethod)
-    for name, method in (each for each in methods if not each[0].startswith("_")):
-        yield f"## {name}{_signature(method)}\n\n{_docstring(method)}\n"
+    for kind, before in ((Client, ""), (Study, "study."), (Bench, "client.bench."), (Figure, "figure.")):
+        if before:
+            yield f"## {kind.__name__}\n\n{_docstring(kind)}\n"
+        for name, method in inspect.getmembers(kind, inspect.isfunction):
+            if not name.startswith("_") and name not in dir(BaseModel):
+                yield f"{'###' if before else '##'} {before}{name}{_signature(method)}\n\n{_docstring(method)}\n"
 
 
 def settings() -> Iterator[str]:

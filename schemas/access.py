@@ -3,7 +3,7 @@
 from datetime import datetime
 from enum import StrEnum
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Read
 
 
 class Role(StrEnum):
@@ -24,7 +24,7 @@ class Role(StrEnum):
         return order.index(self) >= order.index(other)
 
 
-class TokenRead(Frozen):
+class TokenRead(Read):
     """A listed token, without its secret."""
 
     id: str

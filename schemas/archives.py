@@ -4,13 +4,13 @@ from typing import Literal
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Name
+from gaplab.schemas.base import Frozen, Id, Name, Read
 
 MOST_BYTES_OF_IMPORT = 2**30
 """Size of an archive that an import reads."""
 
 
-class ImportRead(Frozen):
+class ImportRead(Read):
     """The result of an import."""
 
     study: Id
@@ -43,7 +43,7 @@ class RepetitionRerun(Frozen):
     reason: str | None = Field(None, description="first difference, or why it was not computed")
 
 
-class RerunRead(Frozen):
+class RerunRead(Read):
     """The repetitions of an archive, computed again and compared with the stored numbers."""
 
     same: int

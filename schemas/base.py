@@ -1,7 +1,9 @@
 """The base of every schema, and the bounded numbers they share."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
+from enum import StrEnum
+from html import escape
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
@@ -20,6 +22,82 @@ class Frozen(BaseModel):
         """Return the attributes of an object that have the names of fields, and `others` in place of or beside them."""
         named = [name for name in cls.model_fields if name not in others and hasattr(source, name)]
         return cls(**{name: getattr(source, name) for name in named} | others)
+
+
+LINE, WORDS = 160, 60
+"""Most characters of what the service answered as one line, and of one text in it."""
+
+MOST_ROWS, MOST_COLUMNS, MOST_ITEMS = 20, 9, 3
+
+
+class Read(Frozen):
+    """What the service answers: one line at a prompt, a small table in a notebook; `model_dump()` has everything."""
+
+    def __repr__(self) -> str:
+        fields = ", ".join(f"{name}={in_words(value)}" for name, value in _telling(self).items())
+        return f"{shortened(f'{type(self).__name__}({fields}', LINE - 1)})"
+
+    __str__ = __repr__
+
+    def __dir__(self) -> list[str]:
+        """Return what completion offers: not all that pydantic's base has."""
+        return [name for name in super().__dir__() if name.startswith("_") or name not in _OF_PYDANTIC]
+
+    def _repr_html_(self) -> str:
+        return table((self,))
+
+
+_OF_PYDANTIC = frozenset(dir(BaseModel)) - {"model_dump", "model_dump_json"}
+
+
+def _telling(item: Read) -> dict[str, Any]:
+    """Return the fields that say something, which defaults do not: first numbers and texts, last lists."""
+    known = {name: (getattr(item, name), field.default) for name, field in type(item).model_fields.items()}
+    said = {name: value for name, (value, usual) in known.items() if value not in (None, (), {}, "", usual)}
+    kinds = (BaseModel, datetime, tuple | list | dict)
+    return dict(sorted(said.items(), key=lambda each: [isinstance(each[1], kind) for kind in reversed(kinds)]))
+
+
+def shortened(text: str, most: int = WORDS) -> str:
+    """Return a text with at most this many characters."""
+    return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
+def in_words(value: object) -> str:
+    """Return a value as a line has it: numbers to four digits, long texts and lists shortened."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, datetime):
+        return f"{value:%Y-%m-%d %H:%M}"
+    if isinstance(value, tuple | list | dict):
+        items = tuple(value.items() if isinstance(value, dict) else value)
+        if items and isinstance(items[0], BaseModel):
+            return f"<{len(items)} {type(items[0]).__name__}>"
+        return f"({', '.join(map(in_words, items[:MOST_ITEMS]))}{f', … {len(items)}' if items[MOST_ITEMS:] else ''})"
+    if isinstance(value, StrEnum):
+        return str(value)
+    return str(getattr(value, "text", None) or shortened(repr(value)))
+
+
+def table(items: Sequence[Any]) -> str:
+    """Return HTML: a table of what the first items tell, a row for each; of one item alone, a row for each field."""
+    told = [_telling(item) for item in items[:MOST_ROWS]]
+    heads = list(dict.fromkeys(name for each in told for name in each))[: MOST_COLUMNS if told[1:] else None]
+    rows = [heads, *([_cell(each.get(name)) for name in heads] for each in told)]
+    more = f"<p>and {len(items) - MOST_ROWS} more</p>" if len(items) > MOST_ROWS else ""
+    return html_of(rows if told[1:] else zip(*rows, strict=True)) + more
+
+
+def html_of(rows: Iterable[Iterable[str]]) -> str:
+    """Return texts as an HTML table."""
+    lines = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows)
+    return f"<table>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
+
+
+def _cell(value: object) -> str:
+    """Return a value as a table has it: texts whole."""
+    texts = value if isinstance(value, tuple) else ("" if value is None else value,)
+    return "; ".join(map(str, texts)) if all(isinstance(each, str) for each in texts) else in_words(value)
 
 
 def from_name(value: object, field: str) -> object:

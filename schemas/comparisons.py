@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Name, Statistic, Unit
+from gaplab.schemas.base import Frozen, Id, Name, Read, Statistic, Unit
 from gaplab.schemas.curves import Fitness
 
 
@@ -132,7 +132,7 @@ class Equivalence(Frozen):
     words: str = Field(examples=["equivalent within ±0.03 (p = 0.012, raw 0.004)"])
 
 
-class Pair(Frozen):
+class Pair(Read):
     """Two experiments, and the numbers of real-world evaluations at which they are compared."""
 
     first: Id

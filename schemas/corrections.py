@@ -4,13 +4,13 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Reason, Unit
+from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Read, Reason, Unit
 from gaplab.schemas.measurements import MOST_VALUES, Table, Values
 
 _OPERATOR = "person who says so; the event names them"
 
 
-class Consequences(Frozen):
+class Consequences(Read):
     """What follows from a correction or a void."""
 
     answer: Id | None = Field(None, description="id of the new answer; null for a dry run or a void")
@@ -66,7 +66,7 @@ class ConflictSpec(Frozen):
     operator: Label | None = Field(None, description=_OPERATOR)
 
 
-class BranchRead(Frozen):
+class BranchRead(Read):
     """Steps of a repetition that a correction closed; they count nowhere, and stay readable."""
 
     repetition: int

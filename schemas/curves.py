@@ -4,7 +4,7 @@ from enum import StrEnum
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Name, Statistic, Unit
+from gaplab.schemas.base import Id, Name, Read, Statistic, Unit
 from gaplab.schemas.lifecycle import State
 
 
@@ -35,7 +35,7 @@ class Fitness(StrEnum):
         }[self]
 
 
-class CurvePoint(Frozen):
+class CurvePoint(Read):
     """Fitness at one number of real-world evaluations, over the repetitions that have reached it.
 
     A statistic is null if it has too few repetitions.
@@ -50,7 +50,7 @@ class CurvePoint(Frozen):
     values: tuple[Statistic, ...] = Field(description="fitness by repetition; null: not reached yet, or failed")
 
 
-class Curve(Frozen):
+class Curve(Read):
     """The curve of one experiment.
 
     A strategy without samples has a single point, at 0, which is a level across the figure. The direct baseline is one:

@@ -4,7 +4,7 @@ from typing import Any
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Name
+from gaplab.schemas.base import Frozen, Id, Name, Read
 
 Values = tuple[Any, ...]
 
@@ -17,7 +17,7 @@ class DiffColumn(Frozen):
     experiments: int = Field(description="number of its experiments", examples=[3])
 
 
-class SettingRead(Frozen):
+class SettingRead(Read):
     """A setting with different values."""
 
     pointer: str = Field(
@@ -33,7 +33,7 @@ class SettingRead(Frozen):
     texts: tuple[str, ...] = Field(description="by column: these values in words", examples=[("400", "800")])
 
 
-class SpecDiff(Frozen):
+class SpecDiff(Read):
     """The settings that differ. Names and the schedule change no number, so they are not settings."""
 
     columns: tuple[DiffColumn, ...]

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
-from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Name, Tag
+from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Name, Read, Tag
 
 MOST_TAGS = 20
 """Tags of one study."""
@@ -43,7 +43,7 @@ class Edit(Frozen):
         return self
 
 
-class NotesRead(Frozen):
+class NotesRead(Read):
     """Notes as HTML."""
 
     html: str = Field(
@@ -52,7 +52,7 @@ class NotesRead(Frozen):
     )
 
 
-class DeletionRead(Frozen):
+class DeletionRead(Read):
     """A deleted study or experiment."""
 
     id: Id
@@ -70,7 +70,7 @@ ViewName = Annotated[
 """The name of a saved view: letters, digits, spaces and `_ . : + - ( )`."""
 
 
-class ViewSpec(Frozen):
+class ViewSpec(Read):
     """What a saved view shows."""
 
     EXAMPLES: ClassVar[Examples] = {

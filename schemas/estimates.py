@@ -4,7 +4,7 @@ from typing import Any
 
 from pydantic import Field
 
-from gaplab.schemas.base import EngineName, Frozen, Name
+from gaplab.schemas.base import EngineName, Frozen, Name, Read
 
 
 class EngineCost(Frozen):
@@ -32,7 +32,7 @@ class ExperimentCost(Frozen):
     core_seconds: float = Field(examples=[166_400.0])
 
 
-class EstimateRead(Frozen):
+class EstimateRead(Read):
     """Cost of a study or an experiment: rollouts, and time on the cores of this service."""
 
     experiments: tuple[ExperimentCost, ...]

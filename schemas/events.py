@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Moment
+from gaplab.schemas.base import Id, Moment, Read
 
 
 class EventKind(StrEnum):
@@ -65,7 +65,7 @@ class EventKind(StrEnum):
     PROBED = "probed"
 
 
-class EventRead(Frozen):
+class EventRead(Read):
     """A change of an experiment, with its number."""
 
     number: int = Field(description="number of the event, from 1 without gaps; a reader resumes after it")
@@ -80,7 +80,7 @@ class EventRead(Frozen):
     sentence: str = Field("", examples=["Repetition 0, iteration 1: measured in reality, 1.31"])
 
 
-class EventPage(Frozen):
+class EventPage(Read):
     """Some events, and the number to continue after."""
 
     items: tuple[EventRead, ...]

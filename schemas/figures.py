@@ -4,7 +4,7 @@ from typing import Any
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Read
 
 
 class Chart(Frozen):
@@ -16,14 +16,14 @@ class Chart(Frozen):
     )
 
 
-class TableRead(Frozen):
+class TableRead(Read):
     """The numbers of a figure, as text."""
 
     head: tuple[str, ...] = Field(examples=[("Curve", "Mean")])
     rows: tuple[tuple[str, ...], ...] = Field(examples=[(("Simulated fit", "1.2"),)])
 
 
-class FigureRead(Frozen):
+class FigureRead(Read):
     """A figure for a page that has Plotly."""
 
     figure: Chart

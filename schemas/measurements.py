@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Real, Reason, RobotName, Statistic, Unit
+from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Read, Real, Reason, RobotName, Statistic, Unit
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.traces import AttachmentRead as AttachmentRead
@@ -132,7 +132,7 @@ class MeasurementSpec(Frozen):
         return self
 
 
-class DoubtsRead(Frozen):
+class DoubtsRead(Read):
     """What is plausible in an answer, but unlikely; nothing is stored."""
 
     doubts: tuple[str, ...] = Field(examples=[("31 is 1e+02 times the other repeats",)])
@@ -149,7 +149,7 @@ class AnswerState(StrEnum):
     DISMISSED = "dismissed"
 
 
-class AnswerRead(Frozen):
+class AnswerRead(Read):
     """An answer to a request, as it was given. Answers are never changed; others replace them."""
 
     id: Id
@@ -194,7 +194,7 @@ class LimitsSpec(Frozen):
     )
 
 
-class Safety(Frozen):
+class Safety(Read):
     """What tuned simulators expect of a controller; the worst of each.
 
     Attributes:
@@ -220,7 +220,7 @@ class Safety(Frozen):
     unknown: tuple[str, ...] = Field((), description="what could not be forecast, and why, in words")
 
 
-class RequestRead(Frozen):
+class RequestRead(Read):
     """A measurement that an experiment waits for."""
 
     id: Id

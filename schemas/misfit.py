@@ -4,7 +4,7 @@ from enum import StrEnum
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Statistic, TunableName, Unit
+from gaplab.schemas.base import Frozen, Id, Read, Statistic, TunableName, Unit
 
 
 class Distribution(Frozen):
@@ -72,7 +72,7 @@ class Identification(StrEnum):
     UNKNOWN = "unknown"
 
 
-class TunableVerdict(Frozen):
+class TunableVerdict(Read):
     """Whether the samples determine a tunable."""
 
     name: TunableName
@@ -85,7 +85,7 @@ class TunableVerdict(Frozen):
     helps: tuple[str, ...] = Field(description="what would help, unless it is identified")
 
 
-class MisfitRead(Frozen):
+class MisfitRead(Read):
     """Misfit of an experiment, by iteration; empty for a strategy without samples, which tunes nothing."""
 
     experiment: Id

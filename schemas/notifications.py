@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Examples, Frozen, Id, Moment, Name
+from gaplab.schemas.base import Examples, Frozen, Id, Moment, Name, Read
 from gaplab.schemas.lifecycle import State
 
 
@@ -57,7 +57,7 @@ class WebhookSpec(Frozen):
     )
 
 
-class WebhookRead(Frozen):
+class WebhookRead(Read):
     """The webhook of a study, without the rest of its address, which may be a secret."""
 
     host: str | None = Field(description="host that is told; null: none", examples=["hooks.example.org"])

@@ -7,7 +7,7 @@ from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from gaplab.schemas.base import Frozen, Real, from_name
+from gaplab.schemas.base import Frozen, Read, Real, from_name
 
 LONGEST_NAME = 100
 """Largest number of characters of a plug-in's name."""
@@ -82,7 +82,7 @@ class TunableRef(Named):
         return schema
 
 
-class PluginRead(Frozen):
+class PluginRead(Read):
     """A plug-in in the catalogue."""
 
     name: str
@@ -103,7 +103,7 @@ class IgnoredFile(Frozen):
     why: str = Field(description="why it is not a plug-in, and what to do")
 
 
-class BudgetRead(Frozen):
+class BudgetRead(Read):
     """A named budget: the numbers that a spec gets if it leaves them out."""
 
     name: str
@@ -118,7 +118,7 @@ class BudgetRead(Frozen):
     lean: bool = Field(False, description="whether plug-ins and options that a spec leaves out save rollouts")
 
 
-class Catalogue(Frozen):
+class Catalogue(Read):
     """All plug-ins of this service, and the named budgets."""
 
     strategies: tuple[PluginRead, ...]

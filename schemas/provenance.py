@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Moment
+from gaplab.schemas.base import Frozen, Moment, Read
 
 
 class Provenance(Frozen):
@@ -39,7 +39,7 @@ class ProvenanceUse(Frozen):
     provenance: Provenance
 
 
-class ProvenanceRead(Frozen):
+class ProvenanceRead(Read):
     """Everything that computed an experiment; empty until it starts."""
 
     computed_with: str | None = Field(

@@ -9,13 +9,14 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Moment, Name, Statistic
+from gaplab.schemas.base import Id, Moment, Name, Read, Statistic, table
+from gaplab.schemas.curves import from_before
 from gaplab.schemas.lifecycle import Ending, State
 
 T = TypeVar("T")
 
 
-class Page(Frozen, Generic[T]):
+class Page(Read, Generic[T]):
     """A part of a list."""
 
     items: tuple[T, ...]
@@ -23,8 +24,11 @@ class Page(Frozen, Generic[T]):
         None, description="pass it as `cursor` for the next page; null on the last", examples=["WyIyMDEyIl0"]
     )
 
+    def _repr_html_(self) -> str:
+        return table(self.items)
 
-class TimeLeft(Frozen):
+
+class TimeLeft(Read):
     """Interval of the remaining time, from the pace so far. It narrows as more work is done."""
 
     low_s: float = Field(examples=[2400.0])
@@ -32,7 +36,7 @@ class TimeLeft(Frozen):
     text: str = Field(examples=["40 to 70 min"])
 
 
-class StepRead(Frozen):
+class StepRead(Read):
     """A step that a repetition has begun, as of its last checkpoint; steps of less than ten seconds have none."""
 
     repetition: int
@@ -42,7 +46,7 @@ class StepRead(Frozen):
     budget: int = Field(description="most rollouts of the step; it saves the others", examples=[10_000])
 
 
-class Progress(Frozen):
+class Progress(Read):
     """Completed and remaining work."""
 
     repetitions: int = Field(examples=[40])
@@ -73,7 +77,7 @@ class Progress(Frozen):
     )
 
 
-class FitnessRead(Frozen):
+class FitnessRead(Read):
     """A point of the curve: recorded fitness after a number of real-world evaluations.
 
     The number is the last that every repetition counted here has reached: the COMPLETED ones; without any, those that
@@ -85,6 +89,12 @@ class FitnessRead(Frozen):
     n: int = Field(description="repetitions in the mean", examples=[40])
     mean: float = Field(examples=[0.585])
     sd: Statistic = Field(description="sample standard deviation")
+
+    @property
+    def text(self) -> str:
+        """It as a cell of a table: `0.585 ± 0.1 after 10`."""
+        sd = "" if self.sd is None else f" ± {self.sd:.2g}"
+        return f"{self.mean:.3g}{sd} after {self.evaluations}{from_before(self.known)}"
 
 
 class BestRead(FitnessRead):
@@ -98,8 +108,13 @@ class BestRead(FitnessRead):
     name: Name
     strategy: Name
 
+    @property
+    def text(self) -> str:
+        """It as a cell of a table, with the experiment's name."""
+        return f"{self.name} {super().text}"
 
-class SensorsRead(Frozen):
+
+class SensorsRead(Read):
     """The sensors of a robot, and the times at which all of them are read; it may have none."""
 
     names: tuple[str, ...] = Field(examples=[("roll", "height")])
@@ -113,7 +128,7 @@ class SensorsRead(Frozen):
     )
 
 
-class ExperimentRead(Frozen):
+class ExperimentRead(Read):
     """An experiment with its resolved spec. Reality's parameters are null until all of its study have ended."""
 
     id: Id
@@ -164,7 +179,7 @@ class ExperimentRead(Frozen):
     ended_at: Moment | None = None
 
 
-class StudyRead(Frozen):
+class StudyRead(Read):
     """A study; its state combines those of its experiments.
 
     Asked for by the id of one experiment, it has that one alone, with its id and name.
@@ -202,7 +217,7 @@ def common_count(experiments: Sequence[ExperimentRead]) -> int | None:
     return min((each.fitness.evaluations for each in lasting if each.fitness), default=None)
 
 
-class RepetitionRead(Frozen):
+class RepetitionRead(Read):
     """One run of the whole algorithm with its own random numbers."""
 
     number: int
@@ -216,7 +231,7 @@ class RepetitionRead(Frozen):
     ended_at: Moment | None = None
 
 
-class AttemptRead(Frozen):
+class AttemptRead(Read):
     """One attempt at a repetition: its supervisor, times and ending."""
 
     number: int = Field(description="from 1; every write of the attempt carries it as the epoch of its lease")
@@ -234,7 +249,7 @@ class MeasurementKind(StrEnum):
     PROBE = "probe"
 
 
-class SampleRead(Frozen):
+class SampleRead(Read):
     """A real-world evaluation: the genome, its fitness and its readings."""
 
     repetition: int
@@ -258,7 +273,7 @@ class SampleRead(Frozen):
     measured_at: Moment
 
 
-class SimulatorRead(Frozen):
+class SimulatorRead(Read):
     """A tuned simulator; rank 0 is the best of its iteration."""
 
     repetition: int

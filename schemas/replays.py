@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gaplab.schemas.base import EngineName, Frozen, Id, RobotName, Statistic, Unit
+from gaplab.schemas.base import EngineName, Frozen, Id, Read, RobotName, Statistic, Unit
 
 Position = tuple[float, float, float]
 Orientation = tuple[float, float, float, float]
@@ -110,7 +110,7 @@ class Framing(Frozen):
     height_m: float = Field(0.12, description="height that the camera looks at")
 
 
-class Replay(Frozen):
+class Replay(Read):
     """One controller in its simulator and in reality, from the same start."""
 
     experiment: Id
@@ -138,7 +138,7 @@ class Replay(Frozen):
     readings: ReplayReadings | None = Field(None, description="null: the robot has no sensors")
 
 
-class Prediction(Frozen):
+class Prediction(Read):
     """Fitness of one sample in the simulators before and after it; null where the physics failed."""
 
     repetition: int
@@ -152,7 +152,7 @@ class Prediction(Frozen):
     fitness: Statistic = Field(description="fitness in reality; null: the measurement failed")
 
 
-class Predictions(Frozen):
+class Predictions(Read):
     """Predictions of an experiment by repetition and iteration, as far as they are computed.
 
     Each request computes more: repeat it while some are pending. Held-out samples, which no tuning sees, have none.

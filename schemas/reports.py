@@ -4,7 +4,7 @@ from enum import StrEnum
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Name, Statistic
+from gaplab.schemas.base import Id, Name, Read, Statistic
 
 
 class Trend(StrEnum):
@@ -17,7 +17,7 @@ class Trend(StrEnum):
     TOO_FEW = "too_few"
 
 
-class TrendRead(Frozen):
+class TrendRead(Read):
     """The end of one curve, by the paired gain of its repetitions."""
 
     experiment: Id
@@ -33,7 +33,7 @@ class TrendRead(Frozen):
     sentence: str = Field(examples=["Random is flat since iteration 3; not worth continuing."])
 
 
-class VerdictRead(Frozen):
+class VerdictRead(Read):
     """The verdict, computed by stated rules from curves and tests."""
 
     headline: str = Field(examples=["No pair differs at 10 real-world evaluations."])
@@ -47,3 +47,6 @@ class VerdictRead(Frozen):
     rules: tuple[str, ...] = Field(
         description="the rules of the verdict", examples=[("A pair differs if its p after Holm is below 0.05.",)]
     )
+
+    def __str__(self) -> str:
+        return "\n".join((self.headline, *self.sentences))

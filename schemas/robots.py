@@ -4,7 +4,7 @@ from typing import Any
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Moment
+from gaplab.schemas.base import Frozen, Moment, Read
 
 EXAMPLE: dict[str, Any] = {
     "format_version": 1,
@@ -50,7 +50,7 @@ class RobotSource(Frozen):
     )
 
 
-class RobotRead(Frozen):
+class RobotRead(Read):
     """A robot from a file, as it is stored."""
 
     sha256: str = Field(description="hash of the file, which specs have", examples=["5f2c…"])

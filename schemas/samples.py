@@ -5,7 +5,7 @@ from typing import Any, Self
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Read
 from gaplab.schemas.measurements import KnownSample
 
 
@@ -39,7 +39,7 @@ class InvalidSamples(ValueError):
         return type(self), self._made_of
 
 
-class SamplesRead(Frozen):
+class SamplesRead(Read):
     """The samples of a table, for `reality.samples` of a spec; with any error there are none."""
 
     samples: tuple[KnownSample, ...]

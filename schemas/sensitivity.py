@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Count, Examples, Frozen, Id, Moment, Statistic, TunableName, Unit
+from gaplab.schemas.base import Count, Examples, Frozen, Id, Moment, Read, Statistic, TunableName, Unit
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedTunable
@@ -54,7 +54,7 @@ class Checked(Frozen):
     evaluations: int = EVALUATIONS
 
 
-class Sensitivity(Frozen):
+class Sensitivity(Read):
     """Effect of one tunable on fitness between its bounds, with the others in the middle of theirs."""
 
     name: TunableName
@@ -76,7 +76,7 @@ class Sensitivity(Frozen):
     )
 
 
-class SensitivityRead(Frozen):
+class SensitivityRead(Read):
     """A sensitivity check. Its id is a hash of its subject, so equal subjects are checked once."""
 
     id: Id

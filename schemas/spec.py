@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, Discriminator, Field, Tag, model_validator
 
-from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Repetitions, Seed, from_name
+from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Read, Real, Repetitions, Seed, from_name
 from gaplab.schemas.measurements import Beyond, KnownSample, LimitsSpec
 from gaplab.schemas.plugin import PluginRef, TunableRef
 
@@ -228,7 +228,7 @@ AnySpec = Annotated[
 """The spec of a study, or of an experiment, which makes a study of one."""
 
 
-class SpecRead(Frozen):
+class SpecRead(Read):
     """The spec of a study: what a person would submit, and what was stored."""
 
     spec: dict[str, Any] | None = Field(

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Examples, Frozen, Real, Statistic, Unit
+from gaplab.schemas.base import Examples, Frozen, Read, Real, Statistic, Unit
 
 TRACE_COLUMNS = ("time_s", "x", "y", "z", "qx", "qy", "qz", "qw")
 """Columns of a trace in CSV: seconds on a clock of its own, metres, and a quaternion."""
@@ -24,7 +24,7 @@ Lags = Annotated[
 ]
 
 
-class AttachmentRead(Frozen):
+class AttachmentRead(Read):
     """A stored file of an answer."""
 
     id: str = Field(description="SHA-256 of its content, in hexadecimal; answers name it by that", examples=["ab" * 32])
@@ -42,7 +42,7 @@ class TracesSpec(Frozen):
     lags_s: Lags | None = None
 
 
-class TraceRead(Frozen):
+class TraceRead(Read):
     """A trace of one repeat, with the alignment of its clock."""
 
     attachment: str = Field(description="hash of the attachment", examples=["ab" * 32])
@@ -67,7 +67,7 @@ class AlignedTrace(TraceRead):
     expected_distances_m: tuple[float, ...] | None = Field(None, examples=[(0.0, 0.005)])
 
 
-class TracesRead(Frozen):
+class TracesRead(Read):
     """What traces say: the values and readings of an answer, which is not given by this."""
 
     values: tuple[float, ...] = Field(description="fitness of each repeat", examples=[(0.41, 0.44)])

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, TypedDict, Unpack
 
 from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
-from gaplab.api.clients.connection import Connection, Of, segment
+from gaplab.api.clients.connection import Connected, Connection, Of, Rows, id_of, segment
 from gaplab.api.clients.driving import Driving, TakenRequest
 from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.mcap_traces import mcap_to_csv
@@ -29,18 +29,15 @@ class Details(TypedDict, total=False):
     unit: str
     operator: str
     note: str
-    attachments: Sequence[str]
-    traces: Sequence[str]
+    attachments: Sequence[Of]
+    traces: Sequence[Of]
     lags_s: Sequence[float | None]
     take: int
     confirmed: bool
 
 
-class Bench:
-    """A robot on a bench: what is to be measured, and what was."""
-
-    def __init__(self, connection: Connection, studies: Studies) -> None:
-        self._connection, self._studies = connection, studies
+class Requests(Studies):
+    """The loop of a driver."""
 
     def requests(
         self,
@@ -67,30 +64,40 @@ class Bench:
             journal: file that keeps each answer until the service has it; answers of an earlier run are sent first.
         """
         with Journal(journal) as kept:
-            driving = Driving(self._connection, self._studies, kept, lease_s, operator)
+            driving = Driving(self._connection, self, kept, lease_s, operator)
             yield from driving.tasks(experiment, bench)
+
+
+class Bench(Connected):
+    """A robot on a bench: what is to be measured, and what was.
+
+    A request, an answer or a stored file may be given in place of its id.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
 
     def pending(
         self, experiment: Of | None = None, *, bench: str | None = None, wait_s: float = 0.0
     ) -> tuple[RequestRead, ...]:
         """Return the requests that are still needed, the oldest first; wait up to `wait_s` if there is none."""
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": wait_s, "limit": PAGE}
-        return tuple(self._connection.items(Page[RequestRead], "/requests", **parameters))
+        return Rows(self._connection.items(Page[RequestRead], "/requests", **parameters))
 
     def history(self, experiment: Of | None = None, *, bench: str | None = None) -> tuple[RequestRead, ...]:
         """Return all requests, also those that are measured, failed or withdrawn, the oldest first."""
         parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "pending": "false", "limit": PAGE}
-        return tuple(self._connection.items(Page[RequestRead], "/requests", **parameters))
+        return Rows(self._connection.items(Page[RequestRead], "/requests", **parameters))
 
-    def request(self, id: str) -> RequestRead:
+    def request(self, id: Of) -> RequestRead:
         """Return a request with its answers."""
         return self._connection.get(RequestRead, f"/requests/{segment(id)}")
 
-    def motion(self, id: str, form: Literal["csv", "json", "ros2"] = "csv") -> str:
+    def motion(self, id: Of, form: Literal["csv", "json", "ros2"] = "csv") -> str:
         """Return the motion that a request asks for: CSV, JSON, or a ROS 2 JointTrajectory in YAML."""
         return self._connection.get_bytes(f"/requests/{segment(id)}/motion", format=form).decode()
 
-    def answer(self, id: str, values: Sequence[float] | None = None, **details: Unpack[Details]) -> AnswerRead:
+    def answer(self, id: Of, values: Sequence[float] | None = None, **details: Unpack[Details]) -> AnswerRead:
         """Answer a request by hand: with the values of all repeats, or the reason why it `failed`.
 
         Args:
@@ -102,13 +109,13 @@ class Bench:
         """
         return self._connection.post(AnswerRead, f"/requests/{segment(id)}/measurements", _body(values, details))
 
-    def doubts(self, id: str, values: Sequence[float] | None = None, **details: Unpack[Details]) -> tuple[str, ...]:
+    def doubts(self, id: Of, values: Sequence[float] | None = None, **details: Unpack[Details]) -> tuple[str, ...]:
         """Return what is unlikely about an answer that was not given yet, each as a sentence; see `answer`."""
         return self._connection.post(DoubtsRead, f"/requests/{segment(id)}/doubts", _body(values, details)).doubts
 
     def correct(
         self,
-        answer: str,
+        answer: Of,
         values: Sequence[float] | None = None,
         *,
         reason: str,
@@ -121,13 +128,13 @@ class Bench:
         """
         return self._after(answer, "corrections", _body(values, details) | {"reason": reason}, dry_run=dry_run)
 
-    def void(self, answer: str, *, reason: str, operator: str | None = None, dry_run: bool = False) -> Consequences:
+    def void(self, answer: Of, *, reason: str, operator: str | None = None, dry_run: bool = False) -> Consequences:
         """Void an answer, whose controller is then requested again; with `dry_run` only return what would follow."""
         return self._after(answer, "void", {"reason": reason, "operator": operator}, dry_run=dry_run)
 
     def decide(
         self,
-        answer: str,
+        answer: Of,
         counts: Literal["this", "other"],
         *,
         reason: str,
@@ -138,7 +145,7 @@ class Bench:
         body = {"counts": counts, "reason": reason, "operator": operator}
         return self._after(answer, "decision", body, dry_run=dry_run)
 
-    def reopen(self, id: str, *, reason: str | None = None, operator: str | None = None) -> RequestRead:
+    def reopen(self, id: Of, *, reason: str | None = None, operator: str | None = None) -> RequestRead:
         """Open a request again that was taken too often without an answer.
 
         With a `reason`, like "her phone is dead", the `operator` ends the take of somebody else, who still has it.
@@ -171,7 +178,7 @@ class Bench:
             return self.attach(path, "text/csv")
         return self._attach(path.with_suffix(".csv").name, mcap_to_csv(path, topic, body).encode(), "text/csv")
 
-    def traces(self, id: str, traces: Sequence[str], lags_s: Sequence[float | None] | None = None) -> TracesRead:
+    def traces(self, id: Of, traces: Sequence[Of], lags_s: Sequence[float | None] | None = None) -> TracesRead:
         """Return fitness and readings that traces of a request say, and how their clocks were aligned.
 
         Args:
@@ -180,7 +187,7 @@ class Bench:
                 `qw`.
             lags_s: when the motion began on the clock of each trace; None: found by cross-correlation.
         """
-        body = _without_none({"traces": list(traces), "lags_s": lags_s})
+        body = _without_none({"traces": list(map(id_of, traces)), "lags_s": lags_s})
         return self._connection.post(TracesRead, f"/requests/{segment(id)}/traces", body)
 
     def check_samples(
@@ -217,13 +224,14 @@ class Bench:
     def _attach(self, name: str, content: bytes, media_type: str) -> AttachmentRead:
         return self._connection.upload(AttachmentRead, f"/attachments?name={segment(name)}", [content], media_type)
 
-    def _after(self, answer: str, what: str, body: dict[str, Any], *, dry_run: bool) -> Consequences:
+    def _after(self, answer: Of, what: str, body: dict[str, Any], *, dry_run: bool) -> Consequences:
         path = f"/measurements/{segment(answer)}/{what}{'?dry_run=true' if dry_run else ''}"
         return self._connection.post(Consequences, path, _without_none(body))
 
 
 def _body(values: Sequence[float] | None, details: Details) -> dict[str, Any]:
     body = _without_none({"values": None if values is None else numbers_of(values, "/values")} | details)
+    body |= {name: list(map(id_of, body[name])) for name in ("attachments", "traces") if name in body}
     return body | {"readings": readings_of(body["readings"])} if "readings" in body else body
 
 

@@ -2,8 +2,8 @@
 
 with Client("http://127.0.0.1:8000") as client:
     study = client.submit({"robot": "toy_function", "budget": "smoke"})
-    client.wait(study)
-    curves = client.curves(study)
+    study.wait()
+    curves = study.curves()
 
 Programs import it from `gaplab`.
 """
@@ -14,7 +14,7 @@ from typing import Self
 
 import httpx2
 
-from gaplab.api.clients.bench import Bench
+from gaplab.api.clients.bench import Bench, Requests
 from gaplab.api.clients.connection import PAUSES_S, Connection, segment
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.clients.events import EventLog
@@ -25,11 +25,12 @@ from gaplab.schemas.plugin import Catalogue
 from gaplab.schemas.robots import RobotRead
 
 
-class Client(Watcher, Figures, Files, EventLog):
+class Client(Watcher, Requests, Figures, Files, EventLog):
     """A client of the service.
 
-    A study or an experiment may be given in place of its id. `client.bench` has what concerns a robot on a bench. Every
-    method that sends a request raises ServiceError with the service's problem, or ServiceUnreachable.
+    A study or an experiment may be given in place of its id, and those that the client returns have the same methods.
+    `client.bench` has what concerns a robot on a bench. Every method that sends a request raises ServiceError with the
+    service's problem, or ServiceUnreachable.
 
     Args:
         url: address of the service; left out: GAPLAB_URL, or this machine.
@@ -49,8 +50,19 @@ class Client(Watcher, Figures, Files, EventLog):
         pauses_s: Sequence[float] = PAUSES_S,
     ) -> None:
         self._connection = Connection(url, token=token, timeout_s=timeout_s, transport=transport, pauses_s=pauses_s)
-        self.url, self.bench = self._connection.url, Bench(self._connection, self)
-        self.requests = self.bench.requests
+        self._connection.owner, self.url = self, self._connection.url
+
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Leave what it returned without a client in another process."""
+        return type(None), ()
+
+    def __repr__(self) -> str:
+        return f"<client of {self.url}>"
+
+    @property
+    def bench(self) -> Bench:
+        """What is to be measured of a robot on a bench, and what was."""
+        return Bench(self._connection)
 
     def __enter__(self) -> Self:
         return self

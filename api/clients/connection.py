@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import TypeAlias, TypedDict, TypeVar, Unpack
+from typing import Any, TypeAlias, TypedDict, TypeVar, Unpack, cast
 from urllib.parse import quote
 from uuid import uuid4
 
@@ -15,14 +15,19 @@ from pydantic import TypeAdapter, ValidationError
 
 from gaplab.api.clients.bodies import json_of
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, error_of, format_of
+from gaplab.schemas.base import LINE, shortened, table
+from gaplab.schemas.measurements import AnswerRead, AttachmentRead, RequestRead
 from gaplab.schemas.records import ExperimentRead, Page, StudyRead
 from gaplab.services.settings import InvalidSetting, Settings
 
 T = TypeVar("T")
-Of: TypeAlias = str | StudyRead | ExperimentRead
-"""A study, or one experiment of it: its id, or itself."""
+Item = TypeVar("Item", covariant=True)
 
-Parameter = Of | int | float | Sequence[Of] | None
+
+Of: TypeAlias = str | StudyRead | ExperimentRead | RequestRead | AnswerRead | AttachmentRead
+"""A study, one experiment of it, or whatever else a method is about: its id, or itself."""
+
+Parameter = Of | int | float | Sequence[Of | int | float] | None
 Plain = str | int | float | Sequence[str]
 
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
@@ -57,6 +62,19 @@ class Request(TypedDict, total=False):
     timeout: float
 
 
+class Rows(tuple[Item, ...]):
+    """Several of a kind, as a tuple that is one line at a prompt and a table in a notebook."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        kind = type(self[0]).__name__ if self else "none"
+        return shortened(f"<{len(self)} {kind}{': ' if self else ''}{', '.join(map(repr, self[:2]))}", LINE - 1) + ">"
+
+    def _repr_html_(self) -> str:
+        return table(self)
+
+
 _certificates = cache(httpx2.create_ssl_context)
 """The certificates that https trusts, read once for a process: reading them takes longer than most requests."""
 
@@ -73,6 +91,7 @@ class Connection:
         transport: httpx2.BaseTransport | None = None,
         pauses_s: Sequence[float] = PAUSES_S,
     ) -> None:
+        self.owner: object = None
         self.url = url = _configured_url() if url is None else url
         self._pauses_s, self._timeout_s = pauses_s, timeout_s
         token = os.environ.get("GAPLAB_TOKEN") if token is None else token
@@ -170,9 +189,10 @@ class Connection:
             raise ServiceUnreachable(msg) from error
 
     def read(self, kind: type[T], content: str | bytes) -> T:
-        """Return JSON of the service as a value of this type."""
+        """Return JSON of the service as a value of this type; what has methods of its own asks the owner with them."""
         try:
-            return TypeAdapter(kind).validate_json(content)
+            found: Any = TypeAdapter(kind).validate_json(content, context={"client": self.owner})
+            return cast("T", Rows(found) if type(found) is tuple else found)
         except ValidationError as error:
             raise self.unknown_service() from error
 
@@ -229,12 +249,12 @@ def _without_scheme(url: str) -> str:
 
 
 def id_of(of: Of) -> str:
-    """Return the id of a study or an experiment, which may be given in place of it.
+    """Return the id of what may be given in place of it.
 
     Raises:
-        TypeError: it is neither.
+        TypeError: it has none.
     """
-    id = of.id if isinstance(of, StudyRead | ExperimentRead) else of
+    id = getattr(of, "id", of)
     if not isinstance(id, str):
         raise TypeError(f"an id or a name is a text, not {id!r:.100}")
     return id
@@ -243,10 +263,10 @@ def id_of(of: Of) -> str:
 def plain(parameters: Mapping[str, Parameter]) -> dict[str, Plain]:
     """Return the parameters that are given, with ids in place of studies and experiments."""
 
-    def with_ids(value: Of | float | Sequence[Of]) -> Plain:
+    def with_ids(value: Of | float | Sequence[Of | float]) -> Plain:
         if isinstance(value, str | int | float):
             return value
-        return id_of(value) if isinstance(value, StudyRead | ExperimentRead) else [id_of(each) for each in value]
+        return [str(with_ids(each)) for each in value] if isinstance(value, Sequence) else id_of(value)
 
     return {name: with_ids(value) for name, value in parameters.items() if value is not None}
 

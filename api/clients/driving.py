@@ -257,7 +257,7 @@ class TakenRequest:
 
 
 class Driving:
-    """The requests of a driver; see `Bench.requests`."""
+    """The requests of a driver; see `Requests.requests`."""
 
     def __init__(
         self, connection: Connection, studies: Studies, journal: Journal, lease_s: float, operator: str | None

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from io import StringIO
-from typing import Any, TypeAlias
+from typing import Any, Generic, TypeAlias, TypeVar
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group, RenderableType
@@ -21,6 +21,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead, Progress, RepetitionRead, StudyRead
 
 Record: TypeAlias = StudyRead | ExperimentRead
+S = TypeVar("S", bound=StudyRead)
 
 COLORS = {
     State.QUEUED: "dim",
@@ -64,7 +65,7 @@ class RecordProgress:
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class Snapshot(Generic[S]):
     """The progress at one moment.
 
     Attributes:
@@ -73,7 +74,7 @@ class Snapshot:
         away_s: time since the last answer, if the service did not answer; the rows are those of that answer.
     """
 
-    study: StudyRead
+    study: S
     rows: tuple[RecordProgress, ...]
     away_s: float = 0.0
 
@@ -88,7 +89,7 @@ def in_notebook() -> bool:
     return "IPython" in sys.modules and hasattr(sys.modules["IPython"].get_ipython(), "kernel")
 
 
-def show(snapshots: Iterable[Snapshot], console: Console, *, keep: bool = False) -> StudyRead:
+def show(snapshots: Iterable[Snapshot[S]], console: Console, *, keep: bool = False) -> S:
     """Show snapshots until the last, and return its study; a terminal may `keep` it on the screen."""
     if in_notebook():
         return _replace(snapshots, cell())
@@ -98,7 +99,7 @@ def show(snapshots: Iterable[Snapshot], console: Console, *, keep: bool = False)
         return _replace(snapshots, lambda shown: live.update(shown, refresh=True))
 
 
-def log(snapshots: Iterable[Snapshot], console: Console) -> StudyRead:
+def log(snapshots: Iterable[Snapshot[S]], console: Console) -> S:
     """Print snapshots as lines, and return the last study."""
     printed_at, ended = -LINE_EVERY_S, set[str]()
     for snapshot in snapshots:
@@ -113,7 +114,7 @@ def log(snapshots: Iterable[Snapshot], console: Console) -> StudyRead:
     return snapshot.study
 
 
-def view(snapshot: Snapshot) -> RenderableType:
+def view(snapshot: Snapshot[Any]) -> RenderableType:
     """Return a table with a row for a study and each of its experiments: a bar, or a curve and each repetition."""
     curves = [row.curve for row in snapshot.rows if row.curve]
     scale = [mean for curve in curves for mean in _means(curve)]
@@ -168,7 +169,7 @@ def percent(progress: Progress) -> str:
     return f"{math.floor(100 * progress.share)} %"
 
 
-def _replace(snapshots: Iterable[Snapshot], place: Callable[[RenderableType], object]) -> StudyRead:
+def _replace(snapshots: Iterable[Snapshot[S]], place: Callable[[RenderableType], object]) -> S:
     """Show each snapshot in the place of the one before."""
     for snapshot in snapshots:
         place(view(snapshot))

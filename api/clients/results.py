@@ -5,12 +5,14 @@ Frames have a row for each observation, and are complete however many pages the 
 
 import time
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from html import escape
 from typing import TYPE_CHECKING, TypeAlias
 
 from pydantic import BaseModel
 
-from gaplab.api.clients.connection import Connected, Of, Parameter, id_of, segment
+from gaplab.api.clients.connection import Connected, Of, Parameter, Rows, id_of, segment
 from gaplab.api.clients.errors import library
+from gaplab.schemas.base import html_of
 from gaplab.schemas.comparisons import COLUMNS, TEXTS, Comparison, row
 from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.differences import SpecDiff
@@ -39,8 +41,14 @@ WHOLE |= {"from_evaluations", "to_evaluations", "n_first", "n_second", "n_paired
 """Columns of whole numbers, in whatever table; they are never null."""
 
 
-class Comparisons(tuple[Comparison, ...]):
+class Comparisons(Rows[Comparison]):
     """The pairs of a comparison, as a tuple that also has tables."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        grids = comparison(self) if self else ()
+        return "".join(f"<p>{escape(grid.caption)}</p>{html_of((grid.head, *grid.rows))}" for grid in grids)
 
     def frame(self) -> "pandas.DataFrame":
         """Return a row for each pair, with a column for each number, named as in CSV; an undefined number is nan.
@@ -81,7 +89,7 @@ class Results(Connected):
                 `equal_chances`.
         """
         found = (self._connection.get(tuple[Curve, ...], "/curves", study=ids, fitness=fitness) for ids in _parts(of))
-        return tuple(curve for part in found for curve in part)
+        return Rows(curve for part in found for curve in part)
 
     def curves_csv(self, of: Several) -> str:
         """Return the curves of studies and experiments as CSV."""
@@ -126,10 +134,6 @@ class Results(Connected):
     def misfit(self, of: Of) -> MisfitRead:
         """Return how far the tuned simulators of an experiment are from reality and from each other."""
         return self._connection.get(MisfitRead, f"/experiments/{segment(of)}/misfit")
-
-    def misfit_csv(self, of: Of) -> str:
-        """Return the misfit of an experiment as CSV: a line for each iteration and each number over repetitions."""
-        return self._connection.get_bytes(f"/experiments/{segment(of)}/misfit", format="csv").decode()
 
     def replay(self, of: Of, /, **choice: int | str | None) -> Replay:
         """Return the motion of a controller of an experiment in its simulator and in reality.

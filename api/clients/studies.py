@@ -9,12 +9,13 @@ from pydantic import BaseModel
 
 from gaplab.api.clients.confirmation import can_ask, confirm
 from gaplab.api.clients.connection import CONFIRMED, Connected, Of, segment
+from gaplab.api.clients.objects import Experiment, Study
 from gaplab.schemas.editing import DeletionRead, Edit, Order, ViewRead
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.notifications import WebhookRead
 from gaplab.schemas.provenance import ProvenanceRead
-from gaplab.schemas.records import AttemptRead, ExperimentRead, Page, RepetitionRead, StudyRead
+from gaplab.schemas.records import AttemptRead, Page, RepetitionRead
 from gaplab.schemas.sensitivity import SensitivityRead, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SpecRead, StudySpec
 
@@ -30,7 +31,7 @@ class Studies(Connected):
     Where a study is meant, the id of one of its experiments means that one alone, as a study of one.
     """
 
-    def submit(self, spec: Spec, *, yes: bool = False) -> StudyRead:
+    def submit(self, spec: Spec, *, yes: bool = False) -> Study:
         """Queue a study; a spec that names a `strategy`, and no `strategies`, makes a study of one experiment.
 
         In a terminal or a notebook, the estimated cost is shown first, and above an hour a person is asked. With `yes`,
@@ -41,9 +42,9 @@ class Studies(Connected):
         """
         return self.send(spec, confirm_cost=yes or (can_ask() and confirm(self.estimate(spec), input)))
 
-    def send(self, spec: Spec, *, confirm_cost: bool = False) -> StudyRead:
+    def send(self, spec: Spec, *, confirm_cost: bool = False) -> Study:
         """Submit without estimate and question; the service refuses a high cost unless it is confirmed."""
-        return self._connection.post(StudyRead, f"/studies{CONFIRMED if confirm_cost else ''}", _body(spec))
+        return self._connection.post(Study, f"/studies{CONFIRMED if confirm_cost else ''}", _body(spec))
 
     def estimate(self, spec: Spec) -> EstimateRead:
         """Return the rollouts, the duration and the resolved specs of a study; nothing is stored."""
@@ -61,29 +62,29 @@ class Studies(Connected):
             check = self._connection.get(SensitivityRead, f"/sensitivity/{segment(check.id)}")
         return check
 
-    def study(self, of: Of) -> StudyRead:
+    def study(self, of: Of) -> Study:
         """Return a study."""
-        return self._connection.get(StudyRead, f"/studies/{segment(of)}")
+        return self._connection.get(Study, f"/studies/{segment(of)}")
 
-    def experiment(self, of: Of, *, reveal: bool = False) -> ExperimentRead:
+    def experiment(self, of: Of, *, reveal: bool = False) -> Experiment:
         """Return an experiment; `reveal`, which needs the token of an admin, shows reality's parameters early."""
         shown = {"reveal": "true"} if reveal else {}
-        return self._connection.get(ExperimentRead, f"/experiments/{segment(of)}", **shown)
+        return self._connection.get(Experiment, f"/experiments/{segment(of)}", **shown)
 
     def spec(self, of: Of) -> SpecRead:
         """Return the spec of a study, as it was submitted, to submit it again; and the complete ones."""
         return self._connection.get(SpecRead, f"/studies/{segment(of)}/spec")
 
-    def studies(self, *, query: str | None = None, **filters: str | int | None) -> Page[StudyRead]:
+    def studies(self, *, query: str | None = None, **filters: str | int | None) -> Page[Study]:
         """Return a page of studies, newest first: `items`, and `next`, the cursor of the next page or None.
 
         Args:
             query: like `strategy = informative and fitness > 0.5`, or words; archived ones need `archived = true`.
             filters: as in the API: limit (50 if left out, 500 at most), cursor, state, strategy, text, sort.
         """
-        return self._connection.get(Page[StudyRead], "/studies", q=query, **filters)
+        return self._connection.get(Page[Study], "/studies", q=query, **filters)
 
-    def edit(self, of: Of, edit: Edit | Mapping[str, Any]) -> StudyRead:
+    def edit(self, of: Of, edit: Edit | Mapping[str, Any]) -> Study:
         """Change the name, the notes or the tags of a study.
 
         Args:
@@ -93,31 +94,31 @@ class Studies(Connected):
         """
         body = edit.model_dump(exclude_unset=True) if isinstance(edit, Edit) else edit
         headers = {"If-Match": "*"}
-        return self._connection.change(StudyRead, "PATCH", f"/studies/{segment(of)}", json=body, headers=headers)
+        return self._connection.change(Study, "PATCH", f"/studies/{segment(of)}", json=body, headers=headers)
 
-    def pause(self, of: Of) -> StudyRead:
+    def pause(self, of: Of) -> Study:
         """Pause a study once its current steps end."""
         return self._apply(of, Verb.PAUSE)
 
-    def resume(self, of: Of) -> StudyRead:
+    def resume(self, of: Of) -> Study:
         """Continue a paused study."""
         return self._apply(of, Verb.RESUME)
 
-    def stop(self, of: Of) -> StudyRead:
+    def stop(self, of: Of) -> Study:
         """Complete a study with its results so far, once its current steps end."""
         return self._apply(of, Verb.STOP)
 
-    def cancel(self, of: Of) -> StudyRead:
+    def cancel(self, of: Of) -> Study:
         """Cancel a study at once."""
         return self._apply(of, Verb.CANCEL)
 
-    def retry(self, of: Of) -> StudyRead:
+    def retry(self, of: Of) -> Study:
         """Queue the FAILED repetitions of a study once more, from their stored steps."""
         return self._apply(of, Verb.RETRY)
 
     def extend(
         self, of: Of, *, iterations: int | None = None, repetitions: int | None = None, yes: bool = False
-    ) -> StudyRead:
+    ) -> Study:
         """Extend the completed experiments of a study that are smaller to these totals.
 
         A total that is left out stays. With `yes`, they are extended whatever it costs.
@@ -126,17 +127,17 @@ class Studies(Connected):
         given = {name: total for name, total in totals.items() if total is not None}
         return self._apply(of, f"{Verb.EXTEND}{CONFIRMED if yes else ''}", given)
 
-    def schedule(self, of: Of, **changes: int | None) -> StudyRead:
+    def schedule(self, of: Of, **changes: int | None) -> Study:
         """Change the `priority` or `max_parallel` of the experiments of a study."""
-        return self._connection.change(StudyRead, "PATCH", f"/studies/{segment(of)}/schedule", json=changes)
+        return self._connection.change(Study, "PATCH", f"/studies/{segment(of)}/schedule", json=changes)
 
-    def accept_versions(self, of: Of) -> StudyRead:
+    def accept_versions(self, of: Of) -> Study:
         """Let experiments continue under other versions of engines or plug-ins than they started with."""
         return self._apply(of, "accept-versions")
 
-    def _apply(self, of: Of, verb: str, body: Mapping[str, int] | None = None) -> StudyRead:
+    def _apply(self, of: Of, verb: str, body: Mapping[str, int] | None = None) -> Study:
         """Send a verb to a study."""
-        return self._connection.change(StudyRead, "POST", f"/studies/{segment(of)}/{verb}", json=body)
+        return self._connection.change(Study, "POST", f"/studies/{segment(of)}/{verb}", json=body)
 
     def repetitions(self, of: Of) -> tuple[RepetitionRead, ...]:
         """Return the repetitions of an experiment."""
@@ -151,19 +152,19 @@ class Studies(Connected):
         """Return the versions of everything that computed an experiment."""
         return self._connection.get(ProvenanceRead, f"/experiments/{segment(of)}/provenance")
 
-    def tag(self, of: Of, *tags: str) -> StudyRead:
+    def tag(self, of: Of, *tags: str) -> Study:
         """Add tags to a study, and return it."""
         return self.edit(of, {"add_tags": _given(tags)})
 
-    def untag(self, of: Of, *tags: str) -> StudyRead:
+    def untag(self, of: Of, *tags: str) -> Study:
         """Remove tags from a study, and return it."""
         return self.edit(of, {"remove_tags": _given(tags)})
 
-    def archive(self, of: Of) -> StudyRead:
+    def archive(self, of: Of) -> Study:
         """Leave a study that has ended out of lists, and return it."""
         return self._apply(of, "archive")
 
-    def unarchive(self, of: Of) -> StudyRead:
+    def unarchive(self, of: Of) -> Study:
         """List an archived study again, and return it."""
         return self._apply(of, "unarchive")
 

@@ -10,25 +10,16 @@ from rich.console import Console
 
 from gaplab.api.clients.connection import Of
 from gaplab.api.clients.errors import ExperimentFailed, ServiceError, ServiceUnreachable, is_final
+from gaplab.api.clients.objects import Study
 from gaplab.api.clients.progress import RecordProgress, Snapshot, in_notebook, show
 from gaplab.api.clients.results import Results
 from gaplab.api.clients.screen import console
 from gaplab.api.clients.studies import Studies
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import StudyRead
 
 
 class Watcher(Studies, Results):
     """Requests that wait for studies, and show their progress."""
-
-    def watch(self, of: Of, *, every_s: float = 1.0, patience_s: float = 60.0) -> Iterator[StudyRead]:
-        """Yield a study every `every_s` seconds, until it has ended.
-
-        A service that is away for longer than `patience_s` is an error.
-        """
-        for snapshot in self.snapshots(of, every_s=every_s, patience_s=patience_s):
-            if not snapshot.away_s:
-                yield snapshot.study
 
     def wait(
         self,
@@ -38,7 +29,7 @@ class Watcher(Studies, Results):
         timeout_s: float | None = None,
         every_s: float = 1.0,
         patience_s: float = 60.0,
-    ) -> StudyRead:
+    ) -> Study:
         """Wait until a study has completed, and return it.
 
         Args:
@@ -63,8 +54,8 @@ class Watcher(Studies, Results):
 
     def show(
         self, of: Of, console: Console, *, curves: bool = False, every_s: float = 1.0, patience_s: float = 60.0
-    ) -> StudyRead:
-        """Show the progress of a study until it has ended, and return it; see `watch`.
+    ) -> Study:
+        """Show the progress of a study until it has ended, and return it; see `snapshots`.
 
         A terminal gets a live table, anything else a line every ten seconds. With `curves`, the table has curves and
         repetitions too, and its last state stays on the screen.
@@ -74,10 +65,10 @@ class Watcher(Studies, Results):
 
     def snapshots(
         self, of: Of, *, curves: bool = False, every_s: float = 1.0, patience_s: float = 60.0
-    ) -> Iterator[Snapshot]:
+    ) -> Iterator[Snapshot[Study]]:
         """Yield the progress until the study has ended, perhaps with curves and repetitions.
 
-        While the service is away, snapshots say so; see `watch`.
+        While the service is away, snapshots say so; away for longer than `patience_s` is an error.
         """
         details = dict[str, RecordProgress]()
         snapshot = self._snapshot(self.study(of), details, curves=curves)
@@ -96,7 +87,7 @@ class Watcher(Studies, Results):
             if not snapshot.away_s:
                 answered_at = time.monotonic()
 
-    def _snapshot(self, study: StudyRead, details: dict[str, RecordProgress], *, curves: bool) -> Snapshot:
+    def _snapshot(self, study: Study, details: dict[str, RecordProgress], *, curves: bool) -> Snapshot[Study]:
         """Return the progress; details by id, of those experiments that go on or have changed, are read again."""
         experiments = {each.id: each for each in study.experiments}
         moving = [
@@ -111,7 +102,7 @@ class Watcher(Studies, Results):
         return Snapshot(study, (*([RecordProgress(study)] if len(rows) > 1 else []), *rows))
 
 
-def _within(snapshots: Iterator[Snapshot], timeout_s: float | None) -> Iterator[Snapshot]:
+def _within(snapshots: Iterator[Snapshot[Study]], timeout_s: float | None) -> Iterator[Snapshot[Study]]:
     started_at = time.monotonic()
     for snapshot in snapshots:
         yield snapshot

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from gaplab.api.clients.client import Client
     from gaplab.api.clients.figures import Figure
+    from gaplab.api.clients.objects import Study
     from gaplab.schemas.reports import VerdictRead
 
 Spec = Mapping[str, Any] | ExperimentSpec | StudySpec | str | Path
@@ -122,6 +123,9 @@ class Result:
     def __repr__(self) -> str:
         return f"<result of {self.study!r}>"
 
+    def _repr_html_(self) -> str:
+        return self.study._repr_html_()
+
     @cached_property
     def client(self) -> "Client":
         """A client of a service in this process, which has all that is known about the study."""
@@ -130,7 +134,7 @@ class Result:
         return self._open.enter_context(client_of(self._store, url_of(self.path)))
 
     @property
-    def study(self) -> StudyRead:
+    def study(self) -> "Study":
         """The study, with its states, its warnings and its experiments."""
         return self.client.study(self.id)
 
@@ -265,7 +269,7 @@ def _supervised(store: Store, at_once: int, tasks: ProcessTasks) -> Iterator[Sup
         supervisor.hand_back()
 
 
-def _snapshots(result: Result, supervisor: Supervisor) -> Iterator[Snapshot]:
+def _snapshots(result: Result, supervisor: Supervisor) -> Iterator[Snapshot[StudyRead]]:
     """Yield the progress while the supervisor works."""
     while True:
         study = reading.read(result._store, result.id)

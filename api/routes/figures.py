@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Literal, TypeVar
 
 from fastapi import APIRouter, FastAPI, Request, Response
-from pydantic import Field
+from pydantic import Field, Json
 
 from gaplab.api.http.dependencies import Asked, Id, Number, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import SENT, FigureQuery, answer
@@ -68,6 +68,12 @@ class CurvesDrawing(CoordinatesDrawing):
     each: bool = EACH
     fitness: Fitness | None = Field(
         None, description="as of curves; left out: recorded, with thin lines for transferred controllers alone"
+    )
+    labels: Json[dict[str, str]] = Field(
+        {}, description='names of experiments by their id, name or strategy, as JSON like `{"random": "Chance"}`'
+    )
+    order: str = Field(
+        "", max_length=10_000, description="experiments that come first, by id, name or strategy, like `direct,random`"
     )
 
 
@@ -229,7 +235,8 @@ def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition)
 
 
 def _curves(store: Store, query: CurvesDrawing) -> FigureDefinition:
-    drawn = curves.curves(store, query.study, query.fitness or Fitness.RECORDED)
+    found = curves.curves(store, query.study, query.fitness or Fitness.RECORDED)
+    drawn = curves.arranged(found, query.labels, query.order.split(",") if query.order else ())
     beside = () if query.fitness else curves.curves(store, query.study, Fitness.TRANSFERRED)
     against = None if query.x == "evaluations" else cost_axis(store, drawn, query.x, cost_s=query.cost_s)
     return curves_figure(

@@ -14,7 +14,7 @@ from benchmarks.reproduction.studies import Study, read_study
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.figures.marks import FigureDefinition
-from gaplab.services.figures.matplotlib.files import render_file
+from gaplab.services.figures.matplotlib.files import Look, render_file
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.store.session import Store
 
@@ -34,7 +34,7 @@ def pictures(store: Store, studies: Mapping[str, Study], folder: Path) -> dict[t
     addresses = {(label, number): f"{FOLDER}/reproduction-{label}-{number}.svg" for label, number in figures}
     (folder / FOLDER).mkdir(parents=True, exist_ok=True)
     for at, figure in figures.items():
-        (folder / addresses[at]).write_bytes(render_file(figure, "svg", width_in=WIDTH_IN))
+        (folder / addresses[at]).write_bytes(render_file(figure, "svg", Look(WIDTH_IN)))
     return addresses
 
 

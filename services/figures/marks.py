@@ -4,8 +4,9 @@ None stands for a missing value: it interrupts a line, and is left out among poi
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
+from typing import Any, ClassVar
 
 from gaplab.services.figures.style import INK, Style
 
@@ -46,8 +47,9 @@ class Axis:
 
     def __post_init__(self) -> None:
         check_numbers(self.label, (self.limits,))
-        if not self.limits[0] < self.limits[1] or (self.log and self.limits[0] <= 0):
-            raise ValueError(f"the limits of an axis must ascend, from above 0 if it is logarithmic, not {self.limits}")
+        if len(self.limits) != 2 or not self.limits[0] < self.limits[1] or (self.log and self.limits[0] <= 0):
+            wanted = "two numbers that ascend, from above 0 if it is logarithmic"
+            raise ValueError(f"the limits of an axis must be {wanted}, not {self.limits}")
 
 
 Numbers = tuple[Number, ...]
@@ -243,6 +245,8 @@ class FigureDefinition:
         nothing: text that replaces the marks while there are none.
     """
 
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}  # in JSON, fields tell marks from each other
+
     name: str
     title: str
     panels: tuple[Panel, ...]
@@ -267,6 +271,19 @@ class FigureDefinition:
     def shaded(self) -> list[Points | Polylines]:
         """The marks that are drawn in shades."""
         return [mark for mark in self.marks if isinstance(mark, Points | Polylines) and mark.shades]
+
+    def with_axis(self, which: str, **changes: Any) -> "FigureDefinition":  # noqa: ANN401 - fields of an axis
+        """Return the figure with another `label` or other `limits` of its axis x or y.
+
+        Raises:
+            ValueError: the limits do not ascend, or the panels have different axes.
+        """
+        axes = [getattr(panel, which) for panel in self.panels]
+        if changes and len(names := dict.fromkeys(axis.label for axis in axes)) > 1:
+            raise ValueError(f"the panels have different axes ({'; '.join(names)}), so none is meant")
+        changed = ({which: replace(axis, **changes)} for axis in axes)
+        panels = zip(self.panels, changed, strict=True)
+        return replace(self, panels=tuple(replace(panel, **axis) for panel, axis in panels))
 
     @property
     def row_heights(self) -> list[float]:

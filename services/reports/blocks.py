@@ -7,7 +7,7 @@ from functools import cache
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from gaplab.services.figures.marks import FigureDefinition
-from gaplab.services.figures.matplotlib.files import render_file
+from gaplab.services.figures.matplotlib.files import Look, render_file
 from gaplab.services.findings.tables import Grid as Grid
 
 
@@ -87,5 +87,5 @@ def _environment() -> Environment:
 
 def _picture(figure: FigureDefinition) -> str:
     """Return the figure as an address with its SVG inside; an SVG in its own element shares no ids with others."""
-    svg = render_file(figure, "svg", width_in=WIDTH_IN, caption=False)
+    svg = render_file(figure, "svg", Look(WIDTH_IN, caption=False))
     return f"data:image/svg+xml;base64,{b64encode(svg).decode()}"

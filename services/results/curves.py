@@ -11,6 +11,7 @@ from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import best_of_searches, curve_points
+from gaplab.services.core.errors import InvalidSpec, unknown_name
 from gaplab.services.csv_tables import csv_text
 from gaplab.services.figures.kinds.curves import CostAxis
 from gaplab.services.specs.resolution import is_direct
@@ -49,6 +50,26 @@ def curve(store: Store, experiment_id: str, fitness: Fitness = Fitness.RECORDED)
     """
     with store.reading() as session:
         return curves_of(session, [experiments.get_experiment(session, experiment_id)], fitness)[0]
+
+
+def arranged(found: Sequence[Curve], labels: Mapping[str, str], order: Sequence[str]) -> list[Curve]:
+    """Return curves with other names, and those in `order` first; experiments are meant by id, name or strategy.
+
+    Raises:
+        InvalidSpec: labels or order name none of the experiments.
+    """
+    names = {one.experiment: (one.experiment, one.name, one.strategy) for one in found}
+    permitted = list(dict.fromkeys(name for each in names.values() for name in reversed(each)))
+    given = [*(("labels", key) for key in labels), *(("order", key) for key in order)]
+    if wrong := [unknown_name(at, "experiment", key, permitted) for at, key in given if key not in permitted]:
+        raise InvalidSpec(wrong)
+
+    def place(one: Curve) -> int:
+        return min((order.index(name) for name in names[one.experiment] if name in order), default=len(order))
+
+    called = {id: next((labels[name] for name in each if name in labels), None) for id, each in names.items()}
+    ordered = sorted(found, key=place)
+    return [one.model_copy(update={"name": called[one.experiment] or one.name}) for one in ordered]
 
 
 def curves_csv(curves: Sequence[Curve]) -> str:

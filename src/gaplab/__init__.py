@@ -4,8 +4,8 @@ from gaplab import Client
 
 with Client() as gaplab:
     study = gaplab.submit({"robot": "toy_function", "budget": "smoke"})
-    gaplab.wait(study.id)
-    gaplab.figure(study.id).save("curves.pdf")
+    study.wait()
+    study.figure().save("curves.pdf")
 
 Your own plug-ins import from `gaplab.plugins`. The other modules are internal.
 """
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from gaplab.api.clients.errors import ServiceError as ServiceError
     from gaplab.api.clients.errors import ServiceUnreachable as ServiceUnreachable
     from gaplab.api.clients.figures import Figure as Figure
+    from gaplab.api.clients.objects import Experiment as Experiment
+    from gaplab.api.clients.objects import Study as Study
     from gaplab.api.clients.results import Comparisons as Comparisons
     from gaplab.api.library.robots import read_robot as read_robot
     from gaplab.api.library.running import Interrupted as Interrupted
@@ -48,6 +50,7 @@ _MODULES = {
     "CommandError": "gaplab.api.process.errors",
     "Comparisons": "gaplab.api.clients.results",
     "DriverMotion": "gaplab.api.clients.driving",
+    "Experiment": "gaplab.api.clients.objects",
     "ExperimentFailed": "gaplab.api.clients.errors",
     "ExtraMissing": "gaplab.api.clients.errors",
     "Figure": "gaplab.api.clients.figures",
@@ -59,6 +62,7 @@ _MODULES = {
     "Result": "gaplab.api.library.running",
     "ServiceError": "gaplab.api.clients.errors",
     "ServiceUnreachable": "gaplab.api.clients.errors",
+    "Study": "gaplab.api.clients.objects",
     "Tuning": "gaplab.api.library.tuning",
     "local_service": "gaplab.api.process.local_service",
     "read_robot": "gaplab.api.library.robots",

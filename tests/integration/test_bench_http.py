@@ -133,7 +133,7 @@ def test_repeats_from_before_a_void_do_not_count(client: Client, tmp_path: Path)
             break  # the driver ends
         if value == 0.25:
             answer = client.bench.answer(request.id, [0.1, 0.1, 0.1], operator="Ada")
-            client.bench.void(answer.id, reason="the floor was wet")
+            client.bench.void(answer, reason="the floor was wet")
     for request in client.requests(experiment.id, journal=tmp_path / "journal"):
         known = request.known
         break
@@ -425,15 +425,15 @@ def test_what_two_programs_measured_at_once_does_not_count_by_itself(client: Cli
     for each in (second, third):
         taking.take(store, each.id, TakeSpec(operator="Bo"), FREELY)
         if each is second:
-            counted = client.bench.answer(each.id, [0.5], take=1)
+            counted = client.bench.answer(each, [0.5], take=1)
     with pytest.raises(TakeLost, match="take 1 of request"):
         task.take.ask()
 
     mine = task.tell(0.4)
 
-    other = client.bench.answer(third.id, [0.3], take=1)
+    other = client.bench.answer(third, [0.3], take=1)
     assert (mine.state, other.state) == ("conflict", "conflict")
-    (doubt,) = client.bench.request(second.id).answers[0].doubts
+    (doubt,) = client.bench.request(second).answers[0].doubts
     assert (counted.doubts, "had the robot too, and may have moved it" in doubt) == ((), True)
     loop.close()  # type: ignore[attr-defined]
 
@@ -468,7 +468,7 @@ def test_readings_of_numpy_are_stored_with_null_where_a_sensor_failed(
     assert [set(row) for row in answer.readings[0]] == [set(row) for row in answer.readings[1]]
     assert (set(answer.readings[0][0]), set(answer.readings[0][1])) == ({0.25}, {None})
 
-    client.bench.correct(answer.id, [0.5, 0.26], reason="a slip")  # of the values alone
+    client.bench.correct(answer, [0.5, 0.26], reason="a slip")  # of the values alone
 
     (_, corrected) = client.bench.request(task.id).answers
     assert (corrected.values, corrected.readings) == ((0.5, 0.26), answer.readings)
@@ -523,9 +523,10 @@ def test_an_answer_may_be_computed_from_traces(client: Client, store: Store, tmp
     experiment = client.submit(spec)
     compute(store)
     (request,) = client.bench.pending(experiment.id)
-    hashes = [client.bench.attach(file).id for file in traces_of(request.genome, tmp_path)]
+    stored = [client.bench.attach(file) for file in traces_of(request.genome, tmp_path)]
+    hashes = [each.id for each in stored]
 
-    read = client.bench.traces(request.id, hashes)
+    read = client.bench.traces(request, stored)
     assert [round(trace.lag_s, 1) for trace in read.traces] == [2.0, 7.5]
     assert all((trace.match or 0.0) > 0.3 for trace in read.traces)
     assert read.unit == "m/s"
@@ -536,7 +537,7 @@ def test_an_answer_may_be_computed_from_traces(client: Client, store: Store, tmp
     assert again.values == pytest.approx(read.values, abs=0.02)
     assert again.values[0] == pytest.approx(again.values[1], abs=1e-6)
 
-    answer = client.bench.answer(request.id, traces=hashes, operator="Ada", unit="m/s")
+    answer = client.bench.answer(request.id, traces=stored, operator="Ada", unit="m/s")
     assert (answer.state, answer.values, answer.readings) == ("counted", read.values, read.readings)
     assert answer.attachments == tuple(hashes)
     assert [trace.lag_s for trace in answer.traces] == [trace.lag_s for trace in read.traces]

@@ -430,9 +430,9 @@ def test_the_view_survives_a_service_that_is_away_and_says_so(url: str, study: s
 
 def test_it_is_waited_for_only_so_long_and_a_refusal_not_at_all(url: str, study: str) -> None:
     with Client(url, transport=Shaky(99)) as client, pytest.raises(ServiceUnreachable):
-        list(client.watch(study, every_s=0.05, patience_s=0.1))
+        list(client.snapshots(study, every_s=0.05, patience_s=0.1))
     with Client(url) as client, pytest.raises(ServiceError):
-        next(client.watch("nope", every_s=0.1, patience_s=60))
+        next(client.snapshots("nope", every_s=0.1, patience_s=60))
 
 
 def test_numbers_become_blocks() -> None:

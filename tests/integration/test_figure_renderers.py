@@ -13,9 +13,10 @@ import pytest
 from matplotlib import rc_context
 from plotly.graph_objects import Figure as Chart
 
+from gaplab.api.http.figures import DRAWING
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.marks import FigureDefinition
-from gaplab.services.figures.matplotlib.files import COLUMN_IN, DPI, LOOK, FileFormat, render_file
+from gaplab.services.figures.matplotlib.files import COLUMN_IN, DPI, LOOK, FileFormat, Look, render_file
 from gaplab.services.figures.matplotlib.page_layout import lines, shortened, width_in
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.figures.plotly.html import render_html
@@ -34,7 +35,7 @@ def render_svg(figure: FigureDefinition) -> str:
 
 
 def pixels(figure: FigureDefinition, **how: object) -> np.ndarray:
-    return matplotlib.image.imread(BytesIO(render_file(figure, "png", **how)))  # type: ignore[arg-type]
+    return matplotlib.image.imread(BytesIO(render_file(figure, "png", Look(**how))))  # type: ignore[arg-type]
 
 
 @EVERY
@@ -179,3 +180,10 @@ def test_hostile_names_are_only_text() -> None:
     together = curves_figure([curve(name, point(0, 1.0), point(1, 2.0)) for name in NAMES], title=" ".join(NAMES))
     assert ET.fromstring(render_svg(together)).tag == f"{SVG}svg"
     assert render_file(together, "pdf")
+
+
+@EVERY
+def test_marks_can_be_sent_and_drawn_elsewhere(figure: FigureDefinition) -> None:
+    look = Look(5.0, 6.0, font="DejaVu Serif")
+
+    assert DRAWING.validate_json(DRAWING.dump_json((figure, look))) == (figure, look)

@@ -235,7 +235,7 @@ def test_no_mark_takes_a_number_that_json_does_not_have(wrong: float) -> None:
 def test_parts_of_a_mark_are_equally_long_and_limits_go_up() -> None:
     with pytest.raises(ValueError, match=r"\[1, 2\]"):
         Points("a", (0, 1), (0,))
-    with pytest.raises(ValueError, match="must ascend"):
+    with pytest.raises(ValueError, match="two numbers that ascend"):
         Axis("a", (1, 1))
     with pytest.raises(ValueError, match="above 0"):
         Axis("a", (0, 1), log=True)

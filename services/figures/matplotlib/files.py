@@ -1,8 +1,11 @@
 """Figures as SVG, PNG and PDF files for papers: the same bytes for the same figure.
 
-Text has 8 pt at the requested width, by default that of one column of a paper.
+Text has 8 pt, unless another size is asked for, at any width, by default that of one column of a paper.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from io import BytesIO
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal
@@ -10,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from gaplab.services.figures.marks import Axis, FigureDefinition
 from gaplab.services.figures.matplotlib.artists import draw_marks
 from gaplab.services.figures.matplotlib.page_layout import (
-    FAMILY,
+    SIZE_PT,
     PageLayout,
     add_surroundings,
     draw_bar_of_shades,
@@ -26,12 +29,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 FileFormat = Literal["svg", "png", "pdf"]
+Font = Literal["DejaVu Sans", "DejaVu Serif", "STIXGeneral"]
+"""Families of letters that matplotlib brings along, so that they are the same everywhere."""
 
 COLUMN_IN = 3.5
 """The width of one column in most journals; two columns have 7.2."""
 
 DPI = 300
-SIZE_PT = 8
 PANEL_IN, LOW_IN = 2.1, 1.1
 """Least height of the only row of panels, and the height of one of several rows."""
 
@@ -44,20 +48,39 @@ FREE = 0.85
 SQUARE_IN = 3.2
 """Greatest height of a square panel."""
 
+
+@dataclass(frozen=True)
+class Look:
+    """The look of a file.
+
+    Attributes:
+        width_in: its width in inches.
+        height_in: height of its panels with their labels; None: as usual, which alone lets square panels be square.
+        caption: write the caption below the figure.
+        font: family of its letters.
+        size_pt: size of its text; the caption's is 7/8 of it.
+    """
+
+    width_in: float = COLUMN_IN
+    height_in: float | None = None
+    caption: bool = True
+    font: Font = "DejaVu Sans"
+    size_pt: float = SIZE_PT
+
+
+COLUMN = Look()
 LOOK: Any = {
     "svg.hashsalt": "gaplab",
     "pdf.fonttype": 42,  # TrueType: publishers refuse type 3 fonts
     "text.parse_math": False,  # names may contain dollar signs
-    "font.family": FAMILY,
-    "font.size": SIZE_PT,
-    "axes.titlesize": SIZE_PT,
+    "axes.titlesize": "medium",
     "axes.edgecolor": INK,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
-    "legend.fontsize": SIZE_PT,
+    "legend.fontsize": "medium",
 }
 
 METADATA: dict[str, dict[str, Any]] = {
@@ -70,29 +93,39 @@ METADATA: dict[str, dict[str, Any]] = {
 _matplotlib = Lock()  # its settings are global to the process, and the service has many threads
 
 
-def render_file(
-    figure: FigureDefinition, kind: FileFormat, *, width_in: float = COLUMN_IN, caption: bool = True
-) -> bytes:
-    """Return the figure as a file with its caption or, for a paper, without.
+def render_file(figure: FigureDefinition, kind: FileFormat, look: Look = COLUMN) -> bytes:
+    """Return the figure as a file.
 
     An SVG has letters as paths, so that it needs no font.
     """
-    from matplotlib import rc_context
-
-    with _matplotlib, rc_context(LOOK):
-        canvas = _canvas(figure, width_in, caption=caption)
+    with _settings(look):
+        canvas = _canvas(figure, look)
         target = BytesIO()
         described = {"Title": figure.title or figure.name} | ({"Description": figure.alt} if kind != "pdf" else {})
         canvas.savefig(target, format=kind, dpi=DPI, metadata=METADATA[kind] | described)
     return target.getvalue()
 
 
-def _canvas(figure: FigureDefinition, width_in: float, *, caption: bool) -> "Canvas":
+def draw(figure: FigureDefinition, look: Look) -> "Canvas":
+    """Return the figure as matplotlib's own, as in a file, to be changed."""
+    with _settings(look):
+        return _canvas(figure, look)
+
+
+@contextmanager
+def _settings(look: Look) -> Iterator[None]:
+    from matplotlib import rc_context
+
+    with _matplotlib, rc_context(LOOK | {"font.family": [look.font, "DejaVu Sans"], "font.size": look.size_pt}):
+        yield
+
+
+def _canvas(figure: FigureDefinition, look: Look) -> "Canvas":
     from matplotlib.figure import Figure as Canvas
 
     rows = figure.row_heights
-    height_in = sum(rows) * LOW_IN + 0.3 if len(rows) > 1 else max(PANEL_IN, SLOPE * width_in)
-    canvas = Canvas(figsize=(width_in, height_in), layout="constrained")
+    usual_in = sum(rows) * LOW_IN + 0.3 if len(rows) > 1 else max(PANEL_IN, SLOPE * look.width_in)
+    canvas = Canvas(figsize=(look.width_in, look.height_in or usual_in), layout="constrained")
     share: Any = "col" if figure.share_x else False
     grid = canvas.subplots(len(rows), figure.columns, squeeze=False, sharex=share, gridspec_kw={"height_ratios": rows})
     for index, axes in enumerate(grid.flat):
@@ -104,8 +137,8 @@ def _canvas(figure: FigureDefinition, width_in: float, *, caption: bool) -> "Can
         canvas.text(0.5, 0.6, printable(figure.nothing), ha="center", color="#777777")
     canvas.align_ylabels()
     draw_bar_of_shades(canvas, figure)
-    sides = _square(canvas, len(rows)) if figure.panels[0].square else 0.0
-    add_surroundings(canvas, figure, PageLayout.of(figure, width_in, sides, caption=caption))
+    sides = _square(canvas, len(rows)) if figure.panels[0].square and look.height_in is None else 0.0
+    add_surroundings(canvas, figure, PageLayout.of(figure, look.width_in, sides, caption=look.caption))
     _fix_positions(canvas)
     return canvas
 
@@ -145,6 +178,9 @@ def _fix_positions(canvas: "Canvas") -> None:
 
 
 def _set_up(axes: "Axes", x: Axis, y: Axis, *, labelled: bool) -> None:
+    from matplotlib import rcParams
+
+    axes.tick_params(labelsize=rcParams["font.size"], labelfontfamily=rcParams["font.family"])  # of later ticks too
     axes.set(ylabel=printable(y.label), xlim=x.limits, ylim=y.limits)
     if labelled:
         axes.set_xlabel(printable(x.label))

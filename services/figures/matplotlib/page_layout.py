@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
     from matplotlib.ft2font import FT2Font
 
+SIZE_PT = 8
+"""The size of text, in points, that all sizes and lengths here belong to; `scaled` has them at another size."""
+
 LEGEND_PT, CAPTION_PT, TITLE_PT = 8, 7, 8
 ROW_IN = 0.1445  # height of a legend entry
 HANDLE_IN, BETWEEN_IN = 0.46, 0.16  # width of a legend handle, and of the gap between columns
@@ -22,10 +25,16 @@ LINE_IN = 0.125  # height of a line of the caption
 MARGIN_IN = 0.06
 BOLD = 1.15  # width of bold letters, as a factor
 
-FAMILY = "DejaVu Sans"
 POINTS_PER_INCH = 72
 MEASURED_PT = 100  # the size at which text is measured: large, since the measures are rounded
 FRACTIONS = 64  # parts of a pixel, the unit of the measures
+
+
+def scaled(value: float) -> float:
+    """Return a size or a length that belongs to text of `SIZE_PT`, for text of matplotlib's present size."""
+    from matplotlib import rcParams
+
+    return float(value * rcParams["font.size"] / SIZE_PT)
 
 
 def printable(text: str) -> str:
@@ -34,10 +43,10 @@ def printable(text: str) -> str:
 
 
 def width_in(text: str, size_pt: float) -> float:
-    """Return the width of a line of text in inches."""
+    """Return the width in inches of a line of text that has `size_pt` beside text of `SIZE_PT`."""
     font = _font()
     font.set_text(printable(text), 0.0)
-    return float(font.get_width_height()[0]) / FRACTIONS / MEASURED_PT * size_pt / POINTS_PER_INCH
+    return scaled(float(font.get_width_height()[0]) / FRACTIONS / MEASURED_PT * size_pt / POINTS_PER_INCH)
 
 
 def lines(text: str, size_pt: float, width: float) -> list[str]:
@@ -71,12 +80,18 @@ def _broken(word: str, size_pt: float, width: float) -> list[str]:
     return found
 
 
-@cache
 def _font() -> "FT2Font":
-    from matplotlib.font_manager import findfont
+    from matplotlib import rcParams
+
+    return _font_of(rcParams["font.family"][0])
+
+
+@cache
+def _font_of(family: str) -> "FT2Font":
+    from matplotlib.font_manager import FontProperties, findfont
     from matplotlib.ft2font import FT2Font
 
-    font = FT2Font(findfont(FAMILY))
+    font = FT2Font(findfont(FontProperties(family=[family])))
     font.set_size(MEASURED_PT, POINTS_PER_INCH)
     return font
 
@@ -104,7 +119,7 @@ class PageLayout:
         columns = next((each for each in (4, 3, 2) if _legend_in(names, each) <= width - 2 * MARGIN_IN), 1)
         return PageLayout(
             columns=columns,
-            legend_in=ceil(len(names) / columns) * ROW_IN + (MARGIN_IN if names else 0),
+            legend_in=ceil(len(names) / columns) * scaled(ROW_IN) + (MARGIN_IN if names else 0),
             caption=tuple(lines(figure.caption, CAPTION_PT, width - 2 * MARGIN_IN)) if caption else (),
             title=tuple(lines(figure.title, TITLE_PT * BOLD, width - 2 * MARGIN_IN)),
             width=width,
@@ -114,12 +129,12 @@ class PageLayout:
     @property
     def above_in(self) -> float:
         """Height of the title."""
-        return len(self.title) * LINE_IN + 1.25 * MARGIN_IN if self.title else 0.0
+        return len(self.title) * scaled(LINE_IN) + 1.25 * MARGIN_IN if self.title else 0.0
 
     @property
     def height_in(self) -> float:
         """Height of legend and caption."""
-        return self.legend_in + (len(self.caption) * LINE_IN + 2 * MARGIN_IN if self.caption else 0)
+        return self.legend_in + (len(self.caption) * scaled(LINE_IN) + 2 * MARGIN_IN if self.caption else 0)
 
 
 def add_surroundings(canvas: "Canvas", figure: FigureDefinition, layout: PageLayout) -> None:
@@ -132,12 +147,12 @@ def add_surroundings(canvas: "Canvas", figure: FigureDefinition, layout: PageLay
     engine.set(rect=(side, bottom, 1 - 2 * side, top - bottom))
     if layout.title:
         words = "\n".join(map(printable, layout.title))
-        title = canvas.text(left, 1 - MARGIN_IN / height, words, va="top", weight="bold", size=TITLE_PT)
+        title = canvas.text(left, 1 - MARGIN_IN / height, words, va="top", weight="bold", size=scaled(TITLE_PT))
         title.set_in_layout(False)
     _legend(canvas, _names(figure), layout, bottom)
     for number, line in enumerate(layout.caption):
-        y = (LINE_IN * (len(layout.caption) - number) + MARGIN_IN) / height
-        note = canvas.text(left, y, printable(line), size=CAPTION_PT, color="#555555", va="top")
+        y = (scaled(LINE_IN) * (len(layout.caption) - number) + MARGIN_IN) / height
+        note = canvas.text(left, y, printable(line), size=scaled(CAPTION_PT), color="#555555", va="top")
         note.set_in_layout(False)
 
 
@@ -151,7 +166,7 @@ def _legend(canvas: "Canvas", names: list[str], layout: PageLayout, bottom: floa
     named = [each for each in names if each in found]
     legend = canvas.legend(
         [found[each] for each in named],
-        [shortened(printable(each), LEGEND_PT, layout.width - 2 * MARGIN_IN - HANDLE_IN) for each in named],
+        [shortened(printable(each), LEGEND_PT, layout.width - 2 * MARGIN_IN - scaled(HANDLE_IN)) for each in named],
         loc="upper center",
         bbox_to_anchor=(0.5, bottom),
         ncols=layout.columns,
@@ -199,7 +214,7 @@ def _legend_in(names: list[str], columns: int) -> float:
         max(width_in(name, LEGEND_PT) for name in names[end - size : end])
         for size, end in zip(sizes, accumulate(sizes), strict=True)
     ]
-    return sum(widest) + HANDLE_IN * columns + BETWEEN_IN * (columns - 1)
+    return sum(widest) + scaled(HANDLE_IN * columns + BETWEEN_IN * (columns - 1))
 
 
 def _names(figure: FigureDefinition) -> list[str]:
