@@ -12,6 +12,7 @@ from typing import Any
 import typer
 from pydantic import BaseModel
 
+import gaplab
 from docs import typescript
 from gaplab.api.app import create_app
 from gaplab.api.clients.bench import Bench
@@ -96,12 +97,17 @@ def python() -> Iterator[str]:
     yield "`from gaplab import Client`. Methods raise `ServiceError`, which has the service's `problem`, and"
     yield "`ServiceUnreachable`; some raise `ExperimentFailed` or `ExtraMissing`. Import all of them from `gaplab`.\n"
     yield f"## Client{_signature(Client.__init__)}\n\n{_docstring(Client)}\n"
-    for kind, before in ((Client, ""), (Study, "study."), (Bench, "client.bench."), (Figure, "figure.")):
+    kinds = ((Client, ""), (Study, "study."), (Bench, "client.bench."), (Figure, "figure."))
+    for kind, before in (*kinds, (gaplab.Result, "result."), (gaplab.Tuning, "tuning.")):
         if before:
             yield f"## {kind.__name__}\n\n{_docstring(kind)}\n"
-        for name, method in inspect.getmembers(kind, inspect.isfunction):
+        for name, method in inspect.getmembers(kind, lambda each: inspect.isfunction(each) or isinstance(each, property)):
             if not name.startswith("_") and name not in dir(BaseModel):
-                yield f"{'###' if before else '##'} {before}{name}{_signature(method)}\n\n{_docstring(method)}\n"
+                signature = _signature(method) if inspect.isfunction(method) else ""
+                yield f"{'###' if before else '##'} {before}{name}{signature}\n\n{_docstring(method)}\n"
+    yield "# Without a service\n"
+    for function in (gaplab.run, gaplab.simulate, gaplab.read_robot, gaplab.read_samples):
+        yield f"## {function.__name__}{_signature(function)}\n\n{_docstring(function)}\n"
 
 
 def settings() -> Iterator[str]:

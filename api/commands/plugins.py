@@ -41,7 +41,9 @@ def catalogue(
 if TYPE_CHECKING:
     from gaplab.services.contract.checks import CheckedPlugin
 
-Kind = Literal["strategy", "robot", "controller", "task", "engine", "tunable", "optimizer", "discrepancy", "tuner"]
+Kind = Literal[
+    "strategy", "robot", "controller", "task", "engine", "tunable", "optimizer", "discrepancy", "tuner", "driver"
+]
 
 plugin = typer.Typer(help="Write your own plug-ins, and check them.", no_args_is_help=True)
 app.add_typer(plugin, name="plugin", rich_help_panel=PLUGINS)
@@ -52,14 +54,20 @@ def new(
     kind: Annotated[Kind, typer.Argument(help="kind of the plug-in")],
     name: Annotated[str, typer.Argument(metavar="NAME", help="name in specs, and of the file")],
     folder: Annotated[
-        Path | None, typer.Option(help="folder of the file; left out: the first of GAPLAB_PLUGINS, or plugins")
+        Path | None,
+        typer.Option(
+            help="folder of the file; left out: the first of GAPLAB_PLUGINS, or plugins; of a driver, this one"
+        ),
     ] = None,
 ) -> Answer:
-    """Write a plug-in that runs, to change into your own."""
+    """Write a plug-in, or a driver for a robot on a bench, that runs, to change into your own."""
     from gaplab.services.contract.checks import write_skeleton
     from gaplab.services.plugins import folders
 
     folders.load()
+    if kind == "driver":
+        file = write_skeleton(kind, name, folder or Path())
+        return Answer({"file": str(file)}, f"Wrote {file}. Use it: gaplab drive EXPERIMENT --driver {file}")
     named = folders.named()
     file = write_skeleton(kind, name, folder or (named[0] if named else Path("plugins")))
     is_found = file.absolute().parent in named

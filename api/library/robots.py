@@ -27,7 +27,9 @@ Named: TypeAlias = str | Mapping[str, Any] | PluginRef | None
 
 
 def read_robot(robot: AnyRobot, *, controller: Named = None, task: Named = None) -> Robot:
-    """Return a robot; its `rated` computes fitness and readings from recorded angles of joints.
+    """Return a robot by its name, of a robot file, URDF or MJCF, or of a spec.
+
+    Its `rated` computes fitness and readings from recorded angles of joints.
 
     Raises:
         InvalidSpec: robot, controller or task is unknown or refused, or the file cannot be imported.

@@ -93,7 +93,7 @@ class CheckedPlugin:
 def write_skeleton(kind: str, name: str, folder: Path) -> Path:
     """Write a plug-in that runs into a new file of a folder, which is created if absent, and return the file.
 
-    The kind is one of `CHECKS`; the name is that in specs, and of the file.
+    The kind is one of `CHECKS`, or `driver`, which no spec names; the name is that in specs, and of the file.
 
     Raises:
         GaplabError: the name is not permitted, or the kind has a plug-in of this name.
@@ -103,7 +103,7 @@ def write_skeleton(kind: str, name: str, folder: Path) -> Path:
     file = folder / f"{name}.py"
     if file.exists():
         raise FileExistsError(17, "the file exists; choose another name or folder", str(file))
-    if name in REGISTRIES[kind]:
+    if name in REGISTRIES.get(kind, ()):
         raise GaplabError(f"there is a {kind} called {name!r} already; choose another name")
     template = files("gaplab.services.contract").joinpath("skeletons", f"{kind}.txt").read_text("utf-8")
     class_name = _class_name(name)

@@ -16,6 +16,7 @@ import pytest
 import typer
 from rich.console import Console
 
+from gaplab.api.clients import drivers
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.clients.progress import Snapshot, show, spark
@@ -187,6 +188,7 @@ def keep(ask: Callable[..., Any], id: str, folder: Path) -> None:
     assert ask("rerun", archive)["state"] == "QUEUED"
     plugin = ask("plugin new", "strategy", "mine", "--folder", str(folder))["file"]
     assert ask("plugin check", plugin)[0]["name"] == "mine"
+    assert drivers.load(Path(ask("plugin new", "driver", "mylab", "--folder", str(folder))["file"]))
     assert ask("figure", "curves", id, "--out", figure)[0]["bytes"] == Path(figure).stat().st_size
 
 

@@ -1,4 +1,4 @@
-"""The driver of `examples/`, from which people make their own."""
+"""The driver that `gaplab plugin new driver` writes, from which people make their own."""
 
 import ast
 from dataclasses import replace
@@ -8,10 +8,9 @@ import pytest
 
 from gaplab import DriverMotion
 from gaplab.api.clients import drivers
+from gaplab.services.contract.checks import write_skeleton
 from gaplab.services.world.motions import open_loop
 from gaplab.services.world.robots.quadruped import Quadruped
-
-FILE = Path(__file__).parents[2] / "examples" / "mylab.py"
 
 
 @pytest.fixture
@@ -23,8 +22,13 @@ def motion() -> DriverMotion:
     return DriverMotion(names, ("rad",) * len(names), tuple(known.times_s), targets, tuple(known.observe_s))
 
 
-def test_it_measures_its_robot_and_refuses_the_motion_of_another(motion: DriverMotion) -> None:
-    driver = drivers.load(FILE)
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return write_skeleton("driver", "mylab", tmp_path)
+
+
+def test_it_measures_its_robot_and_refuses_the_motion_of_another(file: Path, motion: DriverMotion) -> None:
+    driver = drivers.load(file)
     driver.connect()
     other = replace(motion, actuators=("wheel",), targets=tuple(row[:1] for row in motion.targets))
 
@@ -33,7 +37,7 @@ def test_it_measures_its_robot_and_refuses_the_motion_of_another(motion: DriverM
         driver.run(other)
 
 
-def test_it_imports_only_names_that_are_public() -> None:
-    imports = [node.module for node in ast.walk(ast.parse(FILE.read_text())) if isinstance(node, ast.ImportFrom)]
+def test_it_imports_only_names_that_are_public(file: Path) -> None:
+    imports = [node.module for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.ImportFrom)]
 
     assert {name for name in imports if name and name.startswith("gaplab")} == {"gaplab", "gaplab.plugins"}
