@@ -95,6 +95,7 @@ def create_app(
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)
     app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
     app.add_middleware(Access, settings=settings)
+    app.add_middleware(dashboard.BrowserRedirect)
     app.add_middleware(RequestLimit, most=most_requests(limits))
     app.add_middleware(SecurityHeaders)
     app.add_middleware(RequestCounter, metrics=app.state.metrics)

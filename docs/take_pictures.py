@@ -77,11 +77,14 @@ class View(NamedTuple):
     dark: bool = False
 
 
+JUDGED = "main:has(.conclusion p)"
+"""The view of a study once its verdict is there."""
+
 VIEWS = (
     View("list", "", ".list tbody tr >> nth=3", 560),
     View("new", "new", ".panel .big", press="Quadruped, quickly"),
-    View("study", "studies/{study}", ".plot .scatterlayer .point >> nth=0", dark=True),
-    View("experiment", "experiments/{experiment}", ".figure-predictions .scatterlayer .point >> nth=0", 1700),
+    View("study", "studies/{study}", f"{JUDGED} .plot .scatterlayer .point >> nth=0", dark=True),
+    View("experiment", "experiments/{experiment}", f"{JUDGED} .figure-predictions .scatterlayer .point >> nth=0", 1700),
     View("compare", "compare?experiments={all}", "table.matrix", 1130),
     View("replay", "replay?experiment={experiment}", ".gait .main-svg >> nth=0", fields=(("Time", "2"),), dark=True),
     View("bench", "bench?bench=table", ".gait, .motion, h2 >> nth=0", 844, width=390),

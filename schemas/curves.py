@@ -60,6 +60,7 @@ class Curve(Read):
     experiment: Id
     name: Name
     strategy: Name
+    study_name: Name = ""
     state: State
     unit: Unit
     fitness: Fitness = Fitness.RECORDED

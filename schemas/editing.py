@@ -61,7 +61,7 @@ class DeletionRead(Read):
     deleted_at: Moment
 
 
-Order = Literal["created_at", "-created_at", "name", "-name"]
+Order = Literal["created_at", "-created_at", "name", "-name", "state", "-state", "fitness", "-fitness"]
 """An order of a list: a field, with a minus before it for the opposite order."""
 
 ViewName = Annotated[

@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from http import HTTPStatus
 from string import Template
@@ -11,7 +11,7 @@ from uuid import uuid4
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import HTMLResponse, Response
+from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 
 from gaplab.api.http.security_headers import page
@@ -113,11 +113,19 @@ def of_gaplab(request: Request, error: Exception) -> Response:
 
 
 def _shown(request: Request, refused: Problem, headers: dict[str, str]) -> Response:
-    """Return the problem; as a page if a person looks for something that does not exist."""
-    in_a_browser = request.method == "GET" and "text/html" in request.headers.get("accept", "")
-    if refused.status == HTTPStatus.NOT_FOUND and in_a_browser:
-        return lost(request, refused)
-    return response(refused, headers)
+    """Return the problem; as a page with ways out of it if a person looks for something that does not exist."""
+    if refused.status != HTTPStatus.NOT_FOUND or request.method != "GET" or not takes_pages(request.headers):
+        return response(refused, headers)
+    root = escape(request.scope.get("root_path", ""))
+    answer = page(_PAGE.substitute(title=escape(refused.title), detail=escape(refused.detail), root=root))
+    answer.status_code = refused.status
+    return answer
+
+
+def takes_pages(headers: Mapping[str, str]) -> bool:
+    """Return whether a browser asks for what a person looks at, by its `Accept`."""
+    accepted = headers.get("accept", "")
+    return "text/html" in accepted and "json" not in accepted
 
 
 def _headers(request: Request, error: GaplabError, status: int) -> dict[str, str]:
@@ -196,12 +204,3 @@ _PAGE = Template("""<!doctype html>
 </body>
 </html>
 """)
-
-
-def lost(request: Request, problem: Problem) -> HTMLResponse:
-    """Return the problem as a page with ways out of it."""
-    root = escape(request.scope.get("root_path", ""))
-    html = _PAGE.substitute(title=escape(problem.title), detail=escape(problem.detail), root=root)
-    answer = page(html)
-    answer.status_code = problem.status
-    return answer

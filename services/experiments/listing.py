@@ -8,18 +8,20 @@ import json
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 
-from sqlalchemy import delete, func, select, tuple_, update
+from sqlalchemy import Float, Subquery, case, delete, func, literal, select, tuple_, update
 
 from gaplab.schemas.editing import ViewRead, ViewSpec
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Page, StudyRead
 from gaplab.services.core.errors import InvalidSpec, LimitReached
+from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments.query.conditions import conditions, containing, of_one, study_is
 from gaplab.services.experiments.views import view
 from gaplab.services.store.clock import moment
-from gaplab.services.store.cursor import decode, encode, next_cursor
+from gaplab.services.store.cursor import Column, decode, encode, next_cursor
 from gaplab.services.store.models import ExperimentRow, StudyRow, ViewRow
 from gaplab.services.store.queries.experiments import of_studies
+from gaplab.services.store.queries.results import points_of_all
 from gaplab.services.store.session import Session, snapshot, transaction
 from gaplab.services.store.statements import existing, insert_new, storable
 
@@ -33,7 +35,8 @@ class ListFilter:
         strategy: only studies that have an experiment with this strategy.
         text: only studies whose name, id, notes or tags contain this text, or the id of an experiment of them.
         q: query, as `gaplab.services.experiments.query` has it. Archived ones are left out unless it mentions them.
-        sort: `created_at` or `name`; a minus before it reverses the order.
+        sort: `created_at`, `name`, `state` or `fitness`, which is the highest of its experiments; a minus before it
+            reverses the order, and one without a fitness is last in both.
     """
 
     state: State | None = None
@@ -46,10 +49,9 @@ class ListFilter:
         """Return a text that identifies the list, for its cursors."""
         return sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:12]
 
-    def cursor_after(self, row: StudyRow) -> str:
-        """Return the cursor of the page that follows the row in this list."""
-        return encode(getattr(row, self.sort.removeprefix("-")), row.id, bound_to=self.digest())
 
+LARGEST = 1e308
+"""In place of a missing fitness: databases sort NULL differently, and cursors compare keys."""
 
 NEWEST_FIRST = ListFilter()
 
@@ -63,9 +65,11 @@ def list_studies(
     Raises:
         InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
     """
-    row, falling = StudyRow, wanted.sort.startswith("-")
-    columns = (getattr(row, wanted.sort.removeprefix("-")), row.id)
-    query = select(row).where(*conditions(wanted.q))
+    falling, fitness = wanted.sort.startswith("-"), _fitness()
+    columns = (_key(wanted.sort, fitness), StudyRow.id)
+    query = select(StudyRow, columns[0]).where(*conditions(wanted.q))
+    if wanted.sort.endswith("fitness"):
+        query = query.outerjoin(fitness, fitness.c.study_id == StudyRow.id)
     if wanted.text:
         query = query.where(containing(wanted.text))
     if wanted.strategy is not None:
@@ -76,9 +80,31 @@ def list_studies(
         key, after = tuple_(*columns), decode(cursor, columns, wanted.digest())
         query = query.where(key < after if falling else key > after)
     query = query.order_by(*(each.desc() if falling else each.asc() for each in columns)).limit(limit + 1)
-    rows = session.scalars(query).all()
-    found = of_studies(session, rows[:limit])
-    return Page(items=view(session, *found), next=next_cursor(rows, limit, wanted.cursor_after))
+    rows = session.execute(query).all()
+    found = of_studies(session, [row for row, _ in rows[:limit]])
+    next_ = next_cursor(rows, limit, lambda last: encode(last[1], last[0].id, bound_to=wanted.digest()))
+    return Page(items=view(session, *found), next=next_)
+
+
+def _key(order: str, fitness: Subquery) -> Column:
+    match order.removeprefix("-"):
+        case "state":
+            return case(*((study_is(state), place) for place, state in enumerate(State)))
+        case "fitness":
+            return func.coalesce(fitness.c.best, literal(-LARGEST if order.startswith("-") else LARGEST))
+        case name:
+            column: Column = getattr(StudyRow, name)
+            return column
+
+
+def _fitness() -> Subquery:
+    """Return the highest fitness of each study; that of the direct baseline only if there is no other."""
+    points, value = points_of_all()
+    means = points.add_columns(func.avg(value, type_=Float).label("mean")).subquery()
+    learned = ExperimentRow.strategy.not_in([name for name, each in strategies.items() if each.in_reality])
+    best = func.coalesce(func.max(case((learned, means.c.mean))), func.max(means.c.mean)).label("best")
+    query = select(ExperimentRow.study_id, best).join(means, means.c.experiment_id == ExperimentRow.id)
+    return query.group_by(ExperimentRow.study_id).subquery()
 
 
 MOST = 200

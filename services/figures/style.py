@@ -80,8 +80,8 @@ def strategy_style(strategy: str) -> Style:
 def strategy_styles(strategies: Sequence[str]) -> list[Style]:
     """Return the styles of experiments, by their strategies.
 
-    A strategy keeps its colour. Each further experiment of it has another dash, and another marker where no dash is
-    left, so that the first 36 are distinct.
+    A strategy keeps its colour. Each further experiment of it has another dash and another marker, and the first 36
+    are distinct.
     """
     repeated: Counter[Style] = Counter()
     styles = []
@@ -89,7 +89,7 @@ def strategy_styles(strategies: Sequence[str]) -> list[Style]:
         style = strategy_style(strategy)
         turn, index = divmod(repeated[style], len(DASHES))
         dash = DASHES[(DASHES.index(style.dash) + index) % len(DASHES)]
-        marker = MARKERS[(MARKERS.index(style.marker) + turn) % len(MARKERS)]
+        marker = MARKERS[(MARKERS.index(style.marker) + index + turn) % len(MARKERS)]
         styles.append(replace(style, dash=dash, marker=marker))
         repeated[style] += 1
     return styles

@@ -8,6 +8,7 @@ from math import isfinite
 from gaplab.schemas.curves import from_before
 
 LONGEST = 60  # characters of a name in a figure
+OF_STUDY = 40  # characters of the name of a study beside it
 TITLE = 200  # characters of a title, which may have several lines
 WIDE = 30.0  # ratio of the greatest to the least value from which their axis is logarithmic
 LARGEST = 1e300  # of values that are drawn: sums and margins of them stay finite
@@ -41,14 +42,21 @@ def printable(text: str, longest: int = LONGEST) -> str:
     return shown if len(shown) <= longest else f"{shown[: longest - 1]}…"
 
 
-def distinct_names(named: Sequence[tuple[str, str, str]]) -> list[str]:
-    """Return distinct names from names, strategies and ids of experiments: equal names are followed by their ids."""
-    names = [titled(name, strategy) for name, strategy, _ in named]
+def distinct_names(named: Sequence[tuple[str, str, str, str]]) -> list[str]:
+    """Return distinct names from names, strategies, names of studies, and ids of experiments.
+
+    Equal names in several studies are followed by those of their studies, and names that are still equal by their ids.
+    """
+    names = [titled(name, strategy) for name, strategy, *_ in named]
+    if len({study for *_, study, _ in named}) > 1:
+        own = ("" if study == name else f" · {printable(study, OF_STUDY)}" for name, _, study, _ in named)
+        names = _apart(names, own)
+    return _apart(names, (f" ({identity[:8]})" for *_, identity in named))
+
+
+def _apart(names: Sequence[str], additions: Iterable[str]) -> list[str]:
     often = Counter(names)
-    return [
-        f"{name} ({identity[:8]})" if often[name] > 1 else name
-        for name, (*_, identity) in zip(names, named, strict=True)
-    ]
+    return [name + more if often[name] > 1 else name for name, more in zip(names, additions, strict=True)]
 
 
 def with_unit(label: str, units: Iterable[str]) -> str:

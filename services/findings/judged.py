@@ -112,7 +112,7 @@ def judged_curves(
     curves: Sequence[Curve], experiments: Sequence[ExperimentRead], count: int | None
 ) -> tuple[Judged, ...]:
     """Return the curves of experiments with distinct names, trends, and points after `count` evaluations."""
-    names = distinct_names([(curve.name, curve.strategy, curve.experiment) for curve in curves])
+    names = distinct_names([(one.name, one.strategy, one.study_name, one.experiment) for one in curves])
     found = zip(names, curves, experiments, strict=True)
     return tuple(_judged(name, curve, experiment, count) for name, curve, experiment in found)
 

@@ -39,7 +39,8 @@ def curves_of(
 ) -> tuple[Curve, ...]:
     """Return the curves of experiments in the snapshot of a session."""
     values = values_of(session, rows, fitness)
-    return tuple(_curve(row, values[row.id], fitness) for row in rows)
+    studies = experiments.study_names(session, rows)
+    return tuple(_curve(row, values[row.id], fitness, studies[row.study_id]) for row in rows)
 
 
 def curve(store: Store, experiment_id: str, fitness: Fitness = Fitness.RECORDED) -> Curve:
@@ -109,12 +110,13 @@ def values_of(
     return {id_: np.where(np.isneginf(each), np.nan, each) for id_, each in values.items()}
 
 
-def _curve(row: ExperimentRow, values: FloatArray, fitness: Fitness) -> Curve:
+def _curve(row: ExperimentRow, values: FloatArray, fitness: Fitness, study: str) -> Curve:
     spec = spec_of(row.spec)
     direct = is_direct(spec)
     return Curve.filled_from(
         row,
         experiment=row.id,
+        study_name=study,
         unit=unit(spec),
         fitness=fitness,
         direct=direct,

@@ -136,7 +136,7 @@ def setting_coordinates(store: Store, ids: Sequence[str], *, title: str = "") ->
         axes,
         shades=[each.fitness.mean for each in kept if each.fitness],
         shades_label="Final fitness",
-        hover=distinct_names([(each.name, each.strategy, each.id) for each in kept]),
+        hover=distinct_names([(each.name, each.strategy, "", each.id) for each in kept]),
         what="experiment",
         title=title,
     )

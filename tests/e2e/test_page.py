@@ -42,6 +42,7 @@ def test_a_study_is_submitted_by_the_form_and_finishes_while_one_watches(visit: 
     axe(page)
     screenshot(page, "study-live")
     visit.forgive("409")  # the direct baseline is as large already
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Extend…").click()
     page.get_by_label("Iterations in all").fill("4")
     page.get_by_role("button", name="Extend it").click()
@@ -55,6 +56,7 @@ def test_a_running_study_is_cancelled_after_a_question(visit: Any, shared_servic
     page = visit(f"{shared_service.url}/#/studies/{study}")
     page.locator(".state-now .running").wait_for(timeout=LONG_MS)
 
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Cancel…").click()
     page.get_by_role("button", name="Back").click()
     assert shared_service.get(f"/studies/{study}")["state"] == "RUNNING"

@@ -126,6 +126,7 @@ def test_what_has_ended_is_archived_and_deleted_by_its_name_and_what_runs_is_not
     made = submit_one(written, toy(name="obsolete")).id
     page = visit(f"{api.url}/#/experiments/{made}")
     watching = visit(f"{api.url}/#/experiments/{made}")
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Delete…").click(force=True)
     page.get_by_text("Only what has ended can be deleted").wait_for()
 

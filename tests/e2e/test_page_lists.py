@@ -12,7 +12,7 @@ from gaplab.services.access import create_token
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import CONTRAST, axe, fits, screenshot
-from tests.experiments import submit_one, toy
+from tests.experiments import cancel, submit_one, toy
 
 PUBLISHED = "Fig. 4, lean: MuJoCo in MuJoCo"
 QUEUED = {"robot": "toy_function", "strategies": ["random", "direct"], "budget": "smoke"}
@@ -103,6 +103,55 @@ def test_studies_are_filtered_sorted_and_shown_page_by_page(visit: Any, api: Any
     page.locator(".list tbody tr").nth(5).wait_for()
 
 
+def test_the_heads_of_columns_sort_studies_and_say_so(visit: Any, api: Any, known: Any) -> None:
+    page = visit(f"{api.url}/#/?q=known_fit+or+name+~+study")
+    page.locator("tr.study").first.wait_for()
+    fitness = page.get_by_role("columnheader", name="Fitness")
+
+    fitness.get_by_role("button").click()
+    page.locator("th[aria-sort=descending]", has_text="Fitness").wait_for()
+    assert "sort=-fitness" in page.url
+    assert page.get_by_label("Order").input_value() == "-fitness"
+    fitness.get_by_role("button").press("Enter")
+
+    page.locator("th[aria-sort=ascending]", has_text="Fitness").wait_for()
+    assert fitness.get_by_role("button").evaluate("(button) => button === document.activeElement")
+
+
+def test_several_ticked_studies_are_tagged_archived_exported_and_deleted(visit: Any, api: Any, written: Store) -> None:
+    visit.forgive("409")
+    names = ("first of two", "second of two")
+    ids = [submit_one(written, toy(name=name)).id for name in names]
+    cancel(written, ids[0])
+    page = visit(f"{api.url}/#/?q=of+two")
+    for name in names:
+        page.get_by_label(f"Select {name}").check()
+    bar = page.get_by_role("region", name="Selected experiments")
+    bar.get_by_text("2 studies selected").wait_for()
+
+    bar.get_by_role("button", name="Tag…").click()
+    page.get_by_label("Add").fill("pair")
+    page.get_by_role("button", name="Tag them").click()
+    bar.get_by_text("2 studies tagged.").wait_for()
+    assert {tuple(api.get(f"/studies/{each}")["tags"]) for each in ids} == {("pair",)}
+
+    bar.get_by_role("button", name="Archive").click()
+    bar.get_by_text("1 study archived. “second of two” was not:").wait_for()
+    axe(page)
+
+    cancel(written, ids[1])
+    with page.expect_download() as saved:
+        bar.get_by_role("button", name="Export").click()
+    assert saved.value.path().read_bytes().startswith(b"PK")
+    bar.get_by_text("2 studies exported.").wait_for()
+
+    bar.get_by_role("button", name="Delete…").click()
+    page.get_by_label("Type the number of studies").fill("2")
+    page.get_by_role("button", name="Delete for good").click()
+    bar.get_by_text("2 studies deleted.").wait_for()
+    assert {api.http.get(f"/studies/{each}").status_code for each in ids} == {404}
+
+
 def test_what_is_submitted_and_cancelled_elsewhere_is_seen_also_a_single_experiment(
     visit: Any, api: Any, written: Store
 ) -> None:
@@ -128,6 +177,7 @@ def test_a_study_is_renamed_and_nobody_is_written_over(visit: Any, archive: Any)
     visit.forgive("412")
     made = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{archive.url}/#/studies/{made}")
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Edit name, notes and tags").click()
     archive.http.patch(f"/studies/{made}", json={"notes": "of somebody else"}, headers={"If-Match": "*"})
     page.get_by_label("Name", exact=True).fill("second name")
@@ -149,6 +199,7 @@ def test_errors_stand_beside_their_fields_until_they_are_right(visit: Any, api: 
 
     page.get_by_label("Iterations").fill("many")
     page.get_by_label("Restitution from").fill("-1")
+    page.get_by_text("Advanced").first.click()
     page.get_by_label("Static friction", exact=True).last.fill("99")
     page.locator(".trouble", has_text="whole number").or_(page.locator(".trouble", has_text="integer")).wait_for()
     page.get_by_label("Iterations").fill("")
@@ -257,6 +308,69 @@ def test_an_empty_service_with_tokens_asks_for_one_says_how_to_begin_and_a_reade
         api.close()
 
 
+def test_an_empty_service_says_what_gaplab_is_and_submits_the_toy_at_one_press(
+    visit: Any, sqlite_store: Store, sqlite_url: str, tmp_path: Path
+) -> None:
+    api = Api(sqlite_url, tmp_path / "api.log").start()
+    try:
+        page = visit(api.url, width=390, height=844)
+        page.get_by_text("it tunes the simulator from a handful of trials in reality").wait_for()
+        axe(page)
+        fits(page)
+        screenshot(page, "empty-phone")
+
+        page.get_by_role("button", name="Try the toy").click()
+
+        page.get_by_role("heading", name="toy", exact=True).wait_for()
+        (study,) = api.get("/studies")["items"]
+        assert page.url.endswith(f"#/studies/{study['id']}")
+        page.close()  # it would say that the service is away
+    finally:
+        api.close()
+
+
+def test_a_study_that_is_opened_by_its_address_in_the_api_begins_with_its_verdict_and_facts(
+    visit: Any, api: Any, known: Any
+) -> None:
+    page = visit(f"{api.url}/studies/{known.study}")
+
+    page.locator(".conclusion p").wait_for()
+    headline = api.get(f"/studies/{known.study}/report", format="json")["headline"]
+    assert page.url == f"{api.url}/#/studies/{known.study}"
+    assert page.locator(".conclusion p").first.text_content() == headline
+    facts = page.locator(".experiment-head .facts").inner_text()
+    for words in ("Toy function", "Analytic", "Smoke: 10 iterations", "static friction"):
+        assert words in facts
+    assert page.locator(".life-cycle .button:not(.quiet), .life-cycle button:not(.quiet)").all_inner_texts() == [
+        "Compare its experiments",
+    ]
+    page.goto(f"{api.url}/experiments/{known.strider}")
+    page.locator(".experiment-head .robot-picture[src]").wait_for()
+
+
+@pytest.mark.parametrize("width", [1440, 390])
+def test_the_form_has_three_steps_and_cost_and_button_are_always_in_view(visit: Any, api: Any, width: int) -> None:
+    page = visit(f"{api.url}/#/new", width=width, height=844)
+    page.locator(".panel .big").wait_for()
+    button = page.get_by_role("button", name="Submit the study")
+
+    assert page.locator(".part > legend").all_inner_texts() == [
+        "1. The robot",
+        "2. What is compared and tuned",
+        "3. Size",
+    ]
+    assert page.locator(".advanced > details").count() == 3
+    assert page.locator(".advanced > details[open]").count() == 0
+    for place in ("0", "document.body.scrollHeight / 2", "document.body.scrollHeight"):
+        page.evaluate(f"() => scrollTo(0, {place})")
+        for shown in (button, page.locator(".panel .big").first):
+            page.wait_for_function(
+                "(element) => { const { top, bottom } = element.getBoundingClientRect();"
+                " return top >= 0 && bottom <= innerHeight; }",
+                arg=shown.element_handle(),
+            )
+
+
 @pytest.mark.release
 def test_the_line_for_curl_is_one_that_every_shell_takes(visit: Any, api: Any, known: Any) -> None:
     page = visit(f"{api.url}/#/studies/{known.study}")
@@ -270,6 +384,7 @@ def test_the_line_for_curl_is_one_that_every_shell_takes(visit: Any, api: Any, k
 def test_a_study_is_opened_in_the_form_changed_and_pasted(visit: Any, archive: Any, published: Any) -> None:
     visit.forgive(*REFUSED)
     page = visit(f"{archive.url}/#/studies/{published['id']}")
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="New from this").click()
     page.locator(".panel .big").wait_for()
     spec = json.loads(page.locator("#panel-json code").text_content())

@@ -88,6 +88,7 @@ def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit: Any, api: An
     seed = 2**64 - 1
 
     page.get_by_label("Seed").fill(str(seed))
+    page.get_by_text("Advanced").last.click()
     with page.expect_request(lambda asked: "1e999" in (asked.post_data or "")) as sent:
         page.get_by_label("Repetitions at once").fill("1e999")
 
@@ -208,6 +209,7 @@ def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit:
     visit.forgive("ERR_FAILED")
     study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{archive.url}/#/studies/{study}")
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Edit name, notes and tags").click()
     page.get_by_label("Name", exact=True).fill("second name")
 
@@ -224,6 +226,7 @@ def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit: A
     visit.forgive("ERR_FAILED", "412")
     study = api.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{api.url}/#/studies/{study}")
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Edit name, notes and tags").click()
     page.get_by_label("Name", exact=True).fill("second name")
 

@@ -12,6 +12,13 @@ from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, submit_one, toy
 
+TWO = {
+    "robot": "toy_function",
+    "budget": "smoke",
+    "strategies": ["random", "direct"],
+    "tunables": ["static_friction", "dynamic_friction"],
+}
+
 
 def address(api: Any, experiment: Any) -> str:
     return f"{api.url}/#/experiments/{experiment}"
@@ -22,6 +29,8 @@ def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api: Any, written
     page = visit(address(api, submitted.id))
     verbs = page.get_by_role("group", name="Actions")
     state = page.locator(".state-now")
+    expect(verbs.get_by_role("button")).to_have_text(["Pause", "More actions…"])
+    verbs.get_by_role("button", name="More actions").click()
     verbs.get_by_role("button", name="Resume").press("Enter")
     expect(page.locator(".life-cycle .outcome").first).to_contain_text(
         "queued cannot be resumed, only one that is pausing or paused"
@@ -54,6 +63,7 @@ def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api: Any, 
     (claim,) = execution.claim(written, "tests", 1)
     run(written, claim)
     page = visit(address(api, submitted.id))
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Extend").click()
     page.get_by_label("Repetitions in all").fill("2")
     page.get_by_role("button", name="Extend it").click()
@@ -70,6 +80,7 @@ def test_the_direct_baseline_is_extended_by_repetitions_alone(api: Any, written:
     (claim,) = execution.claim(written, "tests", 1)
     run(written, claim, some_log(0))
     page = visit(address(api, submitted.id))
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Extend").click()
     expect(page.get_by_label("Iterations in all")).to_have_count(0)
     page.get_by_label("Repetitions in all").fill("2")
@@ -79,13 +90,13 @@ def test_the_direct_baseline_is_extended_by_repetitions_alone(api: Any, written:
 
 @pytest.mark.release
 def test_a_study_is_extended(api: Any, written: Store, visit: Any) -> None:
-    spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "direct"]}
-    study = submission.submit(written, StudySpec.model_validate(spec | {"iterations": 2, "repetitions": 1}))
+    study = submission.submit(written, StudySpec.model_validate(TWO | {"iterations": 2, "repetitions": 1}))
     for claim in execution.claim(written, "tests", 2):
         run(written, claim, some_log(2 if claim.spec.strategy.name == "random" else 0))
     page = visit(f"{api.url}/#/studies/{study.id}")
     page.get_by_label("Band").select_option("sd")
     expect(page.get_by_role("link", name="SVG")).to_have_attribute("href", re.compile("band=sd"))
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Extend").click()
     expect(page.get_by_role("dialog")).to_contain_text("Now 2. Empty: unchanged.")
     page.get_by_label("Repetitions in all").fill("3")
@@ -98,12 +109,12 @@ def test_a_study_is_extended(api: Any, written: Store, visit: Any) -> None:
 def test_a_study_gets_more_iterations_and_its_baseline_no_more_repetitions(
     api: Any, written: Store, visit: Any
 ) -> None:
-    spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "direct"]}
     size = {"iterations": 2, "repetitions": 1, "direct_repetitions": 3}
-    study = submission.submit(written, StudySpec.model_validate(spec | size))
+    study = submission.submit(written, StudySpec.model_validate(TWO | size))
     for claim in execution.claim(written, "tests", 9):
         run(written, claim, some_log(2 if claim.spec.strategy.name == "random" else 0))
     page = visit(f"{api.url}/#/studies/{study.id}")
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Extend").click()
     expect(page.get_by_role("dialog")).to_contain_text("Now 1 to 3. Empty: unchanged.")
     page.get_by_label("Iterations in all").fill("3")
@@ -118,6 +129,7 @@ def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api: Any, w
     submitted = submit_one(written, toy(name="mine"))
     visit.forgive("412")
     page = visit(address(api, submitted.id))
+    page.get_by_role("button", name="More actions").click()
     page.get_by_role("button", name="Edit name, notes and tags").click()
     page.get_by_label("Notes", exact=True).fill("On the second robot")
     theirs = api.http.patch(f"/studies/{submitted.id}", json={"name": "theirs"}, headers={"If-Match": "*"})

@@ -174,11 +174,11 @@ def test_a_strategy_keeps_its_colour_and_mark_whatever_is_drawn_beside_it() -> N
     assert together["Mine"] not in [strategy_style(name) for name in STRATEGIES]
 
 
-def test_experiments_of_one_strategy_share_colour_and_mark_and_differ_in_their_dashes() -> None:
+def test_experiments_of_one_strategy_share_their_colour_and_differ_in_dashes_and_marks() -> None:
     first, second, third = strategy_styles(["random", "random", "random"])
 
-    assert len({first.color, second.color, third.color}) == len({first.marker, second.marker, third.marker}) == 1
-    assert len({first.dash, second.dash, third.dash}) == 3
+    assert len({first.color, second.color, third.color}) == 1
+    assert len({first.dash, second.dash, third.dash}) == len({first.marker, second.marker, third.marker}) == 3
     many = strategy_styles(["random"] * 36)
     assert len({(style.dash, style.marker) for style in many}) == 36
     assert {style.color for style in many} == {first.color}
@@ -195,6 +195,18 @@ def test_experiments_of_one_name_are_told_apart_by_their_ids() -> None:
     names = [each.name for each in lines(curves_figure([first, second]))]
 
     assert names == ["Simulated fit (id-of-si)", "Simulated fit (another-)"]
+
+
+def test_experiments_of_one_name_in_several_studies_are_told_apart_by_their_studies() -> None:
+    studies = ("on wood", "on ice", "on ice")
+    drawn = [
+        RISING.model_copy(update={"experiment": f"id-{place}", "study_name": study})
+        for place, study in enumerate(studies)
+    ]
+
+    names = [each.name for each in lines(curves_figure(drawn))]
+
+    assert names == ["Simulated fit · on wood", "Simulated fit · on ice (id-1)", "Simulated fit · on ice (id-2)"]
 
 
 def test_a_name_that_a_person_gave_is_shown_as_it_is() -> None:

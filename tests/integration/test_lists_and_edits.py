@@ -10,6 +10,7 @@ from gaplab.api.app import create_app
 from gaplab.schemas.lifecycle import State
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
+from tests.made_studies import Made, Study, make
 
 TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 1}
 NAMES = ["béta", "Alpha", "alpha 50%", "line\nbreak", "delta_1", "alpha"]
@@ -43,6 +44,25 @@ def test_a_sorted_list_has_each_once_and_its_opposite_is_its_reverse(api: TestCl
     assert sorted(found["name"]) == sorted(made)
     assert found["-name"] == found["name"][::-1]
     assert (found["created_at"], found["-created_at"]) == (made, made[::-1])
+
+
+@pytest.mark.dialects
+def test_studies_are_sorted_by_state_and_by_their_best_learned_fitness(store: Store, api: TestClient) -> None:
+    fitness = {"low": (0.2, 0.9), "high": (0.7, 0.1), "alone": (0.4,)}
+    for name, values in fitness.items():
+        curves = {strategy: Made([value] * 2) for strategy, value in zip(("random", "direct"), values, strict=False)}
+        make(store, name, Study(curves, repetitions=2, samples=1))
+    api.post("/studies", json=TOY | {"name": "queued"})
+
+    found = {
+        sort: [each["name"].removeprefix("made: ") for each in walk(api, sort=sort)]
+        for sort in ("fitness", "-fitness", "state", "-state")
+    }
+
+    assert found["-fitness"] == ["high", "alone", "low", "queued"]
+    assert found["fitness"] == ["low", "alone", "high", "queued"]
+    assert found["state"][0] == "queued"
+    assert found["-state"] == found["state"][::-1]
 
 
 @pytest.mark.dialects

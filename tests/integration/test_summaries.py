@@ -7,8 +7,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
+from gaplab.schemas.access import Role
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.spec import StudySpec
+from gaplab.services.access import create_token
 from gaplab.services.core.types import Probed
 from gaplab.services.experiments import lifecycle, listing, reading, submission
 from gaplab.services.results import curves
@@ -206,7 +208,7 @@ def test_equal_strategies_of_a_study_get_numbers_and_others_keep_their_names() -
 def test_a_browser_that_is_lost_gets_a_page_with_a_way_home_and_a_program_a_problem(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store), base_url="http://127.0.0.1:8000")
 
-    for path in ("/nowhere", "/studies/none", "/experiments/<b>x"):
+    for path in ("/nowhere", "/studies/none/spec", "/experiments/<b>x"):
         shown = api.get(path, headers={"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"})
         told = api.get(path)
 
@@ -215,3 +217,20 @@ def test_a_browser_that_is_lost_gets_a_page_with_a_way_home_and_a_program_a_prob
         assert '<a href="/">To the experiments</a>' in shown.text
         assert "<b>" not in shown.text
         assert told.headers["content-type"] == "application/problem+json"
+
+
+def test_an_address_of_the_api_leads_a_browser_to_the_page_and_is_json_for_all_others(sqlite_store: Store) -> None:
+    api = TestClient(create_app(sqlite_store), base_url="http://127.0.0.1:8000", follow_redirects=False)
+    study = submit_one(sqlite_store, toy()).id
+    browser = {"Accept": "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"}
+
+    views = {f"/studies/{study}": f"../#/studies/{study}", f"/experiments/{study}": f"../#/experiments/{study}"}
+    for path, view in (views | {"/studies": "./#/"}).items():
+        led, plain = api.get(path, headers=browser), api.get(path, headers={"Accept": "application/json, text/html"})
+
+        assert (led.status_code, led.headers["location"]) == (303, view)
+        assert plain.json() == api.get(path).json()
+        assert all("Accept" in answer.headers["vary"].split(", ") for answer in (led, plain))
+    create_token(sqlite_store, Role.READER)
+    assert api.get(f"/studies/{study}", headers=browser).status_code == 303
+    assert api.get(f"/studies/{study}").status_code == 401

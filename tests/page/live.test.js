@@ -6,7 +6,7 @@ Object.assign(globalThis.document, { addEventListener() {}, getElementById: () =
 const { ageOf, follow, keepAges, latestAnswers } = await import("../../api/dashboard/lib/live.js");
 const { rest } = await import("../../api/dashboard/lib/waiting.js");
 const { keepUp } = await import("../../api/dashboard/views/study.js");
-const { editing } = await import("../../api/dashboard/views/study/actions.js");
+const { actions } = await import("../../api/dashboard/views/study/actions.js");
 
 const real = { setInterval: globalThis.setInterval };
 
@@ -80,7 +80,8 @@ test("an age goes on while the page is open", () => {
 test("a new study has the seed of the old one to the last digit", async () => {
   globalThis.location = { hash: "" };
   globalThis.fetch = () => Promise.resolve(new Response('{"spec": {"seed": 18446744073709551615}, "remarks": []}'));
-  editing({ id: "s", study: { id: "s", experiments: [{ study: "s" }] } })[1].click();
+  const experiments = [{ study: "s", state: "COMPLETED", progress: { failed: 0 } }];
+  actions({ id: "s", study: { id: "s", state: "COMPLETED", experiments } }).element.querySelectorAll("button").find(({ textContent }) => textContent === "New from this").click();
   while (!location.hash) await new Promise((resume) => { setTimeout(resume); });
   assert.equal(new URLSearchParams(location.hash.split("?")[1]).get("spec"), '{"seed":18446744073709551615}');
 });

@@ -4,9 +4,9 @@ import { test } from "node:test";
 import { isFunction, isPhysical, unitsOf, worldsText } from "../../api/dashboard/lib/robots.js";
 
 const { lastIteration } = await import("../../api/dashboard/views/replay.js");
-const { actions, editing, keeping, refusal } = await import("../../api/dashboard/views/study/actions.js");
+const { actions, primary, refusal } = await import("../../api/dashboard/views/study/actions.js");
 const { pastEvents } = await import("../../api/dashboard/views/study/events.js");
-const { gathered, waitingText } = await import("../../api/dashboard/views/study/head.js");
+const { budgetText, gathered, waitingText } = await import("../../api/dashboard/views/study/head.js");
 const { measurements } = await import("../../api/dashboard/views/study/measurements.js");
 
 /** A study with experiments in these states, of each of which `failed` repetitions have failed. */
@@ -24,10 +24,31 @@ test("an action that a state forbids says what would permit it", () => {
 });
 
 test("one experiment among others has a name of its own, and its study has the rest", () => {
-  const page = (id) => ({ id, study: { ...study(["COMPLETED"]), id, archived_at: null } });
-  const labels = (id) => [buttons(keeping(page(id)).element), editing(page(id))[0].textContent];
-  assert.deepEqual(labels("s"), [["Archive", "Delete…", "Notify…"], "Edit name, notes and tags"]);
-  assert.deepEqual(labels("e"), [["Delete…"], "Edit name"]);
+  const labels = (id) => buttons(actions({ id, study: { ...study(["COMPLETED"]), state: "COMPLETED", id, archived_at: null } }).element).slice(7);
+  assert.deepEqual(labels("s"), ["Edit name, notes and tags", "New from this", "Archive", "Notify…", "Delete…", "More actions…"]);
+  assert.deepEqual(labels("e"), ["Edit name", "New from this", "Delete…", "More actions…"]);
+});
+
+test("one action is likely wanted, and the others are behind a button", () => {
+  const whole = (states, state, failed = 0) => ({ ...study(states, failed), state, archived_at: null });
+  assert.equal(primary(whole(["RUNNING", "COMPLETED"], "RUNNING")), "pause");
+  assert.equal(primary(whole(["PAUSED"], "PAUSED")), "resume");
+  assert.equal(primary(whole(["FAILED"], "FAILED", 1)), "retry");
+  assert.equal(primary(whole(["WAITING"], "WAITING")), null);
+  assert.equal(primary(whole(["COMPLETED", "FAILED"], "COMPLETED", 1)), null);
+
+  const shownOf = (element) => element.querySelectorAll("a, button").filter(({ hidden }) => !hidden).map((each) => [each.textContent, each.getAttribute("class")]);
+  const { element } = actions({ study: whole(["RUNNING"], "RUNNING") });
+  assert.deepEqual(shownOf(element), [["Pause", ""], ["Replay a controller", "button quiet"], ["More actions…", "quiet"]]);
+  element.querySelectorAll("button").at(-1).click();
+  assert.equal(shownOf(element).length, 7 + 5 + 2);
+  const ended = actions({ study: whole(["COMPLETED", "FAILED"], "COMPLETED") }).element;
+  assert.deepEqual(shownOf(ended)[0], ["Compare its experiments", "button"]);
+});
+
+test("a budget is a preset and its size, of which a baseline may have another", () => {
+  const experiment = (iterations, repetitions, level) => ({ level, spec: { iterations, repetitions, budget: { preset: "some_budget" } } });
+  assert.equal(budgetText({ experiments: [experiment(10, 40, false), experiment(1, 100, true)] }), "Some budget: 10 iterations, 40 or 100 repetitions");
 });
 
 test("an extension whose cost is not confirmed changes nothing, and keeps its dialog", async () => {

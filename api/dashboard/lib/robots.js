@@ -5,13 +5,19 @@ import { readableName } from "./format.js";
 
 /** @typedef {Api.ExperimentRead | undefined} Experiment */
 
+/** Return the robot of a spec as the catalogue has it: one from a file has the name in its options. @param {Record<string, any>} spec resolved */
+export const robotOf = ({ robot: { name, options } }) => /** @type {string} */ (options?.sha256 ? options.name : name);
+
+/** Return the name of the robot of a spec as people read it. @param {Record<string, any>} spec resolved */
+export const robotName = (spec) => readableName(robotOf(spec));
+
 /**
  * Return a function that gives the unit of an experiment's fitness; the empty text if its robot is not installed.
  * @param {Api.Catalogue} catalogue
  */
 export function unitsOf({ robots }) {
   const units = new Map(robots.map(({ name, details }) => [name, details.unit]));
-  return (/** @type {Experiment} */ experiment) => /** @type {string} */ (units.get(experiment?.spec.robot.name) ?? "");
+  return (/** @type {Experiment} */ experiment) => /** @type {string} */ ((experiment && units.get(robotOf(experiment.spec))) ?? "");
 }
 
 /**
@@ -19,7 +25,7 @@ export function unitsOf({ robots }) {
  * @param {Api.Catalogue} catalogue
  * @param {Api.ExperimentRead} experiment
  */
-export const isFunction = ({ robots }, { spec }) => robots.some(({ name, details }) => name === spec.robot.name && details.function === true);
+export const isFunction = ({ robots }, { spec }) => robots.some(({ name, details }) => name === robotOf(spec) && details.function === true);
 
 /** Return whether reality is a robot on a bench. @param {{ spec: Record<string, any> }} experiment */
 export const isPhysical = ({ spec }) => spec.reality.kind === "physical";

@@ -183,6 +183,7 @@ declare namespace Api {
     experiment: string;
     name: string;
     strategy: string;
+    study_name: string;
     state: State;
     unit: string;
     fitness: Fitness;
@@ -920,13 +921,13 @@ declare namespace Api {
   }
   interface ViewRead {
     query: string | null;
-    sort: "created_at" | "-created_at" | "name" | "-name";
+    sort: "created_at" | "-created_at" | "name" | "-name" | "state" | "-state" | "fitness" | "-fitness";
     name: string;
     created_at: string;
   }
   interface ViewSpec {
     query: string | null;
-    sort: "created_at" | "-created_at" | "name" | "-name";
+    sort: "created_at" | "-created_at" | "name" | "-name" | "state" | "-state" | "fitness" | "-fitness";
   }
   interface VoidSpec {
     reason: string;

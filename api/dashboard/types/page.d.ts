@@ -59,6 +59,8 @@ declare namespace Page {
     /** The first experiment, and often the only one. */
     readonly experiment: Api.ExperimentRead;
     tag: string | null;
+    /** The robot of its experiments, as the catalogue has it. */
+    robot: Api.PluginRead | undefined;
     isFunction: boolean;
     unit(experiment: Api.ExperimentRead | undefined): string;
     sections: Sections;

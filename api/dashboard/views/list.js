@@ -7,8 +7,10 @@ import { every, follow } from "../lib/live.js";
 import { empty, failed, loading } from "../lib/placeholders.js";
 import { unitsOf } from "../lib/robots.js";
 import { addressOf, filterForm, filtersOf, isFiltered } from "./list/filters.js";
-import { isSeveral, listRow, listTable, selectionBar } from "./list/rows.js";
+import { isSeveral, listRow, listTable } from "./list/rows.js";
 import { savedViews } from "./list/saved_views.js";
+import { selectionBar } from "./list/selection.js";
+import { welcome } from "./list/welcome.js";
 
 const AT_FIRST = 20;
 const MOST = 500;
@@ -26,19 +28,25 @@ const MINUTE_MS = 60_000;
  */
 export async function show(root, parameters, signal) {
   const catalogue = /** @type {Api.Catalogue} */ (await get("/catalogue", {}, signal));
-  const list = new List(signal, unitsOf(catalogue), filtersOf(parameters));
-  const changed = async (/** @type {Filters} */ filters) => {
+  const filters = filtersOf(parameters);
+  const sorted = (/** @type {string} */ sort) => {
+    filters.sort = sort;
+    form.update();
+    changed(filters);
+  };
+  const list = new List(signal, unitsOf(catalogue), { ...filters }, sorted);
+  const changed = async (/** @type {Filters} */ wanted) => {
     if (signal.aborted) return;  // words typed just before the reader left would change the address of another view
-    history.replaceState(null, "", addressOf(filters));
-    const loaded = list.change({ ...filters });
+    history.replaceState(null, "", addressOf(wanted));
+    const loaded = list.change({ ...wanted });
     views.update();
     await loaded;
   };
-  const form = filterForm({ ...list.filters }, catalogue.strategies.map(({ name }) => name), changed);
+  const form = filterForm(filters, catalogue.strategies.map(({ name }) => name), changed);
   const title = h("div", { class: "titled" }, h("h1", {}, "Studies"), h("a", { class: "button", href: "#/new" }, "New study"));
   const views = savedViews(() => list.filters, signal);
-  root.replaceChildren(title, form, views.element, list.element);
-  await changed(list.filters);
+  root.replaceChildren(title, form.element, views.element, list.element);
+  await changed(filters);
   if (signal.aborted) return;
   follow({}, () => list.refresh(), signal);
   every(MINUTE_MS, () => list.draw(), signal);
@@ -61,8 +69,13 @@ export function restOfList(firstPart, former) {
 
 /** The table, with as many rows as the reader asked for. */
 export class List {
-  /** @param {AbortSignal} signal @param {(experiment: Api.ExperimentRead | undefined) => string} unit @param {Filters} filters */
-  constructor(signal, unit, filters) {
+  /**
+   * @param {AbortSignal} signal
+   * @param {(experiment: Api.ExperimentRead | undefined) => string} unit
+   * @param {Filters} filters
+   * @param {(order: string) => void} [sorted] called with the order that the head of a column asks for
+   */
+  constructor(signal, unit, filters, sorted = () => {}) {
     this.signal = signal;
     this.unit = unit;
     this.filters = filters;
@@ -75,18 +88,18 @@ export class List {
     this.turn = Promise.resolve();
     /** @type {HTMLElement | null} */
     this.error = null;
-    const { element, body } = listTable("Studies");
+    /** @type {HTMLElement | null} */
+    this.welcome = null;
+    const { element, body, showOrder } = listTable("Studies", { sorted });
     this.table = element;
+    this.showOrder = showOrder;
     this.fill = keyedRows(body, (/** @type {Row} */ { value, isNested }) => `${value.id} ${isNested ? "nested" : isSeveral(value)}`, (row) => listRow(row, this));
     this.more = h("button", { type: "button", class: "quiet more", onclick: () => { this.lengthen(); } }, "Show more");
-    this.bar = selectionBar(() => this.draw());
+    this.bar = selectionBar(() => { this.refresh().catch(() => this.draw()); }, signal);
     this.note = h("div", {}, loading());
     this.mistake = h("p", { class: "mistake", role: "status" });
     this.element = h("div", {}, this.mistake, this.bar.element, this.table, this.note, this.more);
-    this.ticked = () => {
-      this.bar.update();
-      this.draw();
-    };
+    this.ticked = () => this.draw();
   }
 
   /** Show the list of other filters; an error replaces the former list. @param {Filters} filters */
@@ -173,6 +186,8 @@ export class List {
     const below = (/** @type {Api.StudyRead} */ study) =>
       (isSeveral(study) && this.unfolded.has(study.id) ? study.experiments.map((value) => ({ value, isNested: true })) : []);
     this.fill(items.flatMap((value) => [{ value }, ...below(value)]));
+    this.showOrder(this.loaded.filters.sort);
+    this.bar.update();
     this.table.hidden = !items.length;
     this.more.hidden = !cursor;
     const note = this.error ?? (items.length || this.mistake.textContent ? null : this.nothing());
@@ -180,7 +195,7 @@ export class List {
   }
 
   nothing() {
-    if (!isFiltered(this.filters)) return empty("Nothing was submitted yet.", h("a", { class: "button", href: "#/new" }, "Submit a study"));
+    if (!isFiltered(this.filters)) return (this.welcome ??= welcome());
     const again = () => dispatchEvent(new HashChangeEvent("hashchange"));  // also where the address is the same already
     return empty("Nothing fits these filters.", h("a", { class: "button quiet", href: "#/", onclick: again }, "Show everything"));
   }

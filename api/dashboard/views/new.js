@@ -7,12 +7,11 @@ import { h } from "../lib/dom.js";
 import { parse } from "../lib/json.js";
 import { draftOf, followRobot, specOf } from "./new/draft.js";
 import { ErrorPlaces } from "./new/fields.js";
-import { budgetPart, simulationPart, strategiesPart, studyPart, tunablesPart } from "./new/form_parts.js";
-import { realityPart } from "./new/reality_part.js";
+import { robotStep, searchStep, sizeStep } from "./new/form_parts.js";
 import { panel } from "./new/panel.js";
 
 const TYPING_MS = 300;
-const PARTS = [studyPart, strategiesPart, simulationPart, tunablesPart, realityPart, budgetPart];
+const STEPS = [robotStep, searchStep, sizeStep];
 
 /** @typedef {Record<string, any>} Spec */
 /** @typedef {{ name: string, summary: string, spec: Record<string, any> }} Preset */
@@ -76,12 +75,15 @@ export class Form {
   remake() {
     const inputs = () => /** @type {HTMLElement[]} */ ([...this.parts.querySelectorAll("input, select, summary, button")]);
     const details = () => [...this.parts.querySelectorAll("details")];
-    const focused = inputs().findIndex((input) => input === document.activeElement);
-    const isOpen = details().map(({ open }) => open);
+    const before = inputs();
+    const focused = before.findIndex((input) => input === document.activeElement);
+    const label = wordsOf(before[focused]);
+    const isOpen = new Map(details().map(({ dataset, open }) => [dataset.id, open]));
     followRobot(this.draft, this.catalogue);
-    this.parts.replaceChildren(...PARTS.map((make) => make(this)));
-    if (focused >= 0) inputs()[focused]?.focus();
-    if (details().length === isOpen.length) details().forEach((element, index) => { element.open ||= isOpen[index]; });
+    this.parts.replaceChildren(...STEPS.map((make) => make(this)));
+    for (const element of details()) element.open = isOpen.get(element.dataset.id) || element.open;
+    const after = inputs();
+    if (focused >= 0) (wordsOf(after[focused]) === label ? after[focused] : after.find((input) => wordsOf(input) === label))?.focus();
     this.check(0);
   }
 
@@ -134,6 +136,9 @@ export class Form {
     }
   }
 }
+
+/** Return what a field or a button is called. @param {Element | undefined} input */
+const wordsOf = (input) => (input instanceof HTMLInputElement || input instanceof HTMLSelectElement ? input.labels?.[0]?.textContent : input?.textContent);
 
 /** Return the spec of a study for a spec of a study or an experiment, whose one strategy becomes a list. @param {Spec} spec @returns {Spec} */
 export function studyOf(spec) {

@@ -6,12 +6,13 @@ import { showBenchLink } from "../lib/bench/sender.js";
 import { copyButton } from "../lib/copy.js";
 import { h, keyedRows } from "../lib/dom.js";
 import { every, follow, keepAges, latestAnswers } from "../lib/live.js";
-import { isFunction, isPhysical, unitsOf } from "../lib/robots.js";
+import { isFunction, isPhysical, robotOf, unitsOf } from "../lib/robots.js";
 import { sections } from "../lib/sections.js";
 import { ENDED } from "../lib/state_badge.js";
 import { framed } from "../lib/table.js";
 import { tabs } from "../lib/tabs.js";
-import { listRow, listTable, selectionBar } from "./list/rows.js";
+import { listRow, listTable } from "./list/rows.js";
+import { selectionBar } from "./list/selection.js";
 import { eventList } from "./study/events.js";
 import { curves, otherFigures } from "./study/figures.js";
 import { head } from "./study/head.js";
@@ -35,7 +36,7 @@ export async function show(root, parameters, signal) {
   const [{ value: study, tag }, catalogue] = await Promise.all([load(), get("/catalogue", {}, signal)]);
   /** @type {Page.StudyPage} */
   const page = {
-    id, study, tag, latest, signal, unit: unitsOf(catalogue), isFunction: isFunction(catalogue, study.experiments[0]), sections: sections(signal),
+    id, study, tag, latest, signal, robot: catalogue.robots.find((/** @type {Api.PluginRead} */ { name }) => name === robotOf(study.experiments[0].spec)), unit: unitsOf(catalogue), isFunction: isFunction(catalogue, study.experiments[0]), sections: sections(signal),
     get experiment() { return page.study.experiments[0]; },
     update() {
       top.update();
@@ -97,7 +98,7 @@ function experiments(page) {
     bar.update();
     update();
   };
-  const { element, body } = listTable("Experiments", "flat");
+  const { element, body } = listTable("Experiments", { cssClass: "flat" });
   const fill = keyedRows(body, ({ value }) => value.id, (/** @type {import("./list/rows.js").Row} */ row) => listRow(row, { unit: page.unit, ticked }));
   const update = () => fill(page.study.experiments.map((value) => ({ value, isNested: true })));
   update();

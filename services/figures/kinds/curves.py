@@ -62,7 +62,7 @@ def curves_figure(
     """
     curves = [_drawable(one) for one in curves]
     band = band or _default_band(curves)
-    names = distinct_names([(one.name, one.strategy, one.experiment) for one in curves])
+    names = distinct_names([(one.name, one.strategy, one.study_name, one.experiment) for one in curves])
     placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
     lines = [one for one in placed if not one.curve.level]
     levels = [one for one in placed if one.curve.level and one.points]

@@ -215,6 +215,12 @@ def experiments_of(session: Session, studies: Sequence[str]) -> tuple[Experiment
     return tuple(session.scalars(select(row).where(row.study_id.in_(studies)).order_by(row.study_id, row.position)))
 
 
+def study_names(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, str]:
+    """Return the names of the studies of experiments, by their ids."""
+    named = select(StudyRow.id, StudyRow.name).where(StudyRow.id.in_({row.study_id for row in rows}))
+    return dict(session.execute(named).all())
+
+
 def open_studies(session: Session, studies: Sequence[str]) -> frozenset[str]:
     """Return the ids of the studies in which an experiment has not ended."""
     row = ExperimentRow

@@ -4,6 +4,7 @@
 import { get } from "../../lib/api.js";
 import { titleOf } from "../../lib/format.js";
 
+const OF_STUDY = 40;  // characters, as in figures
 const NOT_FOUND = 404;
 
 /**
@@ -73,14 +74,19 @@ export function experimentCache(signal) {
     /** @param {string} id of an experiment whose study is named; null if it is the only one of its study */
     studyName: (id) => (experiments.get(id)?.study === id ? null : studyNames.get(experiments.get(id)?.study ?? "") ?? null),
     /**
-     * Return names by id, as the figure has them: names that are alike are followed by their ids.
+     * Return names by id, as the figure has them: names that are alike are followed by those of their studies, and then by their ids.
      *
      * @param {string[]} ids
      */
     namesOf(ids) {
-      const names = ids.map(nameOf);
-      const isUnique = (/** @type {string} */ name) => names.indexOf(name) === names.lastIndexOf(name);
-      return new Map(ids.map((id, index) => [id, isUnique(names[index]) ? names[index] : `${names[index]} (${id.slice(0, 8)})`]));
+      const studies = ids.map((id) => studyNames.get(experiments.get(id)?.study ?? "") ?? "");
+      const areSeveral = new Set(studies).size > 1;
+      const short = distinct(ids.map(nameOf), (name, index) => {
+        const hasOther = areSeveral && studies[index] && studies[index] !== experiments.get(ids[index])?.name;
+        return hasOther ? `${name} · ${cut(studies[index])}` : name;
+      });
+      const names = distinct(short, (name, index) => `${name} (${ids[index].slice(0, 8)})`);
+      return new Map(ids.map((id, index) => [id, names[index]]));
     },
     /**
      * Return the chosen experiments that exist.
@@ -90,6 +96,12 @@ export function experimentCache(signal) {
     known: (ids) => ids.filter((id) => experiments.get(id)),
   };
 }
+
+/** Return names, those that are alike with an addition. @param {string[]} names @param {(name: string, index: number) => string} add */
+const distinct = (names, add) => names.map((name, index) => (names.indexOf(name) === names.lastIndexOf(name) ? name : add(name, index)));
+
+/** @param {string} name */
+const cut = (name) => (name.length > OF_STUDY ? `${name.slice(0, OF_STUDY - 1)}…` : name);
 
 /**
  * Return what a request answers; null if there is no such thing.

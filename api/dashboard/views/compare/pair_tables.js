@@ -15,8 +15,6 @@ export const UNPAIRED = /** @type {const} */ (["student", "welch", "mann_whitney
 const PAIRED = /** @type {const} */ (["paired_t", "wilcoxon"]);
 const AFTER_HOLM = "p after Holm (raw)";
 
-/** @type {Partial<Record<Api.Found, Api.Found>>} */
-const OPPOSITE = { higher: "lower", lower: "higher", wider: "narrower", narrower: "wider" };
 const BETTER = { kind: "better", sign: "▲" };
 const WORSE = { kind: "worse", sign: "▼" };
 /** @type {Partial<Record<Api.Found, typeof BETTER>>} */
@@ -42,36 +40,62 @@ export function letter(index) {
 export const rangeText = ([from, to]) => (from === to ? `${from}` : `${from}–${to}`);
 
 /**
- * Return the matrix over one range: the row against the column. The numbers of a pair stand once, above the diagonal.
+ * Return which pairs differ, in a sentence.
+ *
+ * @param {string[]} experiments whose places give their letters
+ * @param {Api.Comparison[]} pairs
+ * @param {Page.Comparison["test"]} test
+ */
+export function differing(experiments, pairs, test) {
+  const found = pairs.map((pair) => ({ pair, ...(LOOKS[pair[test].found] ?? UNKNOWN) }));
+  const tested = found.filter(({ kind }) => kind !== "unknown").length;
+  const differ = found.filter(({ kind }) => kind === "better" || kind === "worse");
+  const { where } = pairs[0];
+  const by = test === "trusted" ? "" : `, by ${TESTS[test].label}`;
+  if (!tested) return `No pair can be tested ${where}${by}: there are too few values that vary.`;
+  if (!differ.length) return `No pair differs ${where}${by}. That does not show that any are equal.`;
+  /** @type {Map<string, string[]>} */
+  const ahead = new Map();
+  for (const { pair, kind } of differ) {
+    const [first, other] = [pair.first, pair.second].map((id) => letter(experiments.indexOf(id)));
+    const [more, less] = kind === "better" ? [first, other] : [other, first];
+    ahead.set(more, [...(ahead.get(more) ?? []), less]);
+  }
+  const told = [...ahead].sort(([one], [other]) => one.length - other.length || one.localeCompare(other)).map(([more, less]) => `${more} ${test === "brown_forsythe" ? "wider than" : "above"} ${less.join(", ")}`);
+  return `${differ.length} of ${pairs.length} ${pairs.length === 1 ? "pair differs" : "pairs differ"} ${where}${by}: ${told.join("; ")}.`;
+}
+
+/**
+ * Return which pairs differ over one range, and the matrix: each pair once, the row against the column. It is folded while none differs.
  *
  * @param {Page.CompareView} view
  * @param {string[]} ids
  * @param {Api.Comparison[]} pairs
+ * @param {boolean} isOpen whether a matrix without differences is unfolded
  */
-export function matrix({ cache, choice }, ids, pairs) {
-  const letterOf = (/** @type {string} */ id) => letter(choice.experiments.indexOf(id));
-  const names = cache.namesOf(choice.experiments);
+export function matrix({ cache, choice: { experiments, test } }, ids, pairs, isOpen) {
+  const letterOf = (/** @type {string} */ id) => letter(experiments.indexOf(id));
+  const names = cache.namesOf(experiments);
   const pairOf = (/** @type {string} */ first, /** @type {string} */ second) => pairs.find((pair) => pair.first === first && pair.second === second);
   const title = `The row against the column, ${pairs[0].where}`;
-  const head = h("tr", {}, h("td", {}), ...ids.map((id) => h("th", { scope: "col", title: names.get(id) }, letterOf(id))));
-  const rows = ids.map((row) => h("tr", {}, h("th", { scope: "row" }, h("b", {}, letterOf(row)), ` ${names.get(row)}`),
-    ...ids.map((column) => cell(pairOf(row, column), pairOf(column, row), choice.test))));
+  const named = (/** @type {string} */ id) => [h("b", {}, letterOf(id)), ` ${names.get(id)}`];
+  const head = h("tr", {}, h("td", {}), ...ids.slice(1).map((id) => h("th", { scope: "col" }, named(id))));
+  const rows = ids.slice(0, -1).map((row, index) => h("tr", {}, h("th", { scope: "row" }, named(row)),
+    ...ids.slice(1).map((column, place) => (place < index ? h("td", { class: "blank" }) : cell(pairOf(row, column), test)))));
   const made = h("table", { class: "matrix", "aria-labelledby": "matrix-title" }, h("thead", {}, head), h("tbody", {}, ...rows));
-  return [h("p", { class: "note", id: "matrix-title" }, title), framed(title, made)];
+  const whole = [h("p", { class: "note", id: "matrix-title" }, title), framed(title, made)];
+  const areAlike = pairs.every((pair) => !["better", "worse"].includes((LOOKS[pair[test].found] ?? UNKNOWN).kind));
+  return [h("p", { class: "sentence" }, differing(experiments, pairs, test)),
+    ...(areAlike ? [h("details", { open: isOpen, class: "pairs alike" }, h("summary", {}, "The numbers of each pair"), ...whole)] : whole)];
 }
 
-/**
- * @param {Api.Comparison | undefined} pair the row and the column, in the service's order
- * @param {Api.Comparison | undefined} mirrored the column and the row
- * @param {Page.Comparison["test"]} test
- */
-function cell(pair, mirrored, test) {
-  const judged = (pair ?? mirrored)?.[test];
-  if (!judged) return h("td", { class: "self" }, h("span", { class: "away" }, "itself"));
-  const found = pair ? judged.found : OPPOSITE[judged.found] ?? judged.found;
+/** @param {Api.Comparison | undefined} pair @param {Page.Comparison["test"]} test */
+function cell(pair, test) {
+  if (!pair) return h("td");
+  const { found } = pair[test];
   const { kind, sign } = LOOKS[found] ?? UNKNOWN;
   if (kind === "unknown") return h("td", { class: kind }, found);
-  return h("td", { class: kind }, h("span", { class: "verdict" }, h("span", { "aria-hidden": "true" }, `${sign} `), found), pair ? numbers(pair, test) : null);
+  return h("td", { class: kind }, h("span", { class: "verdict" }, h("span", { "aria-hidden": "true" }, `${sign} `), found), numbers(pair, test));
 }
 
 /** @type {(pair: Api.Comparison, test: Page.Comparison["test"]) => Page.Child} */

@@ -156,7 +156,7 @@ async function fill(place, view, isCurrent, unfolded) {
   results.push({ range: [first, last], pairs });
   const asked = { study: ids, from: first, to: last, margin, margin_of_direct: share, fitness };
   refillInPlace(place, JSON.stringify([results, hasOthers, test, [...view.cache.namesOf(experiments)]]), () => [
-    cautions(view, pairs), matrix(view, ids, pairs), files(asked), summaries(view, pairs, isOpen("each")),
+    cautions(view, pairs), matrix(view, ids, pairs, isOpen("alike")), files(asked), summaries(view, pairs, isOpen("each")),
     hasOthers ? pairsTable(view, results, isOpen("every")) : foldedPairs(unfolded), pooledTable(view, pairs, isOpen("pooled"))]);
   return pairs;
 }

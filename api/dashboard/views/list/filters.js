@@ -8,7 +8,8 @@ import { STATES } from "../../lib/state_badge.js";
 /** @typedef {{ sort: string, state: string, strategy: string, text: string, q: string }} Filters */
 
 /** @type {[value: string, label: string][]} */
-const ORDERS = [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"], ["-name", "By name, reversed"]];
+const ORDERS = [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"], ["-name", "By name, reversed"],
+  ["-fitness", "Fittest first"], ["fitness", "Fittest last"], ["state", "By state"], ["-state", "By state, reversed"]];
 const NEWEST_FIRST = "-created_at";
 const TYPING_MS = 350;
 
@@ -30,10 +31,11 @@ export function addressOf({ sort = NEWEST_FIRST, ...others }) {
 export const isFiltered = ({ state, strategy, text, q }) => Boolean(state || strategy || text || q);
 
 /**
- * Return the form of the filters.
+ * Return the form of the filters; an update shows an order that was chosen elsewhere.
  * @param {Filters} filters changed in place
  * @param {string[]} strategies
  * @param {(filters: Filters) => void} changed
+ * @returns {Page.Updatable}
  */
 export function filterForm(filters, strategies, changed) {
   /** @type {number | undefined} */
@@ -47,14 +49,16 @@ export function filterForm(filters, strategies, changed) {
   };
   const search = h("input", { type: "search", placeholder: "Words, or a query like tag = gait", "aria-label": "Search by words or a query", maxlength: 1000, oninput: type });
   search.value = filters.q || filters.text;
-  /** @type {(name: "state" | "strategy" | "sort", label: string, choices: Page.Choices) => HTMLElement} */
+  /** @type {(name: "state" | "strategy" | "sort", label: string, choices: Page.Choices) => HTMLSelectElement} */
   const choice = (name, label, choices) => {
     const field = select(choices, { "aria-label": label, onchange: () => change({ [name]: field.value }) });
     field.value = filters[name];
     return field;
   };
-  return h("form", { class: "filters", role: "search", onsubmit: (event) => event.preventDefault() }, search,
+  const order = choice("sort", "Order", ORDERS);
+  const element = h("form", { class: "filters", role: "search", onsubmit: (event) => event.preventDefault() }, search,
     choice("state", "State", [["", "Any state"], ...STATES.map((state) => /** @type {[string, string]} */ ([state, readableName(state.toLowerCase())]))]),
     choice("strategy", "Strategy", [["", "Any strategy"], ...strategies.map((name) => /** @type {[string, string]} */ ([name, readableName(name)]))]),
-    choice("sort", "Order", ORDERS));
+    order);
+  return { element, update: () => { order.value = filters.sort; } };
 }

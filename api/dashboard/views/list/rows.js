@@ -1,12 +1,13 @@
 // @ts-check
-/** Rows of the list: a study, which can be unfolded if it has several experiments, and an experiment below it. Rows are ticked for a comparison. */
+/** Rows of the list: a study, which can be unfolded if it has several experiments, and an experiment below it. */
 
 import { h, refill, setText } from "../../lib/dom.js";
 import { age, count, evaluationsText, fixed, fromBefore, readableName, titleOf } from "../../lib/format.js";
 import { progressBar, timeLeft } from "../../lib/progress.js";
-import { worldsText } from "../../lib/robots.js";
+import { robotName, worldsText } from "../../lib/robots.js";
 import { stateBadge } from "../../lib/state_badge.js";
 import { tagList } from "../../lib/tags.js";
+import { tickBox } from "./selection.js";
 
 /** @typedef {{ value: Api.StudyRead | Api.ExperimentRead, isNested?: boolean }} Row */
 
@@ -18,26 +19,43 @@ import { tagList } from "../../lib/tags.js";
  * @property {(id: string) => void} [toggle]
  */
 
-/** The columns; a narrow window leaves out those that are wide. */
+/** The columns, with the order that a first press of the head gives; a narrow window leaves out those that are wide. */
 const COLUMNS = [
-  { label: "", key: "ticks" }, { label: "Name", key: "name" }, { label: "State", key: "stands" }, { label: "Progress", key: "progress" },
-  { label: "Time left", key: "left", wide: true },
-  { label: "Fitness", key: "best", title: "Mean fitness in reality over repetitions, as on the curve, after the number of real-world evaluations beside it; of several experiments, that of the best" },
-  { label: "Submitted", key: "age", wide: true },
+  { label: "", key: "ticks" }, { label: "Name", key: "name", sort: "name" }, { label: "State", key: "stands", sort: "state" },
+  { label: "Progress", key: "progress" }, { label: "Time left", key: "left", wide: true },
+  { label: "Fitness", key: "best", sort: "-fitness", title: "Mean fitness in reality over repetitions, as on the curve, after the number of real-world evaluations beside it; of several experiments, that of the best" },
+  { label: "Submitted", key: "age", sort: "-created_at", wide: true },
 ];
-
-/** @type {Set<string>} the experiments that are ticked; they stay so while the reader visits other parts of the page */
-const ticked = new Set();
 
 /** @param {{ key: string, wide?: boolean }} column */
 const classOf = ({ key, wide }) => (wide ? `${key} wide` : key);
 
-/** Return a table with its head, and its body, which is empty. @param {string} caption for screen readers @param {string} [cssClass] */
-export function listTable(caption, cssClass = "") {
-  const head = COLUMNS.map((column) => h("th", { scope: "col", class: classOf(column), title: column.title }, column.label || h("span", { class: "away" }, "Select")));
+/**
+ * Return a table with its head, its body, which is empty, and a function that shows the order in the head.
+ * @param {string} caption for screen readers
+ * @param {{ cssClass?: string, sorted?: (order: string) => void }} [options] `sorted` is called with the order that a press of a head asks for
+ */
+export function listTable(caption, { cssClass = "", sorted } = {}) {
+  let order = "";
+  const press = (/** @type {string} */ sort) => () => sorted?.(sort === order ? reversed(sort) : sort);
+  const head = COLUMNS.map((column) => h("th", { scope: "col", class: classOf(column), title: column.title },
+    column.sort && sorted ? h("button", { type: "button", class: "sort", onclick: press(column.sort) }, column.label) : column.label || h("span", { class: "away" }, "Select")));
+  const showOrder = (/** @type {string} */ shown) => {
+    order = shown;
+    COLUMNS.forEach(({ sort }, index) => {
+      if (!sort || bare(sort) !== bare(order)) head[index].removeAttribute("aria-sort");
+      else head[index].setAttribute("aria-sort", order.startsWith("-") ? "descending" : "ascending");
+    });
+  };
   const body = h("tbody");
-  return { body, element: h("table", { class: `list ${cssClass}` }, h("caption", { class: "away" }, caption), h("thead", {}, h("tr", {}, ...head)), body) };
+  return { body, showOrder, element: h("table", { class: `list ${cssClass}` }, h("caption", { class: "away" }, caption), h("thead", {}, h("tr", {}, ...head)), body) };
 }
+
+/** @param {string} sort */
+const bare = (sort) => sort.replace("-", "");
+
+/** @param {string} sort */
+const reversed = (sort) => (sort.startsWith("-") ? bare(sort) : `-${sort}`);
 
 /** Return whether a row stands for several experiments. @param {Row["value"]} value */
 export const isSeveral = (value) => "experiments" in value && value.experiments.length !== 1;
@@ -59,7 +77,7 @@ export function listRow({ value: first, isNested = false }, list) {
     link.href = `#/${isNested ? "experiments" : "studies"}/${value.id}`;
     setText(subtitle, isNested ? "" : subtitleOf(experiments));
     tags.update("tags" in value ? value.tags : []);
-    box.update(experiments.map(({ id }) => id));
+    box.update(value);
     bar.update(value.progress);
     toggle?.setAttribute("aria-expanded", String(list.unfolded?.has(value.id)));
     toggle?.setAttribute("aria-label", `Experiments of ${value.name}`);
@@ -76,7 +94,7 @@ export function listRow({ value: first, isNested = false }, list) {
 function subtitleOf(experiments) {
   const [first] = experiments;
   const what = experiments.length === 1 ? readableName(first.strategy) : `${count(experiments.length)} experiments`;
-  return [what, ...(first ? [readableName(first.spec.robot.name), worldsText(first.spec)] : [])].join(" · ");
+  return [what, ...(first ? [robotName(first.spec), worldsText(first.spec)] : [])].join(" · ");
 }
 
 /** Return a fitness with its number of real-world evaluations. @param {Api.FitnessRead | Api.BestRead} fitness @param {string} unit */
@@ -84,51 +102,4 @@ function fitnessParts(fitness, unit) {
   const by = "name" in fitness ? `${titleOf(fitness)}: ` : "";
   const title = `${by}mean of ${fitness.n} after ${evaluationsText(fitness)}`;
   return h("span", { title }, fixed(fitness.mean), h("span", { class: "unit" }, ` ${unit}`), h("small", { class: "at" }, ` at ${fitness.evaluations}${fromBefore(fitness.known)}`));
-}
-
-/**
- * Return the bar that leads to the comparison of what is ticked.
- * @param {() => void} cleared called when the bar has unticked all
- * @returns {Page.Updatable}
- */
-export function selectionBar(cleared) {
-  const text = h("span", { role: "status" });
-  const compare = h("a", { class: "button" }, "Compare");
-  const clear = () => {
-    ticked.clear();
-    update();
-    cleared();
-  };
-  const element = h("div", { class: "selection", role: "region", "aria-label": "Selected experiments", hidden: true }, text, compare,
-    h("button", { type: "button", class: "quiet", onclick: clear }, "Clear"));
-  const update = () => {
-    element.hidden = ticked.size === 0;
-    text.textContent = ticked.size ? `${ticked.size} selected` : "";
-    compare.href = `#/compare?experiments=${[...ticked].join(",")}`;
-  };
-  update();
-  return { element, update };
-}
-
-/**
- * Return a box that ticks several experiments; it is half ticked while only some of them are.
- * @param {string} label
- * @param {() => void} changed
- * @returns {Page.Updatable<string[]>}
- */
-function tickBox(label, changed) {
-  /** @type {string[]} */
-  let ids = [];
-  const tick = () => {
-    for (const id of ids) ticked[box.checked ? "add" : "delete"](id);
-    changed();
-  };
-  const box = h("input", { type: "checkbox", "aria-label": label, onchange: tick });
-  const update = (/** @type {string[]} */ newIds) => {
-    ids = newIds;
-    const tickedCount = ids.filter((id) => ticked.has(id)).length;
-    box.checked = ids.length > 0 && tickedCount === ids.length;
-    box.indeterminate = tickedCount > 0 && tickedCount < ids.length;
-  };
-  return { element: box, update };
 }

@@ -4,6 +4,7 @@
 import { h, select, setText } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
 
+/** @typedef {import("../new.js").Form} Form */
 /** @typedef {() => string | null} Pointer where a value stands in the spec now; null if it is not in it */
 /** @typedef {{ pointer: Pointer, element: Element, room: HTMLElement }} Place */
 /** @typedef {{ pointer: string, message: string }} FieldError */
@@ -38,7 +39,10 @@ export class ErrorPlaces {
       const messages = errors.filter((_, error) => nearest[error] === index).map(({ message }) => message);
       const rest = messages.length - MOST_MESSAGES;
       setText(room, [...messages.slice(0, MOST_MESSAGES), ...(rest > 0 ? [`and ${rest} more errors`] : [])].join(" "));
-      if (messages.length) element.setAttribute("aria-invalid", "true");
+      if (messages.length) {
+        element.setAttribute("aria-invalid", "true");
+        for (let around = element.closest("details"); around; around = around.parentElement?.closest("details") ?? null) around.open = true;
+      }
       else element.removeAttribute("aria-invalid");
     });
     return errors.filter((_, error) => nearest[error] === -1);
@@ -123,4 +127,37 @@ export function optionFields(plugin, options, pointer, { places, changed }) {
     return field({ label, hint: schema.description, value: options[name], set, places, choices, pointer: optionPointer, ...attributes });
   });
   return fields.length ? h("div", { class: "fields" }, ...fields) : null;
+}
+
+/** Return what can be unfolded; it stays so while the form is made again. @type {(id: string, title: Page.Child, content: Page.Child[], open?: boolean) => HTMLElement} */
+export const folded = (id, title, content, open = false) => h("details", { open, dataset: { id } }, h("summary", {}, title), ...content);
+
+/**
+ * Return a list of plug-ins to choose from, and the options of the chosen one. Unavailable plug-ins say why, and how to get them.
+ * @param {Form} form
+ * @param {string} label
+ * @param {Page.PluginDraft} draft
+ * @param {Api.PluginRead[]} plugins
+ * @param {string} pointer
+ * @param {string | null} [none] label of the choice of none
+ */
+export function pluginField(form, label, draft, plugins, pointer, none = null) {
+  const chosen = plugins.find(({ name }) => name === draft.name);
+  /** @type {Page.Choices} */
+  const choices = plugins.map(({ name, available }) => [name, `${readableName(name)}${available ? "" : ": not available"}`, !available]);
+  const set = (/** @type {string} */ name) => {
+    Object.assign(draft, { name, options: {} });
+    form.remake();
+  };
+  const options = optionFields(chosen, draft.options, () => pointer, form);
+  return [
+    field({ label, hint: chosen?.summary, value: draft.name, set, pointer, places: form.places, choices: none === null ? choices : [["", none], ...choices] }),
+    ...plugins.map(whyUnavailable),
+    options ? folded(pointer, `Options of ${readableName(draft.name)}`, [options], Object.keys(draft.options).length > 0) : null];
+}
+
+/** Return why a plug-in is unavailable; null if it is not. @param {Api.PluginRead | undefined} plugin */
+export function whyUnavailable(plugin) {
+  return plugin === undefined || plugin.available ? null
+    : h("p", { class: "note" }, `${readableName(plugin.name)} is not available: `, h("code", {}, plugin.note));
 }

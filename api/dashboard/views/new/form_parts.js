@@ -5,44 +5,109 @@ import { h } from "../../lib/dom.js";
 import { count, readableName } from "../../lib/format.js";
 import { robotPicture } from "../../lib/robot_picture.js";
 import { EVALUATIONS, addTunable, plainName, ticked } from "./draft.js";
-import { errorRoom, field, numberField, optionFields, tickField } from "./fields.js";
+import { errorRoom, field, folded, numberField, optionFields, pluginField, tickField, whyUnavailable } from "./fields.js";
+import { rareReality, realityFields } from "./reality_part.js";
 
 /** @typedef {import("../new.js").Form} Form */
 
-/** @param {string} title @param {...Page.Child} content */
-export const part = (title, ...content) => h("fieldset", { class: "part" }, h("legend", {}, title), ...content);
+/** Return one of the steps of the form. @param {string} title @param {...Page.Child} content */
+const step = (title, ...content) => h("fieldset", { class: "part" }, h("legend", {}, title), ...content);
 
-/** Return the name, the sizes and the schedule of the study. @param {Form} form */
-export function studyPart(form) {
-  const { draft, places, catalogue } = form;
-  const preset = catalogue.budgets.find(({ name }) => name === draft.budget.preset);
+/** Return what is rarely needed of a step. @param {string} id @param {...Page.Child} content */
+const advanced = (id, ...content) => h("div", { class: "advanced" }, folded(id, "Advanced", content));
+
+/** @param {...Page.Child[]} columns */
+const columns = (...columns) => h("div", { class: "columns" }, ...columns.map((column) => h("div", {}, ...column)));
+
+/** Return the first step: the robot, what simulates it, and what reality is. @param {Form} form */
+export function robotStep(form) {
+  const { draft, catalogue } = form;
+  const robot = catalogue.robots.find(({ name }) => name === draft.robot.name);
+  const ownOf = (/** @type {any} */ { name }) => `The robot’s own: ${readableName(name)}`;
+  const robotEngine = `The robot’s own${robot ? `: ${readableName(String(robot.details.engine))}` : ""}`;
+  return step("1. The robot",
+    columns(
+      [pluginField(form, "Robot", draft.robot, catalogue.robots, "/robot"), robotPicture(robot, form.signal)],
+      [pluginField(form, "Engine of the simulators", draft.engine, catalogue.engines, "/engine", robotEngine), ...realityFields(form)]),
+    advanced("robot", columns(
+      robot?.details.controller ? [
+        pluginField(form, "Controller", draft.controller, catalogue.controllers ?? [], "/controller", ownOf(robot.details.controller)),
+        pluginField(form, "Task", draft.task, catalogue.tasks ?? [], "/task", ownOf(robot.details.task))] : [],
+      rareReality(form))));
+}
+
+/** Return the second step: what is compared and tuned, and how it searches. @param {Form} form */
+export function searchStep(form) {
+  const { draft, catalogue, places } = form;
+  const isLean = catalogue.budgets.some(({ name, lean }) => lean && name === draft.budget.preset);
+  return step("2. What is compared and tuned",
+    columns(strategies(form), tunables(form)),
+    advanced("search", columns(
+      [pluginField(form, "Tuner", draft.tuner, catalogue.tuners, "/tuner"),
+        pluginField(form, "Tuning minimises", draft.discrepancy, catalogue.discrepancies, "/discrepancy"),
+        numberField({ label: "Share of samples held out", hint: "no tuning sees them, simulators are tested on them; 0.2: each fifth", value: draft.held_out, set: form.setter(draft, "held_out"), pointer: "/held_out", places, placeholder: "0" })],
+      [pluginField(form, "Optimizer", draft.optimizer, catalogue.optimizers, "/optimizer"),
+        pluginField(form, "Optimizer of controllers", draft.controllerOptimizer, catalogue.optimizers, "/controller_optimizer", isLean ? "That of the lean budget" : "The same")])));
+}
+
+const SEARCHES = ["Search for the transferred controller", "Search for the next sample", "Search for a simulator"];
+
+/** Return the third step: how much is computed, and the name of the study. @param {Form} form */
+export function sizeStep(form) {
+  const { draft, draft: { budget }, places, catalogue: { budgets } } = form;
+  const preset = /** @type {Record<string, any> | undefined} */ (budgets.find(({ name }) => name === budget.preset));
   /** @type {(name: string, label: string, hint: string, placeholder?: string) => HTMLElement} */
   const countField = (name, label, hint, placeholder = "") =>
     numberField({ label, hint, value: draft[name], set: form.setter(draft, name), pointer: `/${name}`, places, placeholder });
-  return part("Study",
-    field({ label: "Name", value: draft.name, set: form.setter(draft, "name"), pointer: "/name", places, maxlength: 200, placeholder: "study" }),
+  const set = (/** @type {string} */ name) => {
+    budget.preset = name;
+    form.remake();
+  };
+  const searches = EVALUATIONS.map((name, index) => numberField({
+    label: SEARCHES[index], hint: "evaluations", placeholder: count(preset?.[name]), value: budget[name],
+    set: form.setter(budget, name), places, pointer: `/budget/${name}`,
+  }));
+  return step("3. Size",
     h("div", { class: "fields" },
+      field({ label: "Name", value: draft.name, set: form.setter(draft, "name"), pointer: "/name", places, maxlength: 200, placeholder: "study" }),
+      field({ label: "Budget", hint: "how long each search is", value: budget.preset, set, pointer: "/budget", places, choices: budgets.map(({ name }) => [name, readableName(name)]) }),
       countField("iterations", "Iterations", "real-world evaluations of a repetition", preset && count(preset.iterations)),
       countField("repetitions", "Repetitions", "of each strategy", preset && count(preset.repetitions)),
-      countField("direct_repetitions", "Repetitions of the direct baseline", "", "as the strategies"),
-      countField("seed", "Seed", "the same seed gives the same numbers", "0"),
-      countField("priority", "Priority", "−10 to 10; the highest is computed first", "0"),
-      countField("max_parallel", "Repetitions at once", "of an experiment", "any number"),
-      countField("held_out", "Share of samples held out", "no tuning sees them, simulators are tested on them; 0.2: each fifth", "0")));
+      countField("seed", "Seed", "the same seed gives the same numbers", "0")),
+    advanced("size",
+      h("div", { class: "fields" }, ...searches,
+        countField("direct_repetitions", "Repetitions of the direct baseline", "", "as the strategies"),
+        countField("priority", "Priority", "−10 to 10; the highest is computed first", "0"),
+        countField("max_parallel", "Repetitions at once", "of an experiment", "any number")),
+      tickField("Reuse the transferred controller as the next sample, where a strategy would only search for it again. This saves rollouts, but makes comparisons unfair: other strategies select from a search of their own",
+        budget.reuse_transfer, form.setter(budget, "reuse_transfer")).element));
 }
 
 /** Return the strategies that are compared, each with its options; one can be there several times. @param {Form} form */
-export function strategiesPart(form) {
+function strategies(form) {
   const { draft, places } = form;
   const room = errorRoom();
-  const list = h("div", { class: "strategies" }, ...draft.strategies.map((strategy) => strategyField(form, strategy)));
+  const list = inTwo(draft.strategies, "strategies", (strategy) => strategyField(form, strategy));
   places.add(() => "/strategies", list, room);
   const tickAll = (/** @type {boolean} */ on) => () => {
     for (const strategy of draft.strategies) strategy.on = on;
     form.remake();
   };
-  return part("Strategies", h("p", { class: "note" }, "One experiment each, all else equal. ",
-    linkButton("All", tickAll(true)), " ", linkButton("None", tickAll(false))), room, list);
+  return [h("h3", {}, "Strategies"), h("p", { class: "note" }, "One experiment each, all else equal. ",
+    linkButton("All", tickAll(true)), " ", linkButton("None", tickAll(false))), room, list];
+}
+
+/**
+ * Return the fields of what is ticked, and behind them, folded, the others.
+ *
+ * @template {{ on?: boolean }} Ticked
+ * @param {Ticked[]} all
+ * @param {string} what they are
+ * @param {(one: Ticked) => HTMLElement} make
+ */
+function inTwo(all, what, make) {
+  const others = all.filter(({ on }) => !on);
+  return h("div", { class: what }, ...ticked(all).map(make), others.length ? folded(what, `${count(others.length)} more ${what}`, others.map(make), !ticked(all).length) : null);
 }
 
 /** @param {string} label @param {() => void} press */
@@ -71,72 +136,21 @@ function strategyField(form, strategy) {
   box.disabled = !strategy.on && plugin?.available === false;
   places.add(pointer, box, room);
   const open = Object.keys(strategy.options).length > 0;
-  const more = options && strategy.on ? h("details", { open }, h("summary", {}, "Options"), options, h("p", {}, add, " ", remove)) : null;
+  const more = options && strategy.on ? folded(String(pointer()), "Options", [options, h("p", {}, add, " ", remove)], open) : null;
   return h("div", { class: "strategy" }, element, whyUnavailable(plugin), room, more);
 }
 
-/** Return the robot, the engine of the simulators, the optimizer, and how simulators are tuned. @param {Form} form */
-export function simulationPart(form) {
-  const { draft, catalogue } = form;
-  const robot = catalogue.robots.find(({ name }) => name === draft.robot.name);
-  const isLean = catalogue.budgets.some(({ name, lean }) => lean && name === draft.budget.preset);
-  const ownOf = (/** @type {any} */ { name }) => `The robot’s own: ${readableName(name)}`;
-  const robotEngine = `The robot’s own${robot ? `: ${robot.details.engine}` : ""}`;
-  return part("Simulation",
-    pluginField(form, "Robot", draft.robot, catalogue.robots, "/robot"),
-    robotPicture(robot, form.signal),
-    ...(robot?.details.controller ? [
-      pluginField(form, "Controller", draft.controller, catalogue.controllers ?? [], "/controller", ownOf(robot.details.controller)),
-      pluginField(form, "Task", draft.task, catalogue.tasks ?? [], "/task", ownOf(robot.details.task))] : []),
-    pluginField(form, "Engine of the simulators", draft.engine, catalogue.engines, "/engine", robotEngine),
-    pluginField(form, "Optimizer", draft.optimizer, catalogue.optimizers, "/optimizer"),
-    pluginField(form, "Optimizer of controllers", draft.controllerOptimizer, catalogue.optimizers, "/controller_optimizer", isLean ? "That of the lean budget" : "The same"),
-    pluginField(form, "Tuner", draft.tuner, catalogue.tuners, "/tuner"),
-    pluginField(form, "Tuning minimises", draft.discrepancy, catalogue.discrepancies, "/discrepancy"));
-}
-
-/**
- * Return a list of plug-ins to choose from, and the options of the chosen one. Unavailable plug-ins say why, and how to get them.
- * @param {Form} form
- * @param {string} label
- * @param {Page.PluginDraft} draft
- * @param {Api.PluginRead[]} plugins
- * @param {string} pointer
- * @param {string | null} [none] label of the choice of none
- */
-export function pluginField(form, label, draft, plugins, pointer, none = null) {
-  const chosen = plugins.find(({ name }) => name === draft.name);
-  /** @type {Page.Choices} */
-  const choices = plugins.map(({ name, available }) => [name, `${readableName(name)}${available ? "" : ": not available"}`, !available]);
-  const set = (/** @type {string} */ name) => {
-    Object.assign(draft, { name, options: {} });
-    form.remake();
-  };
-  const options = optionFields(chosen, draft.options, () => pointer, form);
-  return [
-    field({ label, hint: chosen?.summary, value: draft.name, set, pointer, places: form.places, choices: none === null ? choices : [["", none], ...choices] }),
-    ...plugins.map(whyUnavailable),
-    options ? h("details", { open: Object.keys(draft.options).length > 0 }, h("summary", {}, `Options of ${readableName(draft.name)}`), options) : null];
-}
-
-/** Return why a plug-in is unavailable; null if it is not. @param {Api.PluginRead | undefined} plugin */
-function whyUnavailable(plugin) {
-  return plugin === undefined || plugin.available ? null
-    : h("p", { class: "note" }, `${readableName(plugin.name)} is not available: `, h("code", {}, plugin.note));
-}
-
 /** Return what is tuned, and between which bounds. @param {Form} form */
-export function tunablesPart(form) {
+function tunables(form) {
   const room = errorRoom();
-  const list = h("div", {}, ...form.draft.tunables.map((tunable) => tunableField(form, tunable)));
+  const list = inTwo(form.draft.tunables, "tunables", (tunable) => tunableField(form, tunable));
   form.places.add(() => "/tunables", list, room);
   const label = h("input", { type: "text", placeholder: "mass(trunk)", maxlength: 100, "aria-label": "Tunable of a part of the robot" });
   const add = () => {
     addTunable(form.draft, label.value);
     form.remake();
   };
-  return part("What is tuned", room, list,
-    h("p", { class: "note" }, "Of a part of the robot, by pattern: ", label, " ", linkButton("Add", add)));
+  return [h("h3", {}, "Tunables"), room, list, h("p", { class: "note" }, "Of a part of the robot, by pattern: ", label, " ", linkButton("Add", add))];
 }
 
 /** @param {Form} form @param {Page.TunableDraft} tunable */
@@ -160,27 +174,4 @@ function tunableField(form, tunable) {
   const unit = plugin?.details.unit === "1" ? "" : plugin?.details.unit;
   const bounds = on ? h("div", { class: "bounds" }, bound("lower", "From"), bound("upper", "To"), h("span", { class: "note" }, unit)) : null;
   return h("div", { class: "tunable" }, element, whyUnavailable(plugin), bounds, room);
-}
-
-const SEARCHES = ["Search for the transferred controller", "Search for the next sample", "Search for a simulator"];
-
-/** Return how much is computed. @param {Form} form */
-export function budgetPart(form) {
-  const { draft: { budget }, places, catalogue: { budgets } } = form;
-  const preset = /** @type {Record<string, any> | undefined} */ (budgets.find(({ name }) => name === budget.preset));
-  /** @type {Page.Choices} */
-  const choices = budgets.map(({ name }) => [name, readableName(name)]);
-  const set = (/** @type {string} */ name) => {
-    budget.preset = name;
-    form.remake();
-  };
-  const numbers = EVALUATIONS.map((name, index) => numberField({
-    label: SEARCHES[index], hint: "evaluations", placeholder: count(preset?.[name]), value: budget[name],
-    set: form.setter(budget, name), places, pointer: `/budget/${name}`,
-  }));
-  return part("Budget",
-    field({ label: "Preset", value: budget.preset, set, pointer: "/budget", places, choices }),
-    h("div", { class: "fields" }, ...numbers),
-    tickField("Reuse the transferred controller as the next sample, where a strategy would only search for it again. This saves rollouts, but makes comparisons unfair: other strategies select from a search of their own",
-      budget.reuse_transfer, form.setter(budget, "reuse_transfer")).element);
 }

@@ -1,5 +1,5 @@
 // @ts-check
-/** The panel beside the form: what the study costs, the button, and the spec to copy in every form. */
+/** Beside the form, or below it on a phone: what the study costs and the button, always in view, and the spec to copy in every form. */
 
 import { copyButton } from "../../lib/copy.js";
 import { h } from "../../lib/dom.js";
@@ -21,9 +21,11 @@ export function panel() {
     h("div", {}, copyButton("Copy", () => code[name].textContent), framed(`The spec as ${name}`, h("pre", {}, code[name])));
   const forms = tabs("The spec", [
     ["json", "JSON", snippet("json")], ["curl", "curl", snippet("curl")], ["python", "Python", snippet("python")]], "json", () => {});
-  const element = h("aside", { class: "panel card", "aria-label": "Cost and spec" }, h("h2", {}, "What it costs"), cost, errorList, button, forms);
+  const breakdown = h("div", { class: "cost" });
   return {
-    element,
+    element: h("aside", { class: "side", "aria-label": "Cost and spec" },
+      h("div", { class: "panel card" }, h("h2", {}, "What it costs"), h("div", { class: "submission" }, cost, button), errorList),
+      h("div", { class: "panel-more card" }, breakdown, forms)),
     /** @param {Record<string, any>} spec */
     showSpec(spec) {
       const base = new URL(".", location.href).href;
@@ -33,7 +35,10 @@ export function panel() {
       code.python.textContent = pythonLines(base, json);
     },
     /** @param {Api.EstimateRead} estimate */
-    showCost: (estimate) => cost.replaceChildren(...costBlocks(estimate)),
+    showCost(estimate) {
+      cost.replaceChildren(...costBlocks(estimate));
+      breakdown.replaceChildren(...costDetails(estimate));
+    },
     /**
      * Show errors that have no place in the form, and words instead of the cost.
      * @param {{ pointer: string, message: string }[]} errors
@@ -69,18 +74,23 @@ export function pythonLines(base, json) {
 }
 
 /** @param {Api.EstimateRead} estimate */
-function costBlocks({ rollouts, seconds, cores, core_seconds: coreSeconds, engines, experiments, supervisors }) {
-  const time = h("p", { class: "big" }, h("strong", {}, duration(seconds)), ` on ${count(cores)} ${cores === 1 ? "core" : "cores"}`);
+function costBlocks({ rollouts, seconds, cores, experiments }) {
   const runs = experiments.reduce((sum, each) => sum + each.runs, 0);
   const real = runs ? [h("p", { class: "big" }, h("strong", {}, `${count(runs)} ${runs === 1 ? "run" : "runs"}`), " of the real robot")] : [];
-  const work = h("p", {}, `${count(rollouts)} rollouts at most: ${duration(coreSeconds)} of one core, if nothing else is waiting.`);
+  return [...real,
+    h("p", { class: "big" }, h("strong", {}, duration(seconds)), ` on ${count(cores)} ${cores === 1 ? "core" : "cores"}`),
+    h("p", {}, `${count(rollouts)} rollouts at most`)];
+}
+
+/** @param {Api.EstimateRead} estimate */
+function costDetails({ core_seconds: coreSeconds, engines, experiments, supervisors }) {
   const paces = engines.map(({ engine, seconds_per_rollout: pace, measured }) =>
     h("p", { class: "note" }, `${readableName(engine)}: ${milliseconds(pace)} a rollout, ${measured ? "measured here" : "the usual time; not measured here yet"}.`));
-  const waiting = supervisors ? [] : [h("p", { class: "remark" }, NO_WORKERS)];
   const rows = experiments.map((experiment) => [titleOf(experiment),
     `${count(experiment.repetitions)} ×`, count(experiment.rollouts), duration(experiment.core_seconds)]);
   const costs = table("Cost of each experiment", ["Experiment", "Repetitions", "Rollouts", "One core"], rows);
-  return [...real, time, work, ...waiting, ...paces, h("details", {}, h("summary", {}, "By experiment"), costs)];
+  return [...(supervisors ? [] : [h("p", { class: "remark" }, NO_WORKERS)]), h("p", { class: "note" }, `${duration(coreSeconds)} of one core, if nothing else is waiting.`), ...paces,
+    h("details", {}, h("summary", {}, "By experiment"), costs)];
 }
 
 /** @param {number} seconds */

@@ -7,8 +7,7 @@ import { count, readableName } from "../../lib/format.js";
 import { stringify } from "../../lib/json.js";
 import { table } from "../../lib/table.js";
 import { LIMITS, plainName, pluginName } from "./draft.js";
-import { errorRoom, field, numberField } from "./fields.js";
-import { part, pluginField } from "./form_parts.js";
+import { errorRoom, field, folded, numberField, pluginField } from "./fields.js";
 
 /** @typedef {import("../new.js").Form} Form */
 
@@ -26,8 +25,8 @@ const LIMIT_WORDS = {
   tilt: ["Tilt of the base at most", "rad"], height: ["Height of the base at least", "m"],
 };
 
-/** Return what reality is. @param {Form} form */
-export function realityPart(form) {
+/** Return the fields that say what reality is. @param {Form} form */
+export function realityFields(form) {
   const { draft: { bench, strategies }, places, catalogue } = form;
   const set = (/** @type {string} */ kind) => {
     bench.isPhysical = kind === "physical";
@@ -36,10 +35,14 @@ export function realityPart(form) {
     if (bench.isPhysical) for (const strategy of strategies) strategy.on = strategy === one;
     form.remake();
   };
-  return part("Reality",
-    field({ label: "Kind", value: bench.isPhysical ? "physical" : "simulated", set, pointer: "/reality/kind", places, choices: KINDS }),
-    ...(bench.isPhysical ? physical(form) : simulated(form)));
+  return [
+    field({ label: "Reality", value: bench.isPhysical ? "physical" : "simulated", set, pointer: "/reality/kind", places, choices: KINDS,
+      hint: bench.isPhysical ? "" : "its parameters are hidden from the strategies, and from everybody until the study has ended" }),
+    ...(bench.isPhysical ? physical(form) : [])];
 }
+
+/** Return the fields of reality that are rarely needed. @param {Form} form */
+export const rareReality = (form) => (form.draft.bench.isPhysical ? limits(form) : simulated(form));
 
 /** Return the engine and the hidden parameters of a simulated reality. @param {Form} form */
 function simulated(form) {
@@ -52,29 +55,32 @@ function simulated(form) {
       pointer: `/reality/parameters/${name}`, hint: name.includes("=") ? "" : `${plugin.details.least} to ${plugin.details.greatest}` })] : [];
   });
   return [
-    h("p", { class: "note" }, "Hidden from the strategies, and from everybody until the study has ended."),
     pluginField(form, "Engine of reality", realityEngine, catalogue.engines, "/reality/engine", "The engine of the simulators"),
-    h("div", { class: "fields" }, ...fields), probesField(form, "each")];
+    h("p", { class: "note" }, "Hidden parameters of reality"), h("div", { class: "fields" }, ...fields), probesField(form, "each")];
 }
 
-/** Return what is measured on a bench, what is known already, and the limits of the robot. @param {Form} form */
+/** Return what is measured on a bench, and what is known already. @param {Form} form */
 function physical(form) {
   const { draft: { bench, robot }, places } = form;
-  const limits = LIMITS.map((name) => numberField({
-    label: LIMIT_WORDS[name][0], hint: LIMIT_WORDS[name][1], value: bench.limits[name], set: form.setter(bench.limits, name),
-    pointer: `/reality/limits/${name}`, places, placeholder: "not checked" }));
-  const isOpen = Object.values(bench.limits).some((value) => value !== "") || bench.beyond !== "";
   return [
     h("p", { class: "note" }, "Measurements are requested on the page “Bench”, and repetitions wait for them, for a year if need be. Each strategy needs runs of its own, so one is ticked."),
     field({ label: "Name of the bench", hint: "one measurement is taken at a time on it", value: bench.bench, set: form.setter(bench, "bench"), pointer: "/reality/bench", places, maxlength: 200, placeholder: robot.name }),
     numberField({ label: "Repeats of each measurement", hint: "their mean is the fitness, their spread the noise", value: bench.repeats, set: form.setter(bench, "repeats"), pointer: "/reality/repeats", places, placeholder: "1" }),
+    samplesField(form)];
+}
+
+/** Return when the transferred controller is measured, and the limits of the robot. @param {Form} form */
+function limits(form) {
+  const { draft: { bench }, places } = form;
+  const fields = LIMITS.map((name) => numberField({
+    label: LIMIT_WORDS[name][0], hint: LIMIT_WORDS[name][1], value: bench.limits[name], set: form.setter(bench.limits, name),
+    pointer: `/reality/limits/${name}`, places, placeholder: "not checked" }));
+  return [
     probesField(form, "last"),
-    samplesField(form),
-    h("details", { open: isOpen }, h("summary", {}, "Limits of the robot"),
-      h("p", { class: "note" }, "Before a controller is offered, the simulators forecast whether it keeps them."),
-      h("div", { class: "fields" }, ...limits),
-      field({ label: "Beyond them", value: bench.beyond, set: form.setter(bench, "beyond"), pointer: "/reality/beyond", places,
-        choices: [["", "offer it with a warning"], ["refuse", "refuse it: it counts as failed"]] }))];
+    h("p", { class: "note" }, "Limits of the robot: before a controller is offered, the simulators forecast whether it keeps them."),
+    h("div", { class: "fields" }, ...fields),
+    field({ label: "Beyond them", value: bench.beyond, set: form.setter(bench, "beyond"), pointer: "/reality/beyond", places,
+      choices: [["", "offer it with a warning"], ["refuse", "refuse it: it counts as failed"]] })];
 }
 
 /** @param {Form} form @param {string} usual */
@@ -127,10 +133,10 @@ function samplesField(form) {
   });
   showKept();
   places.add(() => (bench.isPhysical ? "/reality/samples" : null), area, room);
-  return h("details", { class: "paste", open: bench.samples.length > 0 }, h("summary", {}, "Samples that were measured before"),
+  return h("div", { class: "paste" }, folded("samples", "Samples that were measured before", [
     h("label", { for: "samples" }, "Table as CSV"), area,
     h("small", { id: "samples-hint", class: "note" }, hintOf(genes)), h("p", {}, file),
-    h("button", { type: "button", class: "quiet", onclick: () => check(area.value) }, "Check and use the table"), room, told);
+    h("button", { type: "button", class: "quiet", onclick: () => check(area.value) }, "Check and use the table"), room, told], bench.samples.length > 0));
 }
 
 /** Return the columns that a table needs. @param {number} genes */

@@ -3,7 +3,7 @@
 
 import { getTagged, patch, post, Problem, put, remove } from "../../lib/api.js";
 import { confirmingCost, openDialog } from "../../lib/dialog.js";
-import { button, h, setText, tellingErrors } from "../../lib/dom.js";
+import { h, setText, tellingErrors } from "../../lib/dom.js";
 import { count } from "../../lib/format.js";
 import { stringify } from "../../lib/json.js";
 import { ENDED } from "../../lib/state_badge.js";
@@ -50,33 +50,78 @@ export function refusal(action, study) {
     : `An experiment that is ${state.toLowerCase()} cannot be ${participle}, only one that is ${only}.`;
 }
 
+/** Return the action that a person most likely wants now; null if that is to look at results, or to measure. @param {Api.StudyRead} study @returns {Action | null} */
+export function primary(study) {
+  if (study.state === "WAITING") return null;
+  const permitted = /** @type {Action[]} */ (["resume", "pause"]).find((action) => PERMITTED[action].includes(study.state));
+  return permitted ?? (study.state === "FAILED" && !refusal("retry", study) ? "retry" : null);
+}
+
+/** Return the view of a study's results: the comparison, or of one experiment its motion or its function. @param {Page.StudyPage} page */
+function resultsLink({ study, isFunction }) {
+  const [{ id }, ...others] = study.experiments;
+  const [label, href] = others.length ? ["Compare its experiments", compared(study)]
+    : isFunction ? ["Step through the function", `#/toy?experiment=${id}`] : ["Replay a controller", `#/replay?experiment=${id}`];
+  return h("a", { href }, label);
+}
+
+/** Return the address of the comparison of a study's experiments. @param {Pick<Api.StudyRead, "experiments">} study */
+export const compared = ({ experiments }) => `#/compare?experiments=${experiments.map(({ id }) => id).join(",")}`;
+
 /**
- * Return the buttons of the actions, which are updated when `page.study` has changed. One that is refused can still be reached.
+ * Return the one action that is most likely wanted, the way to the results, and all other actions behind a button; they are updated when `page.study` has changed.
+ * One that is refused can still be reached, and says why. Archiving and deleting wait until everything has ended. One experiment
+ * among others has a name of its own, and its study has the rest.
  * @param {Page.StudyPage} page
  * @returns {Page.Updatable}
  */
 export function actions(page) {
   const message = h("p", { class: "outcome", role: "status" });
   const telling = tellingErrors(message);
+  const isOne = isAmongOthers(page.study);
+  const hasEnded = () => page.study.experiments.every(({ state }) => ENDED.includes(state));
   /** @type {Record<string, (action: Action) => unknown>} */
   const asking = { stop: () => stop(page), cancel: () => cancel(page), extend: () => extend(page) };
-  const buttons = ACTIONS.map(([action, label]) => {
-    const press = telling(() => {
-      const reason = refusal(action, page.study);
-      if (reason) throw new Error(reason);
-      return (asking[action] ?? ((name) => send(page, name)))(action);
+  const buttonOf = (/** @type {string} */ label, /** @type {() => unknown} */ act) => h("button", { type: "button", class: "quiet", onclick: telling(act) }, label);
+  /** @type {(label: string, participle: string, act: () => unknown) => HTMLButtonElement} */
+  const whenEnded = (label, participle, act) => buttonOf(label, () => {
+    if (!hasEnded()) throw new Error(`Only what has ended can be ${participle}: stop or cancel it first.`);
+    return act();
+  });
+  const verbs = ACTIONS.map(([action, label]) => buttonOf(label, () => {
+    const reason = refusal(action, page.study);
+    if (reason) throw new Error(reason);
+    return (asking[action] ?? ((name) => send(page, name)))(action);
+  }));
+  const [archiving, deleting] = [whenEnded("", "archived", () => archive(page)), whenEnded("Delete…", "deleted", () => askToDelete(page))];
+  const others = [
+    ...verbs, buttonOf("Change schedule…", () => { schedule(page); }), buttonOf(isOne ? "Edit name" : "Edit name, notes and tags", () => { edit(page); }),
+    buttonOf("New from this", () => again(page)), ...(isOne ? [] : [archiving, buttonOf("Notify…", () => { askWhomToTell(page); })]), deleting];
+  const link = resultsLink(page);
+  const more = h("button", { type: "button", class: "quiet", "aria-expanded": "false", onclick: () => {
+    more.setAttribute("aria-expanded", String(more.getAttribute("aria-expanded") === "false"));
+    update();
+  } });
+  const update = () => {
+    const wanted = primary(page.study);
+    const isOpen = more.getAttribute("aria-expanded") === "true";
+    verbs.forEach((each, index) => {
+      const reason = refusal(ACTIONS[index][0], page.study);
+      each.setAttribute("aria-disabled", String(Boolean(reason)));
+      each.title = reason;
     });
-    return h("button", { type: "button", class: "quiet", dataset: { action }, onclick: press }, label);
-  });
-  const update = () => buttons.forEach((each, index) => {
-    const reason = refusal(ACTIONS[index][0], page.study);
-    each.setAttribute("aria-disabled", String(Boolean(reason)));
-    each.title = reason;
-  });
+    others.forEach((each, index) => {
+      const isWanted = ACTIONS[index]?.[0] === wanted;
+      each.hidden = !isWanted && !isOpen;
+      each.setAttribute("class", isWanted ? "" : "quiet");
+    });
+    setText(archiving, page.study.archived_at ? "Unarchive" : "Archive");
+    for (const one of [archiving, deleting]) one.setAttribute("aria-disabled", String(!hasEnded()));
+    setText(more, isOpen ? "Fewer actions" : "More actions…");
+    link.setAttribute("class", wanted || page.study.state === "WAITING" ? "button quiet" : "button");
+  };
   update();
-  const group = h("div", { role: "group", "aria-label": "Actions" }, ...buttons,
-    h("button", { type: "button", class: "quiet", onclick: telling(() => { schedule(page); }) }, "Change schedule…"));
-  return { element: h("div", { class: "life-cycle" }, group, message), update };
+  return { element: h("div", { class: "life-cycle" }, h("div", { role: "group", "aria-label": "Actions" }, ...others, link, more), message), update };
 }
 
 /** @param {Page.StudyPage} page @param {Action} action @param {unknown} [body] */
@@ -155,15 +200,17 @@ function schedule(page) {
   }, page.signal);
 }
 
-/** Return the button that edits, and the one that opens the form with the same spec. @param {Page.StudyPage} page */
-export function editing(page) {
-  const failure = h("span", { role: "alert", class: "failed" });
-  const again = async () => {
-    const { spec, remarks } = (await getTagged(`/studies/${page.id}/spec`)).value;  // the seed keeps all its digits
-    if (!spec) throw new Error(remarks.join("; "));
-    location.hash = `#/new?${new URLSearchParams({ spec: stringify(spec), ...(remarks.length ? { note: remarks.join("; ") } : {}) })}`;
-  };
-  return [button(isAmongOthers(page.study) ? "Edit name" : "Edit name, notes and tags", () => { edit(page); }), button("New from this", tellingErrors(failure)(again)), failure];
+/** Open the form with the same spec. @param {Page.StudyPage} page */
+async function again({ id }) {
+  const { spec, remarks } = (await getTagged(`/studies/${id}/spec`)).value;  // the seed keeps all its digits
+  if (!spec) throw new Error(remarks.join("; "));
+  location.hash = `#/new?${new URLSearchParams({ spec: stringify(spec), ...(remarks.length ? { note: remarks.join("; ") } : {}) })}`;
+}
+
+/** @param {Page.StudyPage} page */
+async function archive({ id, study, reload }) {
+  await post(`/studies/${id}/${study.archived_at ? "unarchive" : "archive"}`);
+  await reload();
 }
 
 /**
@@ -201,35 +248,6 @@ function edit(page) {
     action: "Save",
     act,
   }, page.signal);
-}
-
-/**
- * Return the buttons that archive, delete and notify; archiving and deleting wait until everything has ended. One experiment among others
- * is only deleted.
- * @param {Page.StudyPage} page
- * @returns {Page.Updatable}
- */
-export function keeping(page) {
-  const message = h("p", { class: "outcome", role: "status" });
-  const telling = tellingErrors(message);
-  const hasEnded = () => page.study.experiments.every(({ state }) => ENDED.includes(state));
-  const whenEnded = (/** @type {string} */ participle, /** @type {() => unknown} */ act) => telling(() => {
-    if (!hasEnded()) throw new Error(`Only what has ended can be ${participle}: stop or cancel it first.`);
-    return act();
-  });
-  const archive = async () => {
-    await post(`/studies/${page.id}/${page.study.archived_at ? "unarchive" : "archive"}`);
-    await page.reload();
-  };
-  const [archiving, deleting] = [button("", whenEnded("archived", archive)), button("Delete…", whenEnded("deleted", () => askToDelete(page)))];
-  const update = () => {
-    setText(archiving, page.study.archived_at ? "Unarchive" : "Archive");
-    for (const one of [archiving, deleting]) one.setAttribute("aria-disabled", String(!hasEnded()));
-  };
-  update();
-  const group = h("div", { role: "group", "aria-label": "Keep" },
-    ...(isAmongOthers(page.study) ? [deleting] : [archiving, deleting, button("Notify…", telling(() => askWhomToTell(page)))]));
-  return { element: h("div", { class: "life-cycle keeping" }, group, message), update };
 }
 
 /** Delete it once the reader has typed its name. @param {Page.StudyPage} page */

@@ -3,16 +3,18 @@
 
 import { get } from "../../lib/api.js";
 import { requestWords, stateText } from "../../lib/bench/requests.js";
-import { h, refill, setText } from "../../lib/dom.js";
+import { h, refill, refillInPlace, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { age, count, evaluationsText, fixed, percent, readableName, timeBetween, titleOf } from "../../lib/format.js";
 import { notesBlock } from "../../lib/markdown.js";
 import { progressBar, timeLeft } from "../../lib/progress.js";
-import { isPhysical, worldsText } from "../../lib/robots.js";
+import { FIGURE_KINDS } from "../../lib/event_kinds.js";
+import { robotPicture } from "../../lib/robot_picture.js";
+import { isPhysical, robotName, worldsText } from "../../lib/robots.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { factItems } from "../../lib/table.js";
 import { tagList } from "../../lib/tags.js";
-import { actions, editing, isAmongOthers, keeping } from "./actions.js";
+import { actions, compared, isAmongOthers } from "./actions.js";
 import { BENCH_KINDS } from "./measurements.js";
 
 /** @typedef {import("../../lib/table.js").Fact} Fact */
@@ -27,7 +29,7 @@ export function head(page) {
   const notes = notesBlock(`/studies/${experiments[0].study}`, page.signal);
   const bar = progressBar("Progress");
   const [facts, remarks] = [h("dl", { class: "facts" }), h("div", { class: "remarks" })];
-  const buttons = [actions(page), keeping(page)];
+  const deeds = actions(page);
   const update = () => {
     const { study } = page;
     setText(title, titleOf({ name: study.name, strategy: study.experiments.length > 1 ? "" : study.experiments[0].strategy }));
@@ -36,20 +38,33 @@ export function head(page) {
     tags.update(study.tags);
     refill(state, `${study.state} ${study.caveat}`, () => stateBadge(study.state, study.caveat));
     bar.update(study.progress);
+    whole.hidden = ENDED.includes(study.state);
     const known = factsOf(page);
     refill(facts, JSON.stringify(known), () => factItems(known));
     const warnings = gathered(study, (experiment) => experiment.warnings);
     const reasons = gathered(study, (experiment) => experiment.reasons);
     refill(remarks, JSON.stringify([warnings, reasons]), () =>
       [remarkBlock("Warnings", "warned", warnings), remarkBlock("Why repetitions failed", "broken", reasons)]);
-    for (const each of buttons) each.update();
+    deeds.update();
   };
+  const whole = h("div", { class: "whole" }, bar.element);
   update();
-  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, tags.element, ...editing(page)),
-    experiments.length > 1 ? null : h("p", { class: "what" }, summary(experiments[0])), notes.element, h("div", { class: "whole" }, bar.element), facts,
-    experiments.length === 1 && isPhysical(experiments[0]) ? waitingRemark(page) : null, remarks,
-    h("div", { class: "deeds" }, ...buttons.map((each) => each.element)), links(page));
+  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, tags.element), verdict(page), deeds.element,
+    h("div", { class: "abstract" }, h("div", {}, whole, facts, notes.element), robotPicture(page.robot, page.signal)),
+    experiments.length === 1 && isPhysical(experiments[0]) ? waitingRemark(page) : null, remarks, links(page));
   return { element, update };
+}
+
+/** Return what the results so far mean, in a sentence, and why. @param {Page.StudyPage} page */
+function verdict({ id, sections, signal }) {
+  const place = h("div", { class: "conclusion" }, "");  // with a text, sections add no note that it loads
+  sections.add(place, ["repetition_completed", ...FIGURE_KINDS], async () => {
+    /** @type {Api.VerdictRead} */
+    const { headline, sentences } = await get(`/studies/${id}/report`, { format: "json" }, signal);
+    refillInPlace(place, JSON.stringify([headline, sentences]), () => [h("p", {}, headline), sentences.length > 0 &&
+      h("details", { dataset: { id: "why" } }, h("summary", {}, "Why"), h("ul", {}, ...sentences.map((sentence) => h("li", {}, sentence))))]);
+  });
+  return place;
 }
 
 /** Return the way to the list, and from one experiment among others to its study. @param {Page.StudyPage} page */
@@ -63,26 +78,34 @@ function trail({ study, signal }) {
   return place;
 }
 
-/** Return strategy, robot, engines and tunables in a line. @param {Api.ExperimentRead} experiment */
-function summary({ strategy, direct, level, spec }) {
-  const tunables = (/** @type {{ name: string }[]} */ (spec.tunables)).map(({ name }) => name.replaceAll("_", " ")).join(", ");
-  const tunes = tunables && !direct ? `${level ? "varies" : "tunes"} ${tunables}` : null;
-  return [readableName(strategy), spec.robot.name.replaceAll("_", " "), worldsText(spec), tunes].filter(Boolean).join(" · ");
-}
-
-/** @param {Page.StudyPage} page @returns {Fact[]} */
+/** Return what is simulated, tuned and computed, which all experiments of a study share, and how far it is. @param {Page.StudyPage} page @returns {Fact[]} */
 function factsOf({ study, unit }) {
   const { experiments: [first, ...others], best, progress } = study;
+  const { strategy, direct, level, spec, priority, max_parallel: atOnce } = first;
   const ended = study.experiments.filter(({ state }) => ENDED.includes(state)).length;
   const fitness = others.length ? best : first.fitness;
   const by = best && others.length ? ` by ${titleOf(best)},` : "";
-  const { priority, max_parallel: atOnce } = first;
-  /** @type {Fact[]} */
-  const several = [["Experiments", `${count(ended)} of ${count(others.length + 1)} ended`]];
-  /** @type {Fact[]} */
-  const reached = fitness ? [[by ? "Best fitness" : "Fitness in reality", `${fixed(fitness.mean)} ${unit(first)}${by} after ${evaluationsText(fitness)} (mean of ${fitness.n})`]] : [];
-  return [...(others.length ? several : []), ["Work", progress.text], ...reached, ...times(study),
-    ...(others.length ? [] : [/** @type {Fact} */ (["Priority", priority]), /** @type {Fact} */ (["At once", atOnce === null ? "any number" : `at most ${count(atOnce)}`])])];
+  const tunables = /** @type {{ name: string }[]} */ (spec.tunables).map(({ name }) => name.replaceAll("_", " ")).join(", ");
+  const tunes = direct && !others.length ? "" : tunables;
+  /** @type {(Fact | false | null)[]} */
+  const facts = [
+    others.length ? ["Experiments", `${count(ended)} of ${count(others.length + 1)} ended`] : ["Strategy", readableName(strategy)],
+    ["Robot", robotName(spec)], ["Engine", worldsText(spec)], tunes !== "" && [level && !others.length ? "Varies" : "Tunes", tunes],
+    ["Budget", budgetText(study)],
+    fitness && [by ? "Best fitness" : "Fitness in reality", `${fixed(fitness.mean)} ${unit(first)}${by} after ${evaluationsText(fitness)} (mean of ${fitness.n})`],
+    ["Work", progress.text], ...times(study),
+    !others.length && priority !== 0 && ["Priority", priority], !others.length && atOnce !== null && ["At once", `at most ${count(atOnce)}`]];
+  return /** @type {Fact[]} */ (facts.filter(Boolean));
+}
+
+/** Return the preset and the size of a study; a baseline may have other repetitions. @param {Pick<Api.StudyRead, "experiments">} study */
+export function budgetText({ experiments }) {
+  const [{ spec }] = experiments;
+  const rest = experiments.filter(({ level }) => !level);
+  const iterations = Math.max(...(rest.length ? rest : experiments).map((each) => each.spec.iterations));
+  const repetitions = [...new Set(experiments.map((each) => each.spec.repetitions))].sort((one, other) => one - other);
+  const one = (/** @type {number} */ number) => (number === 1 ? "" : "s");
+  return `${readableName(spec.budget.preset)}: ${count(iterations)} iteration${one(iterations)}, ${repetitions.map(count).join(" or ")} repetition${one(repetitions[0])}`;
 }
 
 /** Return when it ended and how long it took, or what is left and when it began. @param {Api.StudyRead} study @returns {Fact[]} */
@@ -116,15 +139,10 @@ function remarkBlock(title, cssClass, remarks) {
 }
 
 /** @param {Page.StudyPage} page */
-function links({ id, study: { experiments }, isFunction }) {
-  const [{ id: first }, ...others] = experiments;
-  const replay = isFunction ? h("a", { href: `#/toy?experiment=${first}` }, "Step through the function") : h("a", { href: `#/replay?experiment=${first}` }, "Replay a controller");
-  return h("p", { class: "links" },
-    h("a", { href: `#/compare?experiments=${experiments.map((experiment) => experiment.id).join(",")}` }, others.length ? "Compare its experiments" : "Compare with others"),
-    others.length ? null : replay,
-    downloadLink("Report", `/studies/${id}/report`, {}, `gaplab-${id}-report.html`, "Writing the report"),
-    downloadLink("Archive of everything (.zip)", `/studies/${id}/export`, {}, `gaplab-${id}.zip`));
-}
+const links = ({ id, study: { experiments } }) => h("p", { class: "links" },
+  experiments.length > 1 ? null : h("a", { href: compared({ experiments }) }, "Compare with others"),
+  downloadLink("Report", `/studies/${id}/report`, {}, `gaplab-${id}-report.html`, "Writing the report"),
+  downloadLink("Archive of everything (.zip)", `/studies/${id}/export`, {}, `gaplab-${id}.zip`));
 
 /** Return a remark with the measurements that an experiment waits for; nothing while there are none. @param {Page.StudyPage} page */
 function waitingRemark({ study: { experiments: [{ id }] }, sections, signal }) {
