@@ -101,13 +101,19 @@ def python() -> Iterator[str]:
     for kind, before in (*kinds, (gaplab.Result, "result."), (gaplab.Tuning, "tuning.")):
         if before:
             yield f"## {kind.__name__}\n\n{_docstring(kind)}\n"
-        for name, method in inspect.getmembers(kind, lambda each: inspect.isfunction(each) or isinstance(each, property)):
+        for name, method in inspect.getmembers(
+            kind, lambda each: inspect.isfunction(each) or isinstance(each, property)
+        ):
             if not name.startswith("_") and name not in dir(BaseModel):
                 signature = _signature(method) if inspect.isfunction(method) else ""
                 yield f"{'###' if before else '##'} {before}{name}{signature}\n\n{_docstring(method)}\n"
     yield "# Without a service\n"
     for function in (gaplab.run, gaplab.simulate, gaplab.read_robot, gaplab.read_samples):
         yield f"## {function.__name__}{_signature(function)}\n\n{_docstring(function)}\n"
+
+
+def _is_method(member: object) -> bool:
+    return inspect.isfunction(member) or isinstance(member, property)
 
 
 def settings() -> Iterator[str]:
