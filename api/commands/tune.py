@@ -2,11 +2,12 @@
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from gaplab.api.commands.app import SPECS, Answer, command
+from gaplab.api.commands.app import SPECS, Answer, AsJson, command
+from gaplab.api.commands.json_output import echo
 from gaplab.api.commands.tuned import Original, Partial, refusals
 
 
@@ -23,6 +24,7 @@ def tune(  # noqa: PLR0913, PLR0917 - each is an option of the command
     original: Original = None,
     partial: Partial = False,
     save: Annotated[Path | None, typer.Option(help="archive to write, for gaplab.Tuning.load or a service")] = None,
+    as_json: AsJson = False,
 ) -> Answer:
     """Tune a robot's simulator on measurements, print what they identify, and write the tuned values into its file.
 
@@ -31,7 +33,7 @@ def tune(  # noqa: PLR0913, PLR0917 - each is an option of the command
     from gaplab.api.library.tuning import Tuning
 
     labels = None if tunables is None else re.split(r",\s*(?![^()]*\))", tunables)
-    given = {"engine": engine, "tuner": tuner, "discrepancy": discrepancy, "held_out": held_out}
+    given: dict[str, Any] = {"engine": engine, "tuner": tuner, "discrepancy": discrepancy, "held_out": held_out}
     tuning = Tuning(robot, labels, **given)
     for table in runs:
         tuning.tell(Path(table))
@@ -40,6 +42,8 @@ def tune(  # noqa: PLR0913, PLR0917 - each is an option of the command
         tuning.save(save)
     if output is None:
         return Answer({"simulator": found}, str(found))
+    if not as_json:
+        echo(str(found))  # also if the file cannot be written
     with refusals(output):
         written = tuning.save_robot(output, original, partial=partial)
-    return Answer({"simulator": found, **written.facts}, str(found), *written.lines())
+    return Answer({"simulator": found, **written.facts}, *written.lines())

@@ -129,6 +129,8 @@ class Tuning(Result):
         """
         folders.load()
         found, file = cls.__new__(cls), Path(file).absolute()
+        if path is not None and Path(path).exists():
+            raise FileExistsError(f"{path} exists, and the tuning in it goes on by itself: Tuning.load({str(path)!r})")
         found._open_at(file if begins(file, SQLITE) else path, file.parent, progress)
         found.id = study_of(found._store, found.path, file)
         found._check()

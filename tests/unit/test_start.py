@@ -13,7 +13,16 @@ PARTS = {"scipy.stats", "scipy.special", "scipy.spatial", "scipy.signal", "scipy
 
 UNUSED = {
     "gaplab": {"numpy", "pydantic", "sqlalchemy", "httpx2", "rich", "ray"},
-    "gaplab.api.library.running": {*PARTS, "fastapi", "alembic", "matplotlib", "pandas", "pybullet", "mujoco", "ray"},
+    "gaplab.api.library.running, gaplab.api.library.tuning": {
+        *PARTS,
+        "fastapi",
+        "alembic",
+        "matplotlib",
+        "pandas",
+        "pybullet",
+        "mujoco",
+        "ray",
+    },
     "gaplab.workers.process_tasks": {"scipy", "sqlalchemy", "psycopg", "pybullet", "mujoco", "sapien", "ray"},
     "gaplab.api.commands.cli": {"numpy", "scipy", "sqlalchemy", "psycopg", "fastapi", "ray"},
     "gaplab.api.app": {*PARTS, "alembic", "matplotlib", "plotly", "ray"},
