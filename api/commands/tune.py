@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -33,8 +33,7 @@ def tune(  # noqa: PLR0913, PLR0917 - each is an option of the command
     from gaplab.api.library.tuning import Tuning
 
     labels = None if tunables is None else re.split(r",\s*(?![^()]*\))", tunables)
-    given: dict[str, Any] = {"engine": engine, "tuner": tuner, "discrepancy": discrepancy, "held_out": held_out}
-    tuning = Tuning(robot, labels, **given)
+    tuning = Tuning(robot, labels, engine=engine, tuner=tuner, discrepancy=discrepancy, held_out=held_out)
     for table in runs:
         tuning.tell(Path(table))
     found = tuning.simulator

@@ -45,7 +45,7 @@ SENT = sent(
         "image/svg+xml": "<svg xmlns='http://www.w3.org/2000/svg'>…",
         "image/png": "PNG…",
         "application/pdf": "%PDF…",
-        "application/vnd.gaplab.marks+json": None,
+        "application/vnd.gaplab.marks+json": '[{"name": "curves", …}, {"width_in": 3.5, …}]',
     },
     _FORMATS.capitalize(),
 ) | documented(429)

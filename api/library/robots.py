@@ -1,6 +1,6 @@
 """Robots by name, from files and of specs, in this process."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -61,7 +61,7 @@ def settings(kind: type[S], robot: AnyRobot, **others: Any) -> S:  # noqa: ANN40
 
 def invalid(error: ValidationError) -> InvalidSpec:
     """Return an error of a schema in the words of the service."""
-    found = map(dict, error.errors())
+    found: Iterable[dict[str, Any]] = map(dict, error.errors())
     return InvalidSpec(
         Violation(pointer_to(each["loc"]), each["input"], sentence(each), permitted_by(each)) for each in found
     )

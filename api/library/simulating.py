@@ -1,6 +1,6 @@
 """`gaplab.simulate`: controllers in simulators of one's choice, in this process."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any, TypeAlias
@@ -14,6 +14,7 @@ from gaplab.schemas.records import SimulatorRead
 from gaplab.schemas.spec import SharedSettings
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.engines.base import Engine
 from gaplab.services.specs.assembly import edits_of, engine_of
 from gaplab.services.specs.blame import refusing_specs
 from gaplab.services.specs.defaults import default_engine
@@ -103,14 +104,7 @@ def simulate(
     asked = settings(_Asked, robot, engine=engine, controller=controller, task=task, **given)
     made = robot_of(Driven(asked.robot, asked.controller, asked.task))
     ref = asked.engine or PluginRef(name=default_engine(made))
-    kind = usable(ref, made, "/engine")
-    violations = list(engine_violations(made, {kind: "/engine"}))
-    for place, of in enumerate(asked.values):
-        violations += parameter_violations(of, made, kind, ("values", place))
-    for place, row in enumerate(asked.genomes):
-        found = genome_violations(row, made.label, made.space)
-        violations += (each.moved("/genome", f"/genomes/{place}") for each in found)
-    if violations:
+    if violations := list(_violations(asked, made, usable(ref, made, "/engine"))):
         raise InvalidSpec(violations)
     genomes, columns = np.array(asked.genomes), list[tuple[Simulation, FloatArray]]()
     outcomes = [np.empty((len(genomes), 0, 1 + made.sensors.size))]
@@ -121,3 +115,12 @@ def simulate(
         outcomes.append(simulation.sense(genomes, parameters))
     every = np.concatenate(outcomes, axis=1)
     return Simulated(every[..., 0], made.sensors.values(every[..., 1:]), made, genomes, columns)
+
+
+def _violations(asked: _Asked, robot: Robot, engine: type[Engine]) -> Iterator[Violation]:
+    yield from engine_violations(robot, {engine: "/engine"})
+    for place, values in enumerate(asked.values):
+        yield from parameter_violations(values, robot, engine, ("values", place))
+    for place, genome in enumerate(asked.genomes):
+        found = genome_violations(genome, robot.label, robot.space)
+        yield from (each.moved("/genome", f"/genomes/{place}") for each in found)

@@ -51,7 +51,8 @@ def measured(fitness: float | Sequence[float | None] | None, readings: Any) -> d
     """Return values and readings of the repeats that succeeded, or that none did, as parts of an answer."""
     if fitness is None:
         return {}
-    values, tables = (fitness, readings) if hasattr(fitness, "__len__") else ([fitness], [readings])
+    repeats: Any = fitness
+    values, tables = (repeats, readings) if hasattr(fitness, "__len__") else ([repeats], [readings])
     kept = [place for place, value in enumerate(values) if value is not None and not isnan(value)]
     if not kept:
         return {"failed": "no repeat gave a fitness"}

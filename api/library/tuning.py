@@ -110,7 +110,7 @@ class Tuning(Result):
         except FileNotFoundError:
             self.id = submit(self._store, spec).id
         self._check()
-        given, here = resolved.model_dump(exclude={"iterations", "name"}), self._spec.model_dump()
+        given, here = resolved.model_dump(exclude={"iterations", "name"}), self.spec.model_dump()
         if differing := [name for name, value in given.items() if value != here[name]]:
             raise Conflict(f"{path} has a tuning with another {', '.join(differing)}: load it, or use a new path")
 
@@ -146,7 +146,7 @@ class Tuning(Result):
             finalize(self, rmtree, file.parent, ignore_errors=True)
 
     def _check(self) -> None:
-        spec = self._spec
+        spec = self.spec
         selects = spec.strategy.name not in strategies or strategies[spec.strategy.name].takes_samples
         if spec.reality.kind != "physical" or spec.repetitions != 1 or not selects:
             raise Conflict("a tuning has one repetition, a physical reality, and a strategy that selects samples")
@@ -160,9 +160,9 @@ class Tuning(Result):
         until = monotonic() + timeout_s
         while not (asked := self._asked()):
             if reading.read(self._store, self.id).state is State.COMPLETED:
-                lifecycle.extend(self._store, self.id, ExtensionSpec(iterations=self._spec.iterations + 1))
+                lifecycle.extend(self._store, self.id, ExtensionSpec(iterations=self.spec.iterations + 1))
             compute(self._store, self.id, None, until, progress=self._progress)
-        return Genome.of(asked[0].genome, self._spec, None, asked[0].expected)
+        return Genome.of(asked[0].genome, self.spec, None, asked[0].expected)
 
     def tell(
         self,
@@ -194,7 +194,7 @@ class Tuning(Result):
             InvalidSamples: the table has errors; with all of them.
             Conflict: a trace is unlikely, and not `confirmed`.
         """
-        spec, traces = self._spec, [trace] if isinstance(trace, str | Path) else trace
+        spec, traces = self.spec, [trace] if isinstance(trace, str | Path) else trace
         told = samples_in(genome, spec, confirmed=confirmed)
         if told is None:
             parts |= measured(fitness, readings) | {"confirmed": confirmed}
@@ -230,7 +230,7 @@ class Tuning(Result):
     def transfer(self, *, timeout_s: float = math.inf) -> Genome:
         """Return the fittest controller that a search finds in the tuned simulator. Errors are those of `tune`."""
         step = self._latest(Transferred, timeout_s)
-        return Genome.of(step.genome, self._spec, None if math.isnan(step.fitness) else step.fitness)
+        return Genome.of(step.genome, self.spec, None if math.isnan(step.fitness) else step.fitness)
 
     def save_robot(self, file: str | Path, original: str | Path | None = None, *, partial: bool = False) -> Written:
         """Write the tuned simulator into a copy of the robot's URDF or MJCF, or as a robot file, and compare rollouts.
@@ -245,10 +245,10 @@ class Tuning(Result):
         """
         self._latest(Tuned, math.inf)
         source = Path(original) if original is not None else self._original(Path(file).suffix)
-        return write_robot(self.id, self._spec, self._best(), Path(file), source, partial=partial)
+        return write_robot(self.id, self.spec, self._best(), Path(file), source, partial=partial)
 
     def __repr__(self) -> str:
-        spec, samples = self._spec, [step.sample for step in self._log() if isinstance(step, Measured)]
+        spec, samples = self.spec, [step.sample for step in self._log() if isinstance(step, Measured)]
         best = max((each.fitness for each in learnable(samples)), default=None)
         told = many(len(samples), "measurement") + ("" if best is None else f", fittest {number(best)}")
         told += "; one controller is asked for" if self._asked() else ""
@@ -259,7 +259,8 @@ class Tuning(Result):
         return f"<p>{repr(self)[1:-1]}</p>{self.simulator._repr_html_() if isinstance(tuned, Tuned) else ''}"
 
     @property
-    def _spec(self) -> ResolvedSpec:
+    def spec(self) -> ResolvedSpec:
+        """The complete spec."""
         with self._store.reading() as session:
             return spec_of(get_experiment(session, self.id).spec)
 
@@ -279,7 +280,7 @@ class Tuning(Result):
             found = next((step for step in reversed(self._log()) if isinstance(step, kind | Measured)), None)
             if isinstance(found, kind):
                 return found
-            if found is None and not self._spec.reality.samples:
+            if found is None and not self.spec.reality.samples:
                 raise Conflict("nothing was told yet, so there is nothing to tune on")
             compute(self._store, self.id, kind, until, progress=self._progress)
 
@@ -291,12 +292,12 @@ class Tuning(Result):
         """Return the values of the latest simulator; before the first, those of the robot as it is."""
         with suppress(ValueError):
             return list(self._best().parameters.values())
-        world = robot_of(self._spec).world
-        return [edit.read(world) for edit in edits_of(ref.name for ref in self._spec.tunables)]
+        world = robot_of(self.spec).world
+        return [edit.read(world) for edit in edits_of(ref.name for ref in self.spec.tunables)]
 
     def _original(self, suffix: str) -> Path | None:
         """Return the file that the robot was imported from, if it is beside the robot's file or here."""
-        file = robot_file(self._spec.robot.options.get("sha256", ""))
+        file = robot_file(self.spec.robot.options.get("sha256", ""))
         if file is None or file.source is None or not file.source.file.lower().endswith(suffix.lower()):
             return None
         for folder in (self._folder, Path()):

@@ -92,7 +92,7 @@ def log_of(store: Store, experiment: str) -> tuple[Step, ...]:
 def test_it_has_the_numbers_of_a_bench_in_the_service(strategy: str, sqlite_store: Store) -> None:
     """To the last bit, whatever is asked for in between."""
     tuning = tuning_of(strategy=strategy, iterations=3, held_out=0.4)
-    spec = toy(**tuning.spec | {"budget": "smoke"})
+    spec = toy(**tuning.spec.model_dump(mode="json") | {"budget": "smoke"})
     experiment = submit_one(sqlite_store, spec).id
 
     for _ in range(3):

@@ -11,10 +11,10 @@ from sqlalchemy import select
 
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.types import Measured, Probed, Step
+from gaplab.services.core.types import Measured, Probed, Step, place_of
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow, SensitivityRow, StudyRow
-from gaplab.services.store.queries.logs import columns_of, logs, position
+from gaplab.services.store.queries.logs import columns_of, logs
 from gaplab.services.store.session import Store
 from tests.soak import witness
 from tests.soak.hardware_faults import Command, commands
@@ -123,7 +123,7 @@ def _experiment(session: Any, row: Any) -> Any:
             steps=each.steps,
             iterations_done=each.iterations_done,
             log=tuple(digest(step, measured=on_a_bench(row.spec)) for step in steps[each.id]),
-            places=tuple(map(position, steps[each.id])),
+            places=tuple(map(place_of, steps[each.id])),
             error=each.error,
         )
         for each in rows

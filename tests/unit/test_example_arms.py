@@ -131,7 +131,6 @@ class Follower:
     def __init__(self, config: Any) -> None:
         assert config.port
         self.is_connected, self.is_calibrated = False, True
-        Follower.made = self
 
     def connect(self, calibrate: bool = True) -> None:
         assert not self.is_connected
@@ -274,7 +273,8 @@ class Ros:
     """A node, the joint_trajectory_controller of two joints, and their broadcaster, at 250 Hz of a clock of its own."""
 
     def __init__(self) -> None:
-        self.now_ns, self.angles, self.accepted, self.listeners = 1_700_000_000 * 10**9, [0.0, 0.0], [], 1
+        self.now_ns, self.angles, self.listeners = 1_700_000_000 * 10**9, [0.0, 0.0], 1
+        self.accepted = list[Trajectory]()
         self._heard: Any = None
         self._line: Any = None
         self.at_s, self.happens = np.inf, lambda: None

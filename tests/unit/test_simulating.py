@@ -33,7 +33,7 @@ def test_each_controller_meets_each_simulator_whatever_tunables_they_have() -> N
 
 def test_a_robot_is_a_name_a_file_or_a_spec(tmp_path: Path) -> None:
     robot = Quadruped()
-    usual = {"usual_controller": robot.usual_controller, "usual_task": robot.usual_task}
+    usual: dict[str, Any] = {"usual_controller": robot.usual_controller, "usual_task": robot.usual_task}
     (tmp_path / "mine.json").write_text(RobotFile(name="mine", world=robot.world, **usual).text)
     spec = {"strategy": "random", "robot": "quadruped", "engine": "mujoco", "task": {"name": "walk", "options": {}}}
     by_name = fitness("quadruped", robot.known, WET, engine="mujoco")
@@ -42,8 +42,9 @@ def test_a_robot_is_a_name_a_file_or_a_spec(tmp_path: Path) -> None:
     assert by_name == fitness(spec, [robot.known], WET)
     assert by_name == fitness(ExperimentSpec.model_validate(spec), robot.known, WET)
     assert by_name != fitness(spec, robot.known, WET, task={"name": "walk", "options": {"counted_s": 1.0}})
+    neither: Any = 7
     with pytest.raises(TypeError, match="a robot is its name, its file or a spec, not 7"):
-        gaplab.simulate(7, robot.known)
+        gaplab.simulate(neither, robot.known)
 
 
 def test_a_urdf_is_imported_as_by_the_command(tmp_path: Path) -> None:
@@ -100,7 +101,7 @@ def test_a_robot_without_a_body_has_no_trajectory() -> None:
 
 
 def test_angles_of_joints_are_rated_as_the_simulation_of_an_arm_is(tmp_path: Path) -> None:
-    robot = gaplab.read_robot(imported(tmp_path))
+    robot: Any = gaplab.read_robot(imported(tmp_path))
     found = gaplab.simulate(tmp_path / "arm.json", robot.known, engine="mujoco")
     (simulation, parameters), observed = found._simulators[0], robot.motion(robot.known).observe_s
     times_s = np.union1d(observed, robot.sensors.times_s)
