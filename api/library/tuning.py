@@ -19,7 +19,6 @@ from gaplab.api.library.robots import AnyRobot, settings
 from gaplab.api.library.running import SQLITE, Result, begins, study_of, temporary
 from gaplab.api.library.told import measured, sample_of, samples_in
 from gaplab.api.library.tuned import Genome, TunedSimulator
-from gaplab.api.library.writing import Written, write_robot
 from gaplab.schemas.corrections import VoidSpec
 from gaplab.schemas.lifecycle import ExtensionSpec, State
 from gaplab.schemas.measurements import RequestRead
@@ -49,6 +48,8 @@ from gaplab.services.world.robot_library import label_of, robot_file
 
 if TYPE_CHECKING:
     import pandas
+
+    from gaplab.api.library.writing import Written
 
 S = TypeVar("S", Tuned, Transferred)
 
@@ -232,7 +233,7 @@ class Tuning(Result):
         step = self._latest(Transferred, timeout_s)
         return Genome.of(step.genome, self.spec, None if math.isnan(step.fitness) else step.fitness)
 
-    def save_robot(self, file: str | Path, original: str | Path | None = None, *, partial: bool = False) -> Written:
+    def save_robot(self, file: str | Path, original: str | Path | None = None, *, partial: bool = False) -> "Written":
         """Write the tuned simulator into a copy of the robot's URDF or MJCF, or as a robot file, and compare rollouts.
 
         Args:
@@ -243,6 +244,8 @@ class Tuning(Result):
         Raises:
             InvalidRobot: it was not written; with every reason.
         """
+        from gaplab.api.library.writing import write_robot  # with SciPy and lxml, which tuning does not need
+
         self._latest(Tuned, math.inf)
         source = Path(original) if original is not None else self._original(Path(file).suffix)
         return write_robot(self.id, self.spec, self._best(), Path(file), source, partial=partial)

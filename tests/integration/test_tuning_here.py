@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab import InvalidSpec, Tuning
-from gaplab.api.clients.drivers import load
+from gaplab import DriverMotion, InvalidSpec, Tuning
 from gaplab.api.library import computing
 from gaplab.api.library.robots import read_robot
 from gaplab.schemas.corrections import CorrectionSpec
@@ -19,6 +18,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.samples import InvalidSamples
 from gaplab.services.archives import export
 from gaplab.services.archives.rerunning import Part, verify
+from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.types import Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.engines.analytic import Analytic
@@ -31,6 +31,7 @@ from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
+from gaplab.services.world.motions import Motion
 from tests.archiving import exported, imported
 from tests.commands import Gaplab
 from tests.experiments import same, submit_one, toy
@@ -344,15 +345,20 @@ def test_a_robot_of_a_plug_in_is_tuned(put: Callable[..., Path], monkeypatch: py
     assert tuning.simulator.values.keys() == {"friction"}
 
 
+def driven(robot: str, sent: DriverMotion) -> float:
+    """The fitness of a robot that a driver moved."""
+    made, engine = read_robot(robot), engine_of(PluginRef(name="pybullet"))
+    motion = Motion(frozen(sent.times_s), frozen(sent.targets), frozen(sent.observe_s))
+    return float(made.fitness(engine.rollouts([made.world], [motion]))[0, 0])
+
+
 def test_a_driver_runs_the_motions_that_a_tuning_asks_for(tmp_path: Path) -> None:
     """A loop of a driver, and recordings in place of numbers."""
     pytest.importorskip("pybullet")
     budget = {"controller_evaluations": 4, "selection_evaluations": 4, "simulator_evaluations": 20, "preset": "smoke"}
-    driver = load(Path(__file__).parents[2] / "examples" / "mylab.py")
-    driver.connect()
     tuning = Tuning("quadruped", ["static_friction"], strategy="random", engine="pybullet", budget=budget)
     genome = tuning.ask()
-    tuning.tell(genome, driver.run(genome.motion))
+    tuning.tell(genome, driven("quadruped", genome.motion))
     traced = tuning.ask()
     tuning.tell(traced, trace=list(traces_of(traced, tmp_path)), lags_s=[2.0, 7.5])
 
