@@ -355,8 +355,7 @@ def driven(robot: str, sent: DriverMotion) -> float:
 def test_a_driver_runs_the_motions_that_a_tuning_asks_for(tmp_path: Path) -> None:
     """A loop of a driver, and recordings in place of numbers."""
     pytest.importorskip("pybullet")
-    budget = {"controller_evaluations": 4, "selection_evaluations": 4, "simulator_evaluations": 20, "preset": "smoke"}
-    tuning = Tuning("quadruped", ["static_friction"], strategy="random", engine="pybullet", budget=budget)
+    tuning = Tuning("quadruped", ["static_friction"], strategy="random", engine="pybullet", budget="smoke")
     genome = tuning.ask()
     tuning.tell(genome, driven("quadruped", genome.motion))
     traced = tuning.ask()
