@@ -377,7 +377,7 @@ def test_the_form_takes_a_bench_with_samples_from_a_table(visit: Any, api: Any, 
     visit.forgive("422")
     page = visit(f"{api.url}/#/new", **MODES[mode])
     page.get_by_role("button", name="Toy function, quickly").click()
-    page.get_by_label("Reality").select_option("physical")
+    page.get_by_label("Reality", exact=True).select_option("physical")
     page.get_by_label("Name of the bench").fill("leg 1")
     page.get_by_label("Repeats of each measurement").fill("3")
     page.get_by_text("Samples that were measured before").click()

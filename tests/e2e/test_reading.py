@@ -29,6 +29,9 @@ from tests.e2e.reading import (
 )
 from tests.parameters import few
 
+WITHOUT_SERVICE = {"run", "tuning"}
+"""Notebooks that need no service."""
+
 LEAVES = {
     "tutorial": ["curves.svg", "curves.pdf", "curves.html", "study.zip"],
     "day": [
@@ -88,7 +91,7 @@ def test_a_notebook_runs_from_its_first_cell_to_its_last(path: Path, service: Lo
 
     data = [output["data"] for output in shown if "data" in output]
     assert any("image/svg+xml" in each for each in data)  # a figure
-    if path.stem != "tuning":  # which never ends
+    if path.stem not in WITHOUT_SERVICE:
         assert any(" repetitions; " in each.get("text/html", "") for each in data)  # its progress
         assert any("COMPLETED" in each.get("text/plain", "") for each in data)
     assert not [output for output in shown if output["output_type"] == "stream" and output["name"] == "stderr"]

@@ -353,7 +353,7 @@ def test_a_view_is_checked_when_it_is_saved(api: TestClient) -> None:
     wrong: list[tuple[str, dict[str, str], str]] = [
         ("a", {"query": "strategi = x"}, "/query"),
         ("a", {"query": "state ="}, "/query"),
-        ("a", {"sort": "state"}, "/sort"),
+        ("a", {"sort": "progress"}, "/sort"),
         ("a<b", {}, "name"),
         ("x" * 61, {}, "name"),
     ]

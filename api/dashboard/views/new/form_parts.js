@@ -97,8 +97,11 @@ function strategies(form) {
     linkButton("All", tickAll(true)), " ", linkButton("None", tickAll(false))), room, list];
 }
 
+/** @type {WeakSet<object>} what was ticked, which stays where it is when it is unticked */
+const shown = new WeakSet();
+
 /**
- * Return the fields of what is ticked, and behind them, folded, the others.
+ * Return the fields of what is or was ticked, and behind them, folded, the others.
  *
  * @template {{ on?: boolean }} Ticked
  * @param {Ticked[]} all
@@ -106,8 +109,10 @@ function strategies(form) {
  * @param {(one: Ticked) => HTMLElement} make
  */
 function inTwo(all, what, make) {
-  const others = all.filter(({ on }) => !on);
-  return h("div", { class: what }, ...ticked(all).map(make), others.length ? folded(what, `${count(others.length)} more ${what}`, others.map(make), !ticked(all).length) : null);
+  for (const one of ticked(all)) shown.add(one);
+  const others = all.filter((one) => !shown.has(one));
+  return h("div", { class: what }, ...all.filter((one) => shown.has(one)).map(make),
+    others.length ? folded(what, `${count(others.length)} more ${what}`, others.map(make)) : null);
 }
 
 /** @param {string} label @param {() => void} press */
