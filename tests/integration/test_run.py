@@ -52,7 +52,8 @@ class Rig(Analytic):
 """
 
 ALONE = """
-import sys, gaplab
+import signal, sys, gaplab
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what a shell starts in the background ignores it
 result = gaplab.run({spec!r}, workers=1, path=sys.argv[1] if len(sys.argv) > 1 else None)
 assert "ray" not in sys.modules
 print(result.study.state)
