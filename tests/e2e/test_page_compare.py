@@ -84,7 +84,7 @@ def test_the_address_holds_everything(api: Any, known: Any, visit: Any) -> None:
     wanted = f"#/compare?experiments={','.join(known.ids)}&{choices}"
     page.get_by_label("equivalent within").fill("0.03")
     page.get_by_label("equivalent within").press("Tab")
-    expect(page.get_by_text("over 2 to 4 real-world evaluations")).to_be_attached()
+    expect(page.get_by_text("over 2 to 4 real-world evaluations").first).to_be_attached()
     page.wait_for_function(f"() => location.hash === {wanted!r}")
     page.get_by_role("button", name="Copy the link").click()
     expect(page.get_by_role("button", name="Copied")).to_be_visible()
@@ -97,7 +97,7 @@ def test_the_address_holds_everything(api: Any, known: Any, visit: Any) -> None:
     expect(other.get_by_label("Test")).to_have_value("welch")
     expect(other.get_by_label("from", exact=True)).to_have_value("2")
     expect(other.get_by_label("equivalent within")).to_have_value("0.03")
-    expect(other.get_by_text("over 2 to 4 real-world evaluations")).to_be_attached()
+    expect(other.get_by_text("over 2 to 4 real-world evaluations").first).to_be_attached()
     expect(other.locator(".large .xtitle")).to_contain_text("ime")
     assert fragment(other) == wanted
 
