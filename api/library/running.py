@@ -82,11 +82,15 @@ def run(
         Interrupted: Ctrl-C; what is complete is kept.
         OSError: the file cannot be read, or the database not be written.
     """
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers: at least 1, not {workers}")
     folders.load()
     given = _read(spec) if isinstance(spec, str | Path) else spec
     if isinstance(given, Path) and begins(given, SQLITE):
         path = given
     file = Path(path).absolute() if path is not None else temporary()
+    if file.is_dir():
+        raise IsADirectoryError(f"path: a database, not the folder {file}")
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
         new_database(file)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from math import isnan
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,8 @@ def measured(fitness: float | Sequence[float | None] | None, readings: Any) -> d
         return {}
     repeats: Any = fitness
     values, tables = (repeats, readings) if hasattr(fitness, "__len__") else ([repeats], [readings])
+    if wrong := [value for value in values if not isinstance(value, Real | None)]:
+        raise TypeError(f"fitness: a number, one for each repeat, or None for one that failed, not {wrong[0]!r:.100}")
     kept = [place for place, value in enumerate(values) if value is not None and not isnan(value)]
     if not kept:
         return {"failed": "no repeat gave a fitness"}

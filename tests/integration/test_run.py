@@ -161,6 +161,10 @@ def test_what_a_service_refuses_is_refused_in_its_words(tmp_path: Path) -> None:
     assert len(several.value.problem.errors) == 2
     with pytest.raises(gaplab.InvalidSpec, match="/reality/kind: nobody is asked for measurements here"):
         gaplab.run(SMALL | {"strategy": "random", "reality": {"kind": "physical"}})
+    with pytest.raises(ValueError, match="workers: at least 1, not 0"):
+        gaplab.run(SMALL | {"strategy": "random"}, workers=0)
+    with pytest.raises(IsADirectoryError, match="path: a database, not the folder"):
+        gaplab.run(SMALL | {"strategy": "random"}, path=tmp_path)
     (tmp_path / "spec.json").write_text("{")
     with pytest.raises(ValueError, match=r"spec\.json is neither an archive, nor a database, nor JSON"):
         gaplab.run(tmp_path / "spec.json")
