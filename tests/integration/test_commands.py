@@ -102,6 +102,7 @@ def test_every_command_prints_one_document_and_nothing_else(
     tidy(ask, said["list"][-1]["id"])
     measure_on_a_bench(ask, sqlite_store, tmp_path)
     bring_a_robot(ask, tmp_path)
+    compute_here(ask, tmp_path)
     database = {"GAPLAB_DATABASE_URL": sqlite_url}
     assert ask("backup", str(tmp_path / "copy.db"), **database)["bytes"] > 0
     restored = ask("restore", str(tmp_path / "copy.db"), GAPLAB_DATABASE_URL=f"sqlite:///{tmp_path / 'restored.db'}")
@@ -114,6 +115,14 @@ def test_every_command_prints_one_document_and_nothing_else(
     # want a body, a worker, an experiment under way, a failed one, recordings, and a request that is stuck
     elsewhere = {"simulator", "replay", "sensitivity", "accept-versions", "retry", "traces", "reopen", "try-tunables"}
     assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
+
+
+def compute_here(ask: Callable[..., Any], folder: Path) -> None:
+    toy = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 1}
+    assert ask("run", "-", stdin=json.dumps(toy))["state"] == "COMPLETED"
+    (folder / "runs.csv").write_text("gene_0,value\n0.3,0.4\n0.5,0.2\n0.7,0.6\n")
+    found = ask("tune", "toy_function", str(folder / "runs.csv"), "--tunables", "static_friction", "--held-out", "0")
+    assert "static_friction" in json.dumps(found)
 
 
 def bring_a_robot(ask: Callable[..., Any], folder: Path) -> None:
