@@ -88,12 +88,7 @@ def run(
     given = _read(spec) if isinstance(spec, str | Path) else spec
     if isinstance(given, Path) and begins(given, SQLITE):
         path = given
-    file = Path(path).absolute() if path is not None else temporary()
-    if file.is_dir():
-        raise IsADirectoryError(f"path: a database, not the folder {file}")
-    if not file.exists():
-        file.parent.mkdir(parents=True, exist_ok=True)
-        new_database(file)
+    file = _database(Path(path).absolute() if path is not None else temporary())
     with ExitStack() as refused:
         if path is None:
             refused.callback(rmtree, file.parent, ignore_errors=True)
@@ -108,6 +103,16 @@ def run(
     if path is None:
         finalize(result, rmtree, file.parent, ignore_errors=True)
     return result
+
+
+def _database(file: Path) -> Path:
+    """Make a database in a file that is absent, and return the file."""
+    if file.is_dir():
+        raise IsADirectoryError(f"path: a database, not the folder {file}")
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        new_database(file)
+    return file
 
 
 class Result:
