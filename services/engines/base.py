@@ -4,6 +4,7 @@ from abc import abstractmethod
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
+from threading import RLock
 from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar
 
@@ -246,7 +247,10 @@ class WarmScenes(Generic[S]):
 
 
 class SceneEngine(Engine, Generic[S]):
-    """An engine of worlds with bodies, which keeps one scene for all worlds that are built alike."""
+    """An engine of worlds with bodies, which keeps one scene for all worlds that are built alike.
+
+    Threads may share it: `_turn` lets one of them at a time use the scenes.
+    """
 
     honours = ALL_FIELDS
     repeatable = True
@@ -254,7 +258,7 @@ class SceneEngine(Engine, Generic[S]):
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
-        self._scenes = WarmScenes(self._build)
+        self._scenes, self._turn = WarmScenes(self._build), RLock()
 
     @abstractmethod
     def _build(self, world: World) -> S:
@@ -267,4 +271,5 @@ class SceneEngine(Engine, Generic[S]):
 
     def close(self) -> None:
         """Close all scenes."""
-        self._scenes.close()
+        with self._turn:
+            self._scenes.close()

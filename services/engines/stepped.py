@@ -311,7 +311,8 @@ class SteppedEngine(SceneEngine[S]):
 
     def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
         """Return the trajectory of the observed body, `(t, 3)`; times are rounded to whole time steps."""
-        seen = self._run(world, motion, slice(None))
+        with self._turn:
+            seen = self._run(world, motion, slice(None))
         poses = _observed(world, seen)
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
@@ -319,7 +320,8 @@ class SteppedEngine(SceneEngine[S]):
         """Return the same rollout with joint angles and torques."""
         often = motion.observed_at(np.union1d(motion.observe_s, times_s))
         observed, recorded = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, times_s))
-        seen = self._run(world, often, observed, with_torques=True)
+        with self._turn:
+            seen = self._run(world, often, observed, with_torques=True)
         torques = seen[recorded, 7 + len(world.joints) :]
         torques[times_s == 0] = 0.0  # no step has ended yet
         base_and_joints = seen[recorded, : 7 + len(world.joints)]

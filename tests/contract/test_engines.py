@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -209,6 +210,17 @@ def test_engines_in_one_process_do_not_disturb_each_other(pair: Pair) -> None:
 
     assert np.array_equal(pair.roll(), expected)
     assert np.array_equal(other.roll(), expected)
+
+
+def test_threads_that_share_an_engine_get_the_bits_of_one_after_the_other(pair: Pair) -> None:
+    frictions = [0.3 + 0.1 * number for number in range(6)]
+    worlds = [replace(pair.robot.world, material=Material(each, each)) for each in frictions]
+    expected = [pair.roll(world) for world in worlds]
+
+    with ThreadPoolExecutor(len(worlds)) as pool:
+        found = list(pool.map(pair.roll, worlds))
+
+    assert np.array_equal(found, expected)
 
 
 SCRIPT = """

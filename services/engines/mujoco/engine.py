@@ -188,7 +188,8 @@ class MuJoCo(SceneEngine[MuJoCoScene]):
 
     def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
         """Return the trajectory of the observed body, `(t, 3)`; times are rounded to whole time steps."""
-        poses = self._scenes[world.built(self.in_place)].poses([world], [motion])[0, 0]
+        with self._turn:
+            poses = self._scenes[world.built(self.in_place)].poses([world], [motion])[0, 0]
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
     def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
@@ -199,10 +200,13 @@ class MuJoCo(SceneEngine[MuJoCoScene]):
             built = worlds[left[0]].built(self.in_place)
             alike = [column for column in left if worlds[column].built(self.in_place) == built]
             here = consecutive(alike)
-            poses[:, here] = self._scenes[built].poses([worlds[column] for column in alike], motions)
+            with self._turn:
+                poses[:, here] = self._scenes[built].poses([worlds[column] for column in alike], motions)
             left = [column for column in left if column not in alike]
         return Trajectory(motions[0].observe_s, poses[..., :3], poses[..., 3:])
 
     def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
         """Return the same rollout with joint angles and torques."""
-        return recording(motion, times_s, *self._scenes[world.built(self.in_place)].record(world, motion, times_s))
+        with self._turn:
+            seen = self._scenes[world.built(self.in_place)].record(world, motion, times_s)
+        return recording(motion, times_s, *seen)
