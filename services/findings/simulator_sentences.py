@@ -91,8 +91,8 @@ def unreproduced(id: str, tunings: Sequence[Tuning], sensors: Sensors | None, un
     where = f"; most differs {', then '.join(worst)}" if worst else ""
     return (
         f"{Doubt.WRONG.value}: the best err by {number(error, 2)} {unit} a sample, where noise and rough physics would "
-        f"leave {number(left, 2)} ({of}){where}. {LACKING}. `gaplab try-tunables {id}` tries further tunables, and "
-        "`search`"
+        f"leave {number(left, 2)} ({of}){where}. {LACKING}. In a service, `gaplab try-tunables {id}` tries "
+        "further tunables, and `search`"
     )
 
 
@@ -102,7 +102,7 @@ def identified(now: TunableDistribution, verdict: Identification, left: float | 
     if left is None:
         few = f"{repetitions} {'is' if now.n == 1 else 'are'} too few to compare"
         return f"{now.name}: unknown, for {few}, and the tuner gives no intervals"
-    value = f"{spread(now.mean, now.sd, 2)} over {repetitions}"
+    value = spread(now.mean, now.sd, 2) + (f" over {repetitions}" if now.n > 1 else "")
     return f"{now.name}: {verdict.value}; {value}, with {share(left)} of the uncertainty before any sample"
 
 
@@ -114,10 +114,13 @@ def noise(sd: float, unit: str) -> str:
 
 def _left(point: MisfitPoint, unit: str, known: int) -> str:
     error = point.error
-    deviation = f"SD {number(error.sd, 2)}, " if error.sd is not None else ""
     counted = f"{many(point.iteration, 'real-world evaluation')}{from_before(known)}"
-    ends = f"{number(error.least, 2)} to {number(error.greatest, 2)} over {many(error.n, 'repetition')}"
-    return f"at {counted} the best simulators err by {number(error.mean, 2)} {unit} a sample ({deviation}{ends})"
+    left = f"{number(error.mean, 2)} {unit} a sample"
+    if error.n == 1:
+        return f"at {counted} the best simulator errs by {left}"
+    deviation = f"SD {number(error.sd, 2)}, " if error.sd is not None else ""
+    ends = f"{number(error.least, 2)} to {number(error.greatest, 2)} over {error.n} repetitions"
+    return f"at {counted} the best simulators err by {left} ({deviation}{ends})"
 
 
 def _gaps(first: MisfitPoint, last: MisfitPoint, unit: str) -> tuple[str, ...]:

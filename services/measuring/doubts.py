@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from statistics import median
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.measurements import AnswerState, DoubtsRead, MeasurementSpec, RequestState
@@ -95,5 +95,5 @@ def _largest_known(session: Session, repetition: RepetitionRow, request: Request
     """Return the largest absolute fitness that is known from other requests of the experiment; 0 without any."""
     row = StepRow
     own = (row.repetition_id == repetition.id) & (row.iteration == request.iteration) & row.measured_by.is_not(None)
-    known = of_experiments(row, [repetition.experiment_id], row.fitness).where(row.branch == LOG, ~own)
-    return max(map(abs, session.scalars(known.where(row.fitness.is_not(None)))), default=0.0)
+    known = of_experiments(row, [repetition.experiment_id], func.max(func.abs(row.fitness)))
+    return session.scalar(known.where(row.branch == LOG, ~own)) or 0.0

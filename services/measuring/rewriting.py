@@ -22,7 +22,6 @@ from gaplab.services.core.types import (
     Probed,
     Selected,
     Step,
-    next_place,
     place_of,
     recorded_fitness,
 )
@@ -55,12 +54,10 @@ def recorded(session: Session, request: RequestRow, repetition: RepetitionRow) -
 
     One measurement answers all requests of a repetition for the same controller.
     """
-    (log,) = logs(session, [repetition.id]).values()
-    return tuple(
-        each
-        for each in requests.requests_of(session, repetition.id)
-        if (each.same_as or each.id) == request.id and each.branch is None and each.place < next_place(log)
-    )
+    row = RequestRow
+    recorded = row.place < select(RepetitionRow.steps).where(RepetitionRow.id == repetition.id).scalar_subquery()
+    same = func.coalesce(row.same_as, row.id) == request.id
+    return tuple(requests.requests_of(session, repetition.id, same, row.branch.is_(None), recorded))
 
 
 def samples_among(rows: Sequence[RequestRow]) -> list[RequestRow]:
@@ -133,7 +130,8 @@ def close(
     take_back(session, repetition, State.QUEUED, Ending.HANDED_BACK, "a measurement was corrected")
     checkpoints.forget(session, [repetition.id])
     number = None
-    (log,) = logs(session, [repetition.id]).values()
+    session.refresh(repetition)
+    log = logs(session, [repetition.id])[repetition.id] if repetition.steps > place else ()
     gone, kept = _closing(log, place, stays)
     if gone:
         of_it = select(func.max(BranchRow.number)).where(BranchRow.repetition_id == repetition.id)
@@ -229,8 +227,7 @@ def go_on(session: Session, repetition: RepetitionRow, *, closed: bool) -> None:
 
 def _waits_for_nothing(session: Session, repetition: RepetitionRow) -> bool:
     """Return whether the request that a repetition waited for was withdrawn, as it followed from a corrected sample."""
-    pending = [each for each in requests.requests_of(session, repetition.id) if each.state in requests.PENDING]
-    return repetition.state is State.WAITING and not pending
+    return repetition.state is State.WAITING and not requests.pending(session, repetition.id)
 
 
 def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) -> None:

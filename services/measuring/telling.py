@@ -38,7 +38,7 @@ from gaplab.services.store.lease import Claim, Requested, TimedStep
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests, steps
 from gaplab.services.store.queries.experiments import get_experiment, lock, repetitions_of
-from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.queries.logs import last_step
 from gaplab.services.store.session import Session, transaction
 
 Told: TypeAlias = tuple[Genome, MeasurementSpec, TracesRead | None]
@@ -114,7 +114,7 @@ def _tell(session: Session, experiment: ExperimentRow, repetition: RepetitionRow
             apply(session, request, repetition, counted, AGAIN, lambda _: True)
         if samples_among(recorded(session, request, repetition)):
             return counted
-    asked = next((each for each in _asked(session, repetition) if each.genome == genome.tolist()), None)
+    asked = next((each for each in requests.pending(session, repetition.id) if each.genome == genome.tolist()), None)
     request = asked or _add(session, experiment, repetition, genome, resolved)
     if counted is None:
         counted = insert_answer(session, request, spec, AnswerState.COUNTED, None, traces)
@@ -126,21 +126,15 @@ def _tell(session: Session, experiment: ExperimentRow, repetition: RepetitionRow
 
 def _counted(session: Session, repetition: RepetitionRow, genome: Genome) -> AnswerRow | None:
     """Return the answer about a controller that counts in a repetition; None without one."""
-    same = (row for row in requests.requests_of(session, repetition.id) if row.genome == genome.tolist())
+    same = requests.requests_of(session, repetition.id, requests.of_controller(genome.tolist()))
     return next((found for row in same if (found := requests.counted_answer(session, row))), None)
-
-
-def _asked(session: Session, repetition: RepetitionRow) -> list[RequestRow]:
-    """Return the request that a repetition waits for, if it does."""
-    return [row for row in requests.requests_of(session, repetition.id) if row.state in requests.PENDING]
 
 
 def _add(
     session: Session, experiment: ExperimentRow, repetition: RepetitionRow, genome: Genome, spec: ResolvedSpec
 ) -> RequestRow:
     """Let the next iteration of a log begin with a controller, and return the request for its measurement."""
-    (log,) = logs(session, [repetition.id]).values()
-    last = log[-1] if log else None
+    last = last_step(session, repetition.id)
     place = place_of(last) if isinstance(last, Selected) else repetition.steps
     iteration = (place + LENGTH + 1) // LENGTH
     close(session, repetition, place, iteration, REPLACED)

@@ -104,7 +104,6 @@ def refuse(session: Session, claim: Claim, request: RequestRow) -> AnswerRow | N
 
 def _overruled(session: Session, request: RequestRow) -> bool:
     """Return whether a person has voided a refusal of the same controller in the repetition, or answered it."""
-    asked = requests.requests_of(session, request.repetition_id)
-    same = [row.id for row in asked if row.genome == request.genome]
-    answers = requests.answers_of(session, same).values()
+    same = requests.requests_of(session, request.repetition_id, requests.of_controller(request.genome))
+    answers = requests.answers_of(session, [row.id for row in same]).values()
     return any(answer.state is not AnswerState.COUNTED for given in answers for answer in given)

@@ -91,7 +91,7 @@ def test_a_coefficient_at_its_bound_is_remarked_on(store: Store) -> None:
     found = misfit(store, experiment)
 
     assert found.remarks == (
-        "at 1 real-world evaluation the best simulators err by 0.2 m/s a sample (0.2 to 0.2 over 1 repetition)",
+        "at 1 real-world evaluation the best simulator errs by 0.2 m/s a sample",
         "static_friction is at its upper bound, 1.5, in 100 % of 1 repetition",
     )
 

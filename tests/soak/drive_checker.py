@@ -3,23 +3,29 @@
 import socket
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from math import inf
 from typing import Any
 
 from tests.soak.driver_faults import LEASE_S
 from tests.soak.hardware_faults import Command
 
 PAUSED_S = 1.0
-"""Between two commands of one drive: it stood still. One command that it had in hand may follow when it wakes."""
+"""Between two commands of one drive: it stood still."""
+
+REACTION_S = 0.3
+"""For how long a drive that wakes may give commands before it stops: it looks ten times a second, on a busy machine."""
 
 
 def drives(commands: Sequence[Command]) -> Iterator[str]:
-    """Once a drive has begun, no earlier one moves the same robot, but for one command that it had in hand."""
-    now, ended, last, late = dict[str, str](), set[str](), dict[str, float](), dict[tuple[str, str], list[float]]()
+    """Once a drive has begun, no earlier one moves the same robot, but for what it does in the moment that it wakes."""
+    now, ended, late = dict[str, str](), set[str](), dict[tuple[str, str], list[float]]()
+    last, woke = dict[str, float](), dict[str, float]()
     for at, robot, drive, what in commands:
         if what != "moves":
             continue
         if drive in ended:
-            if at - last[drive] < PAUSED_S:
+            woke[drive] = at if at - last[drive] >= PAUSED_S else woke.get(drive, -inf)
+            if at - woke[drive] > REACTION_S:
                 late.setdefault((robot, drive), []).append(at)
         elif now.get(robot, drive) != drive:
             ended.add(now[robot])

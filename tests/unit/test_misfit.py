@@ -83,4 +83,4 @@ def test_before_the_first_sample_there_is_nothing_to_remark() -> None:
 def test_one_repetition_has_no_spread_and_can_be_remarked_on() -> None:
     (error, *_) = remarks([point(tuning(), iteration=1)], "m/s")
 
-    assert error.endswith("err by 0.1 m/s a sample (0.1 to 0.1 over 1 repetition)")
+    assert error.endswith("the best simulator errs by 0.1 m/s a sample")

@@ -296,10 +296,10 @@ def moves(drive: Any, *at: Any, robot: Any = "r") -> Any:
         ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 1.3)], "1.1 moved r 1 times from 1.3"),
         ([*moves("1.1", 1.0), *moves("2.1", 1.2, robot="s"), *moves("1.1", 1.3)], None),
         ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 4.0), *moves("2.1", 4.1, 4.2)], None),
-        ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 4.0, 4.1)], "1.1 moved r 1 times from 4.1"),
+        ([*moves("1.1", 1.0), *moves("2.1", 1.2), *moves("1.1", 4.0, 4.1, 4.4)], "1.1 moved r 1 times from 4.4"),
         ([*moves("1.1", 1.0), *moves("2.1", 1.2), Command(1.3, "r", "1.1", "stop")], None),
     ],
-    ids=["in turn", "two at once", "two robots", "a command in hand", "more than one", "a stop"],
+    ids=["in turn", "two at once", "two robots", "a command in hand", "one too late", "a stop"],
 )
 def test_two_programs_that_move_one_robot_are_found(commands: Any, violation: Any) -> None:
     (*wrong,) = drives(commands)

@@ -41,6 +41,14 @@ def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, 
     return {repetition: tuple(steps) for repetition, steps in found.items()}
 
 
+def last_step(session: Session, repetition: int) -> Step | None:
+    """Return the last step of a log; None of an empty one."""
+    row = StepRow
+    of_it = select(row).where(row.repetition_id == repetition, row.branch == LOG)
+    found = session.scalar(of_it.order_by(row.place.desc()).limit(1))
+    return None if found is None else step_of(found)
+
+
 def is_whole(session: Session, repetition: int, length: int, at_once: int) -> bool:
     """Return whether a log is in order up to the place `length`, and each step, of branches too, is as stored here.
 

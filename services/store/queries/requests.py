@@ -7,10 +7,11 @@ answer    conflict ──> counted ──> replaced, void;  or conflict ──> 
 However the name of a bench is spaced and capitalised, it is one bench, and spelled as it was first written.
 """
 
+import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, case, func, select, union_all, update
+from sqlalchemy import ColumnElement, Text, case, cast, func, select, union_all, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
@@ -92,12 +93,10 @@ def insert(session: Session, asked: Mapping[Claim, Requested]) -> dict[Claim, Re
     """
     found = {}
     for claim, wanted in asked.items():
-        genome, repetition = wanted.genome.tolist(), claim.id
-        earlier = requests_of(session, repetition)
-        same = [row for row in earlier if row.genome == genome]
-        pending = [row for row in same if row.place == wanted.place and row.state in PENDING]
+        same = requests_of(session, claim.id, of_controller(wanted.genome.tolist()))
+        open_ = [row for row in same if row.place == wanted.place and row.state in PENDING]
         answered = [row for row in same if row.state in ANSWERED and counted_answer(session, row) is not None]
-        found[claim] = pending[0] if pending else _new(session, claim, wanted, answered[0] if answered else None)
+        found[claim] = open_[0] if open_ else _new(session, claim, wanted, answered[0] if answered else None)
     return found
 
 
@@ -124,12 +123,21 @@ def _new(session: Session, claim: Claim, wanted: Requested, same: RequestRow | N
     return row
 
 
-def requests_of(session: Session, repetition: int) -> Sequence[RequestRow]:
-    """Return the requests of a repetition, by place in its log."""
+def requests_of(session: Session, repetition: int, *conditions: ColumnElement[bool]) -> Sequence[RequestRow]:
+    """Return the requests of a repetition that meet conditions, by place in its log."""
     row = RequestRow
-    return session.scalars(
-        select(row).where(row.repetition_id == repetition).order_by(row.place, row.created_at, row.id)
-    ).all()
+    found = select(row).where(row.repetition_id == repetition, *conditions)
+    return session.scalars(found.order_by(row.place, row.created_at, row.id)).all()
+
+
+def pending(session: Session, repetition: int) -> Sequence[RequestRow]:
+    """Return the requests that a repetition waits for."""
+    return requests_of(session, repetition, RequestRow.state.in_(PENDING))
+
+
+def of_controller(genome: list[float]) -> ColumnElement[bool]:
+    """Return the condition that a request is for the controller with this genome, to the last bit."""
+    return cast(RequestRow.genome, Text) == json.dumps(genome)
 
 
 def oldest(
