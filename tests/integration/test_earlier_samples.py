@@ -42,7 +42,7 @@ def test_every_count_of_evaluations_says_how_many_samples_were_there_before(
     assert pair.where == "after 2\N{NO-BREAK SPACE}real-world evaluations (and 0–4 from before)"
     assert pair.where in gaplab("compare", id_, without).out
     assert "at 2 (and 4 from before)" in said["show"]
-    assert "at 2 real-world evaluations (and 4 from before) the best simulators err by" in said["show"]
+    assert "at 2 real-world evaluations (and 4 from before) the best simulator errs by" in said["show"]
     assert "after (and 4 from before)" in said["curve"]
     found = verdict_on(sqlite_store, read(sqlite_store, id_)).sentences
     assert found[0].startswith("After 2\N{NO-BREAK SPACE}real-world evaluations (and 4 from before), the mean of")
