@@ -22,7 +22,9 @@ from gaplab.services.store.atomic_files import appearing
 
 @command(KEEPING)
 def export(
-    client: Client, id: Id, to: Annotated[Path | None, typer.Option(help="new file; left out: gaplab-ID.zip")] = None
+    client: Client,
+    id: Id,
+    to: Annotated[Path | None, typer.Option("--to", "-o", help="new file; left out: gaplab-ID.zip")] = None,
 ) -> Answer:
     """Export a study, perhaps with one of its experiments alone, into one archive: a zipped SQLite database."""
     file = to or Path(f"gaplab-{client.study(id).id}.zip")  # the service's id, never a path that was typed
