@@ -5,6 +5,7 @@ A controller drives a walking robot, and an arm of other motors.
 
 from collections.abc import Iterator
 from functools import partial
+from operator import itemgetter
 from typing import TypeAlias
 
 import numpy as np
@@ -268,4 +269,4 @@ def trajectories(times_s: FloatArray) -> Trajectory:
 
 
 def _one(many: Trajectory, row: int, column: int) -> Trajectory:
-    return Trajectory(many.times_s, many.positions_m[row, column], many.orientations[row, column])
+    return many.mapped(itemgetter((row, column)))

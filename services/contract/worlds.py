@@ -11,6 +11,7 @@ import numpy as np
 from gaplab.services.contract.robots import arm
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.base import Engine
+from gaplab.services.world.motions import Start
 from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.robots.quadruped import Quadruped
@@ -71,6 +72,35 @@ def runs_many_as_each(plugin: type[Engine]) -> None:
                 alone = engine.rollout(world, motion).positions_m
                 same = np.array_equal(many.positions_m[row, column], alone, equal_nan=True)
                 assert same, f"of many rollouts of the {robot.label}, one differs from the same alone"
+
+
+def tells_joints_where_it_says_so(plugin: type[Engine]) -> None:
+    """Tells angles, speeds and torques of joints if `tells_joints` is true, and the same poses as without."""
+    for engine, robot in pairs(plugin) if plugin.tells_joints else ():
+        blind = robot.motion(robot.known)
+        told = engine.rollout(robot.world, blind.observed_at(blind.observe_s, joints=True))
+        joints = (told.angles_rad, told.speeds_rad_s, told.torques_nm)
+        shapes = [None if each is None else each.shape for each in joints]
+        expected = (len(blind.observe_s), len(robot.world.joints))
+        assert shapes == [expected] * 3, f"joints of the {robot.label} have the shapes {shapes}, not {expected}"
+        same = np.array_equal(told.positions_m, engine.rollout(robot.world, blind).positions_m, equal_nan=True)
+        assert same, f"the {robot.label} moves otherwise if its joints are told"
+
+
+def begins_where_a_motion_says(plugin: type[Engine]) -> None:
+    """Begins with the pose, the velocity and the angles of a motion's start if `sets_starts` is true."""
+    for engine, robot in pairs(plugin) if plugin.sets_starts else ():
+        before, world = flat(engine, robot), robot.world
+        angles = tuple(joint.start + 0.1 for joint in world.joints)
+        bent = Start(angles_rad=angles)
+        start = bent if world.fixed else replace(bent, position_m=(0.5, 0.0, 2.0), velocity_m_s=(3.0, 0.0, 0.0))
+        seen_s = np.array([0.0, 10 * world.time_step_s])
+        recorded = engine.record(world, replace(robot.motion(robot.known), start=start), seen_s)
+        expected = recorded.poses[:, 0] if world.fixed else [0.5, 0.5 + 3.0 * seen_s[1]]
+        assert np.allclose(recorded.poses[:, 0], expected, atol=0.01), f"x of the thrown {robot.label} is wrong"
+        told = recorded.angles_rad is None or np.allclose(recorded.angles_rad[0], angles, atol=1e-5)
+        assert told, f"the joints of the {robot.label} begin elsewhere"
+        assert np.array_equal(before, flat(engine, robot), equal_nan=True), "a start stays for the next rollout"
 
 
 def honours_what_it_says(plugin: type[Engine]) -> None:

@@ -36,6 +36,8 @@ class Analytic(Engine):
 
     def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
         """Return all glides at once."""
+        if any(motion.joints or motion.start is not None for motion in motions):
+            raise TypeError("a formula has no joints, and its motion no start")
         materials = [each.material for each in worlds]
         coefficients = np.array([(each.static_friction, each.dynamic_friction, each.restitution) for each in materials])
         targets = np.array([open_loop(motion).targets[0, 0] for motion in motions])

@@ -49,7 +49,10 @@ USES: Mapping[str, Uses] = MappingProxyType(
         "joint.dry_friction": _joints(lambda joint: joint.dry_friction),
         "joint.limits": _joints(lambda joint: joint.limits is not None),
         "joint.slides": _joints(lambda joint: joint.slides),
+        "gravity_tilt_rad": lambda world: any(world.gravity_tilt_rad),
+        "ground_m": lambda world: bool(world.ground_m),
         "joint.start": _joints(lambda joint: joint.start),
+        "joint.static_friction": _joints(lambda joint: joint.static_friction),
         "joint.turn": _joints(lambda joint: joint.turn != UNTURNED),
         "motor.delay_s": _motors(lambda motor: motor.delay_s),
         "motor.follows": _motors(lambda motor: motor.follows != "position"),
@@ -89,9 +92,13 @@ ALL_FIELDS = frozenset(
 
 USUALLY_IN_PLACE = frozenset(
     {
+        "biases",
         "body.mass_kg",
+        "ground_m",
         "joint.damping",
         "joint.dry_friction",
+        "joint.static_friction",
+        "joint.stribeck_speed",
         "motor.delay_s",
         "motor.kd",
         "motor.kp",
@@ -101,6 +108,7 @@ USUALLY_IN_PLACE = frozenset(
         "noise",
         "noise.start_tilt_rad",
         "surfaces",
+        "time_offset_s",
     }
 )
 """Fields that all of gaplab's engines with bodies set in place."""
@@ -118,6 +126,8 @@ class Engine(Plugin):
         honours: World fields that affect the results, like `material.dynamic_friction`: names of `ALL_FIELDS`.
         in_place: fields in which worlds may differ and still share what the engine built: names as in `World.edited`.
         closes_loops: true if it runs Loops, not only Motions.
+        tells_joints: true if a trajectory has what encoders tell, where its motion's `joints` asks for it.
+        sets_starts: true if a motion's `start` says where and how fast it begins.
         batch: preferred number of rollouts in a call; 1 if a call has little overhead.
         usual_rollout_s: usual seconds of a rollout, for estimates before any measurement.
         repeatable: true if a rollout is only computed, so that it may be repeated at any time: for replays, and by
@@ -129,6 +139,8 @@ class Engine(Plugin):
     honours: ClassVar[frozenset[str]]
     in_place: ClassVar[frozenset[str]] = frozenset()
     closes_loops: ClassVar[bool] = False
+    tells_joints: ClassVar[bool] = False
+    sets_starts: ClassVar[bool] = False
     batch: ClassVar[int] = 1
     usual_rollout_s: ClassVar[float] = 0.02
     repeatable: ClassVar[bool] = False
@@ -166,12 +178,8 @@ class Engine(Plugin):
 
         An engine that is faster in batches overrides this loop.
         """
-        grid = [[self.rollout(world, motion) for world in worlds] for motion in motions]
-        return Trajectory(
-            times_s=motions[0].observe_s,
-            positions_m=np.array([[each.positions_m for each in row] for row in grid]),
-            orientations=np.array([[each.orientations for each in row] for row in grid]),
-        )
+        rows = [[self.rollout(world, motion) for world in worlds] for motion in motions]
+        return Trajectory.stacked([Trajectory.stacked(row) for row in rows])
 
     def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
         """Return the same rollout, with poses at times `(k,)`, ascending, from 0 to the last observation.
@@ -198,8 +206,9 @@ class Engine(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return the World fields that the engine honours, and whether it closes loops, for the catalogue."""
-        return {"honours": sorted(cls.honours), "closes_loops": cls.closes_loops}
+        """Return the World fields that the engine honours, and what else it can do, for the catalogue."""
+        able = {name: getattr(cls, name) for name in ("closes_loops", "tells_joints", "sets_starts")}
+        return {"honours": sorted(cls.honours), **able}
 
 
 WARM_SCENES = 4
@@ -254,7 +263,7 @@ class SceneEngine(Engine, Generic[S]):
 
     honours = ALL_FIELDS
     repeatable = True
-    closes_loops = True
+    closes_loops = tells_joints = sets_starts = True
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)

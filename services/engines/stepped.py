@@ -17,8 +17,17 @@ from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.engines.base import SceneEngine, Warm
 from gaplab.services.world.controllers.parts import middles
-from gaplab.services.world.kinematics import chain, clearances_m, inverse, observed_poses, rotated
-from gaplab.services.world.motions import Loop, Motion, Recording, Tilt, Trajectory
+from gaplab.services.world.kinematics import (
+    Placed,
+    chain,
+    clearances_m,
+    inverse,
+    observed_poses,
+    placed,
+    rotated,
+    started,
+)
+from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.world.sensing import Bearing, gravity_m_s2, observations
 from gaplab.services.world.world import PDMotor, World
 
@@ -89,7 +98,7 @@ class MotionAgenda:
         rows, actuators = np.nonzero(changed)
         steps = steps_at(motion.times_s[rows], world.time_step_s)
         targets, late = motion.targets[rows, actuators].tolist(), delays(world)
-        self._commands = _before(world, late)
+        self._commands = _before(started(world, motion), late)
         for step, actuator, target in zip(steps, actuators.tolist(), targets, strict=True):
             self._commands.setdefault(step + late[actuator], []).append((actuator, target))
         self.moments: Iterable[int] = self._commands
@@ -109,7 +118,7 @@ class LoopAgenda:
     def __init__(self, loop: Loop, scene: "SteppedScene") -> None:
         self._acting, self._senses, self._scene, world = Acting([loop]), loop.senses, scene, scene.world
         self._late = delays(world)
-        self._commands = _before(world, self._late)
+        self._commands = _before(started(world, loop), self._late)
         self._ticks: dict[int, list[tuple[int, int]]] = {}
         acts, age = tick_steps(loop, world.time_step_s), round(loop.latency_s / world.time_step_s)
         senses = [max(0, step - age) for step in acts]
@@ -170,8 +179,8 @@ class SteppedScene(Warm, Protocol):
     def spin(self) -> FloatArray:
         """Return the angular velocity of the base, `(3,)`, rad/s, along the axes of the world."""
 
-    def torques(self) -> FloatArray:
-        """Return the torques of the motors in the last step, `(joints,)`, N·m."""
+    def encoders(self) -> FloatArray:
+        """Return `(7 + 3 · joints,)`: pose, angles, speeds, and torques of the motors in the last step, N·m, or N."""
 
 
 def watch(
@@ -230,8 +239,25 @@ def checked_s(world: World, end_s: float) -> FloatArray:
     return times_s[times_s <= end_s]
 
 
-def explodes(world: World, poses: FloatArray, angles_rad: FloatArray, gravity_m_s2: FloatArray) -> NDArray[np.bool_]:
-    """Return `(...)`: whether the base has more energy than its fall and its joints can have given it.
+def thrown(world: World, motion: Motion | Loop) -> float:
+    """Return the energy that a robot has when a motion begins, by its mass, m²/s²: all of it may become the base's."""
+    begun = None if motion.start is None else placed(world, motion)
+    if begun is None:
+        return 0.0
+    levers_m = _levers_m(world)
+    swept = (np.abs(begun.speeds_rad_s) @ levers_m[:, 1:].T).max()
+    turned = np.linalg.norm(begun.turning_rad_s) * levers_m[:, 0].max()
+    return float(np.linalg.norm(begun.velocity_m_s) + turned + swept) ** 2 / 2
+
+
+def explodes(
+    world: World,
+    poses: FloatArray,
+    angles_rad: FloatArray,
+    gravity_m_s2: FloatArray,
+    thrown_m2_s2: FloatArray | float = 0.0,
+) -> NDArray[np.bool_]:
+    """Return `(...)`: whether the base has more energy than its start, its fall and its joints can have given it.
 
     A robot pushes itself off at most as fast as its joints sweep its feet past the base, and may fall over its own
     size. Joints that only shake, since their motors are too strong for an engine, sweep nothing.
@@ -241,6 +267,7 @@ def explodes(world: World, poses: FloatArray, angles_rad: FloatArray, gravity_m_
         poses: `(..., c, ≥ 3)`: positions of the base at the checks, and more.
         angles_rad: `(..., c, joints)`, likewise.
         gravity_m_s2: `(..., 3)`.
+        thrown_m2_s2: `(...)`: energy at the start, by mass: see `thrown`.
     """
     levers_m, interval_s = _levers_m(world), _interval_s(world)
     with np.errstate(all="ignore"):  # physics that failed gives nan, or numbers without bounds
@@ -249,7 +276,8 @@ def explodes(world: World, poses: FloatArray, angles_rad: FloatArray, gravity_m_
         swept = (np.abs(np.diff(angles_rad, axis=-2)) @ levers_m[:, 1:].T).max(axis=-1) / interval_s
         pushed = np.maximum.accumulate(swept, axis=-1) ** 2 / 2
         pull = np.maximum(np.linalg.norm(gravity_m_s2, axis=-1), LEAST_PULL_M_S2)[..., None]
-        return np.asarray((speeds**2 / 2 > fallen + pushed + pull * levers_m[:, 0].max()).any(axis=-1))
+        given = pull * levers_m[:, 0].max() + np.asarray(thrown_m2_s2)[..., None]
+        return np.asarray((speeds**2 / 2 > fallen + pushed + given).any(axis=-1))
 
 
 def _interval_s(world: World) -> float:
@@ -273,17 +301,29 @@ def _levers_m(world: World) -> FloatArray:
     return frozen(levers_m)
 
 
-def recording(
-    motion: Motion | Loop, times_s: FloatArray, poses: FloatArray, seen: FloatArray, torques_nm: FloatArray
-) -> Recording:
-    """Return a Recording of the poses of a trajectory `(t, 7)`, and of base and joints at times `(k, 7 + joints)`.
+def trajectory(motion: Motion | Loop, poses: FloatArray, encoders: FloatArray) -> Trajectory:
+    """Return a Trajectory of poses `(..., t, 7)`, with encoders `(..., t, 3 · joints)` if the motion asks for them.
 
-    All of the latter are nan if any of the poses is.
+    Encoders are those of `SteppedScene`; those of a rollout with a pose of nan are nan.
     """
+    if not motion.joints:
+        return Trajectory(motion.observe_s, poses[..., :3], poses[..., 3:])
     if np.isnan(poses).any():
-        seen = np.full_like(seen, np.nan)
-    trajectory = Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
-    return Recording(trajectory, times_s, seen[:, :7], seen[:, 7:], torques_nm)
+        encoders = np.where(np.isnan(poses).any(axis=(-2, -1), keepdims=True), np.nan, encoders)
+    count = encoders.shape[-1] // 3
+    told = (encoders[..., each * count : (each + 1) * count] for each in range(3))
+    return Trajectory(motion.observe_s, poses[..., :3], poses[..., 3:], *told)
+
+
+def recording(seen: Trajectory, times_s: FloatArray, poses: FloatArray, encoders: FloatArray) -> Recording:
+    """Return a Recording of a trajectory, and of base `(k, 7)` and encoders `(k, 3 · joints)` at other times.
+
+    Its poses and angles are nan if any pose of the trajectory is.
+    """
+    angles, _, torques = np.split(encoders, 3, axis=-1)
+    if np.isnan(seen.positions_m).any():
+        poses, angles = np.full_like(poses, np.nan), np.full_like(angles, np.nan)
+    return Recording(seen, times_s, poses, angles, torques)
 
 
 Rows = NDArray[np.intp]
@@ -300,37 +340,32 @@ class SteppedEngine(SceneEngine[S]):
     failures: tuple[type[Exception], ...] = ()
 
     @abstractmethod
-    def _start(self, scene: S, world: World, tilt_rad: Tilt) -> Callable[[int], None]:
+    def _start(self, scene: S, world: World, begun: Placed | None) -> Callable[[int], None]:
         """Set a scene to time 0 of a world; return the function that advances it by a number of time steps.
 
         Args:
             scene: scene that was built from `world.built(in_place)`.
             world: the world, which `scene.world` is from now on.
-            tilt_rad: rotation of the base, about x and y of the world.
+            begun: how the robot is; None if it is as the world has it.
         """
 
     def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
         """Return the trajectory of the observed body, `(t, 3)`; times are rounded to whole time steps."""
         with self._turn:
-            seen = self._run(world, motion, slice(None))
-        poses = _observed(world, seen)
-        return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
+            seen = self._run(world, motion, slice(None), motion.joints)
+        return trajectory(motion, _observed(world, seen), seen[:, 7:])
 
     def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
         """Return the same rollout with joint angles and torques."""
         often = motion.observed_at(np.union1d(motion.observe_s, times_s))
         observed, recorded = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, times_s))
         with self._turn:
-            seen = self._run(world, often, observed, with_torques=True)
-        torques = seen[recorded, 7 + len(world.joints) :]
-        torques[times_s == 0] = 0.0  # no step has ended yet
-        base_and_joints = seen[recorded, : 7 + len(world.joints)]
-        return recording(motion, times_s, _observed(world, seen[observed]), base_and_joints, torques)
+            seen = self._run(world, often, observed, True)
+        found = trajectory(motion, _observed(world, seen[observed]), seen[observed, 7:])
+        return recording(found, times_s, seen[recorded, :7], seen[recorded, 7:])
 
-    def _run(
-        self, world: World, motion: Motion | Loop, checked: slice | Rows, *, with_torques: bool = False
-    ) -> FloatArray:
-        """Return poses and angles `(t, 7 + joints)`, or `(t, 7 + 2 · joints)` with torques.
+    def _run(self, world: World, motion: Motion | Loop, checked: slice | Rows, with_encoders: bool) -> FloatArray:
+        """Return poses and angles `(t, 7 + joints)`, or poses and encoders `(t, 7 + 3 · joints)`.
 
         All is nan if the poses of the checked rows are implausible, or the energy explodes.
         """
@@ -338,15 +373,16 @@ class SteppedEngine(SceneEngine[S]):
         scene, checks_s = self._scenes[built], checked_s(world, float(motion.observe_s[-1]))
         often = motion.observed_at(np.union1d(motion.observe_s, checks_s))
         asked, checks = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, checks_s))
-        looks = (scene.pose, scene.angles, scene.torques)[: 2 + with_torques]
+        look = scene.encoders if with_encoders else lambda: np.concatenate([scene.pose(), scene.angles()])
+        begun = placed(world, motion)
         try:
-            advance = self._start(scene, world, motion.start_tilt_rad)
-            watched = watch(scene, advance, often, lambda: np.concatenate([look() for look in looks]))
+            watched = watch(scene, self._start(scene, world, begun), often, look)
         except self.failures:
-            watched = np.full((len(often.observe_s), 7 + (1 + with_torques) * len(world.joints)), np.nan)
-        seen, energetic = watched[asked], watched[checks]
+            watched = np.full((len(often.observe_s), 7 + (1 + 2 * with_encoders) * len(world.joints)), np.nan)
+        watched[often.observe_s < world.time_step_s / 2, 7 + 2 * len(world.joints) :] = 0.0  # no step has ended yet
+        seen, energetic, energy = watched[asked], watched[checks], thrown(built, motion)
         is_plausible = plausible(seen[checked, :7]) and plausible(_observed(world, seen[checked]))
-        if not is_plausible or explodes(built, energetic, _angles(world, energetic), gravity_m_s2(world)):
+        if not is_plausible or explodes(built, energetic, _angles(world, energetic), gravity_m_s2(world), energy):
             self._scenes.drop(built)  # nan persists in a PhysX scene; Bullet drops bodies that are too far away
             return np.full_like(seen, np.nan)
         return seen

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
+from operator import itemgetter
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -91,19 +92,14 @@ class Simulation:
         noises = {world.noise: None for world in worlds}
         if len(noises) == 1:
             return self._engine.rollouts(worlds, _disturbed(worlds[0], motions, genomes))
-        found: list[Trajectory | None] = [None] * len(worlds)
+        found: dict[int, Trajectory] = {}
         for noise in noises:
             alike = [column for column, world in enumerate(worlds) if world.noise == noise]
             chosen = [worlds[column] for column in alike]
             seen = self._engine.rollouts(chosen, _disturbed(chosen[0], motions, genomes))
             for place, column in enumerate(alike):
-                found[column] = Trajectory(seen.times_s, seen.positions_m[:, place], seen.orientations[:, place])
-        columns = [each for each in found if each is not None]
-        return Trajectory(
-            columns[0].times_s,
-            np.stack([each.positions_m for each in columns], axis=1),
-            np.stack([each.orientations for each in columns], axis=1),
-        )
+                found[column] = seen.mapped(itemgetter((slice(None), place)))
+        return Trajectory.stacked([found[column] for column in range(len(worlds))], axis=1)
 
 
 def _edited(world: World, edits: Sequence[tuple[int, Tunable]], values: tuple[float, ...]) -> World:
@@ -144,7 +140,7 @@ def _places(all_s: FloatArray, times_s: FloatArray) -> Places:
 
 
 def _at(seen: Trajectory, places: Places) -> Trajectory:
-    return Trajectory(seen.times_s[places], seen.positions_m[..., places, :], seen.orientations[..., places, :])
+    return seen.mapped(itemgetter((..., places, slice(None))), times_s=seen.times_s[places])
 
 
 class SafetyForecast:

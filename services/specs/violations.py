@@ -74,20 +74,27 @@ def strategy_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) 
 
 
 def engine_violations(robot: Robot, places: Mapping[type[Engine], str]) -> Iterator[Violation]:
-    """Yield what the robot's world uses and an engine does not honour, and a loop that an engine does not close.
+    """Yield what the robot's world uses and an engine does not honour, and what its motions need and an engine cannot.
 
     Each engine has its place in the spec.
     """
+    start = robot.motion(robot.known).start
+    needs = {
+        "closes_loops": (robot.loops, "the controller of the {} observes while it acts, and {} closes no loop"),
+        "tells_joints": (robot.joints, "the task of the {} needs its joints, and {} tells nothing about them"),
+        "sets_starts": (start is not None, "a motion of the {} says how it begins, and {} begins as the world does"),
+    }
     able = {name: each for name, each in engines.items() if runs(each, robot.world)}
     for engine, pointer in places.items():
         for field in engine.lacks(robot.world):
             others = [name for name, each in able.items() if field not in each.lacks(robot.world)]
             message = f"the {robot.label} uses {field}, which {engine.name} does not honour; {able_to(others)}"
             yield Violation(pointer, engine.name, message, others)
-        if robot.loops and not engine.closes_loops:
-            others = [name for name, each in able.items() if each.closes_loops]
-            message = f"the controller of the {robot.label} observes while it acts, and {engine.name} closes no loop"
-            yield Violation(pointer, engine.name, f"{message}; {able_to(others)}", others)
+        for can, (needed, why) in needs.items():
+            if needed and not getattr(engine, can):
+                others = [name for name, each in able.items() if getattr(each, can)]
+                message = f"{why.format(robot.label, engine.name)}; {able_to(others)}"
+                yield Violation(pointer, engine.name, message, others)
 
 
 def able_to(able: Sequence[str]) -> str:

@@ -7,12 +7,28 @@ Each row of the results depends on the same row of the arguments alone, to the l
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.world.world import UNTURNED, Body, Box, Capsule, Cylinder, Hull, Joint, Part, Shape, World
+from gaplab.services.core.errors import PluginBroken
+from gaplab.services.world.motions import LEVEL, Loop, Motion, Start
+from gaplab.services.world.world import (
+    ORIGIN,
+    UNTURNED,
+    Body,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Joint,
+    Part,
+    Shape,
+    Vector,
+    World,
+)
 
 TOUCHING_M = 0.002
 """Height of the lowest point below which a body touches the ground: engines separate surfaces by less."""
@@ -133,13 +149,71 @@ def lowest_m(world: World, turn: FloatArray) -> float:
     return min(float(clearances_m(world.bodies[place], positions[:, place], turns[:, place])[0]) for place in touching)
 
 
-def tilted_pose(world: World, tilt_rad: tuple[float, float]) -> FloatArray:
-    """Return `(7,)`: pose of the base at time 0, tilted about x and y of the world; its lowest point is as high."""
+class Placed(NamedTuple):
+    """How a robot is at time 0: its base, `(7,)` and `(3,)`, as of Start, and its joints, `(joints,)`."""
+
+    pose: FloatArray
+    velocity_m_s: FloatArray
+    turning_rad_s: FloatArray
+    angles_rad: FloatArray
+    speeds_rad_s: FloatArray
+
+    def of_centre(self, center_m: Vector) -> tuple[FloatArray, FloatArray]:
+        """Return the velocities of the base's centre of mass, `(3,)`, and about it, `(3,)`, along axes of the world."""
+        spin = rotated(self.pose[3:], self.turning_rad_s)
+        return self.velocity_m_s + _cross(spin, rotated(self.pose[3:], np.array(center_m))), spin
+
+
+def placed(world: World, motion: Motion | Loop) -> Placed | None:
+    """Return how a robot is when a motion begins; None if it is as the world has it.
+
+    A base that is tilted has its lowest point as high, unless the motion says where it is.
+
+    Raises:
+        PluginBroken: the start is of another robot.
+    """
+    if motion.start is None and motion.start_tilt_rad == LEVEL:
+        return None
+    start, world = motion.start or Start(), started(world, motion)
+    level = turn = np.array(start.turn or world.start_turn)
+    place = np.array(start.position_m or (0.0, 0.0, world.start_height_m))
+    if motion.start_tilt_rad != LEVEL:
+        turn = product(turn_by(motion.start_tilt_rad), level)
+        place[2] += 0.0 if start.position_m else lowest_m(world, level) - lowest_m(world, turn)
+    return Placed(
+        np.array([*place, *turn]),
+        np.array(start.velocity_m_s or ORIGIN),
+        np.array(start.turning_rad_s or ORIGIN),
+        np.array([joint.start for joint in world.joints]),
+        np.array(start.speeds_rad_s or [0.0] * len(world.joints)),
+    )
+
+
+def started(world: World, motion: Motion | Loop) -> World:
+    """Return the world whose joints begin where the motion's start says.
+
+    Raises:
+        PluginBroken: the start is of another robot.
+    """
+    start, count = motion.start, len(world.joints)
+    if start is None:
+        return world
+    for values in (start.angles_rad, start.speeds_rad_s):
+        if values is not None and len(values) != count:
+            raise PluginBroken(f"the motion starts {len(values)} joints, but the robot has {count}; give one for each")
+    base = (start.position_m, start.turn, start.velocity_m_s, start.turning_rad_s)
+    if world.fixed and base != (None,) * len(base):
+        raise PluginBroken("the motion starts the base, but it never moves; leave position, turn and velocities out")
+    if start.angles_rad is None:
+        return world
+    pairs = zip(world.joints, start.angles_rad, strict=True)
+    return replace(world, joints=tuple(replace(joint, start=angle) for joint, angle in pairs))
+
+
+def turn_by(tilt_rad: tuple[float, float]) -> FloatArray:
+    """Return `(4,)`: the rotation by a tilt about x and y, which is not 0."""
     angle = float(np.hypot(*tilt_rad))
-    axis = np.array([*tilt_rad, 0.0]) / angle
-    level = np.array(world.start_turn)
-    turn = product(about(axis, np.array([angle]))[0], level)
-    return np.array([0.0, 0.0, world.start_height_m + lowest_m(world, level) - lowest_m(world, turn), *turn])
+    return np.asarray(about(np.array([*tilt_rad, 0.0]) / angle, np.array([angle]))[0])
 
 
 def clearances_m(body: Body, positions: FloatArray, orientations: FloatArray) -> FloatArray:

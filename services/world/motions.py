@@ -1,12 +1,13 @@
 """What a world does: commands of a controller, in advance or in a loop, and what is observed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray, Genome, frozen, no_readings
+from gaplab.services.world.world import Quaternion, Vector
 
 Act: TypeAlias = Callable[[FloatArray, FloatArray, FloatArray, float], tuple[FloatArray, FloatArray]]
 """Genomes `(n, g)`, observations `(n, s)`, memories `(n, m)` and seconds to targets `(n, a)` and memories `(n, m)`.
@@ -19,6 +20,27 @@ Tilt: TypeAlias = tuple[float, float]
 LEVEL: Tilt = (0.0, 0.0)
 
 
+@dataclass(frozen=True)
+class Start:
+    """How a robot is at time 0: a part that is None is as the world has it, at rest.
+
+    Attributes:
+        position_m: of the base's frame.
+        turn: rotation of the base, as x, y, z, w.
+        velocity_m_s: of the base's frame, along the axes of the world.
+        turning_rad_s: angular velocity of the base, in its own frame.
+        angles_rad: angle of each joint, in the world's order; m for a joint that slides.
+        speeds_rad_s: speed of each joint, likewise.
+    """
+
+    position_m: Vector | None = None
+    turn: Quaternion | None = None
+    velocity_m_s: Vector | None = None
+    turning_rad_s: Vector | None = None
+    angles_rad: tuple[float, ...] | None = None
+    speeds_rad_s: tuple[float, ...] | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Actuator targets over time, constant between changes.
@@ -29,6 +51,8 @@ class Motion:
         observe_s: `(t,)`, ascending: times of observation; the last one ends the rollout.
         start_tilt_rad: rotation of the base at time 0, about x and y of the world.
         every_s: interval at which a smooth curve was sampled; 0 if targets step.
+        start: how the robot is at time 0; None if it is as the world has it.
+        joints: true if the trajectory has what encoders tell, too.
     """
 
     times_s: FloatArray
@@ -36,10 +60,12 @@ class Motion:
     observe_s: FloatArray
     start_tilt_rad: Tilt = LEVEL
     every_s: float = 0.0
+    start: Start | None = None
+    joints: bool = False
 
-    def observed_at(self, times_s: FloatArray) -> "Motion":
-        """Return the same motion, observed at other times `(t,)`."""
-        return replace(self, observe_s=times_s)
+    def observed_at(self, times_s: FloatArray, joints: bool | None = None) -> "Motion":
+        """Return the same motion, observed at other times `(t,)`; None tells joints if the motion itself does."""
+        return replace(self, observe_s=times_s, joints=self.joints if joints is None else joints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +83,8 @@ class Loop:
         target_noise: `(ticks, a)`: what is added to its targets, likewise.
         latency_s: age of its observations.
         start_tilt_rad: rotation of the base at time 0, about x and y of the world.
+        start: how the robot is at time 0; None if it is as the world has it.
+        joints: true if the trajectory has what encoders tell, too.
     """
 
     act: Act
@@ -69,10 +97,12 @@ class Loop:
     target_noise: FloatArray = field(default_factory=no_readings)
     latency_s: float = 0.0
     start_tilt_rad: Tilt = LEVEL
+    start: Start | None = None
+    joints: bool = False
 
-    def observed_at(self, times_s: FloatArray) -> "Loop":
-        """Return the same loop, whose trajectory is observed at other times `(t,)`."""
-        return replace(self, observe_s=times_s)
+    def observed_at(self, times_s: FloatArray, joints: bool | None = None) -> "Loop":
+        """Return the same loop, observed at other times `(t,)`; None tells joints if the loop itself does."""
+        return replace(self, observe_s=times_s, joints=self.joints if joints is None else joints)
 
     @property
     def ticks(self) -> int:
@@ -100,11 +130,38 @@ class Trajectory:
         positions_m: `(..., t, 3)`: positions of the base's frame; leading axes are motions × worlds. All nan where the
             physics failed.
         orientations: `(..., t, 4)`: orientations of the base, as quaternions x, y, z, w.
+        angles_rad: `(..., t, joints)`: angles of the joints in the world's order, with every full turn, m for a joint
+            that slides; None, as the next two, unless the motion's `joints` asks for them.
+        speeds_rad_s: `(..., t, joints)`: their speeds.
+        torques_nm: `(..., t, joints)`: torques of their motors in the time step before; 0 at time 0.
     """
 
     times_s: FloatArray
     positions_m: FloatArray
     orientations: FloatArray
+    angles_rad: FloatArray | None = None
+    speeds_rad_s: FloatArray | None = None
+    torques_nm: FloatArray | None = None
+
+    def mapped(
+        self, change: Callable[..., FloatArray], *others: "Trajectory", times_s: FloatArray | None = None
+    ) -> "Trajectory":
+        """Return the trajectory with each of its arrays changed, and perhaps other times; None stays None.
+
+        `change` gets the array of each of the others, too.
+        """
+        changed = {
+            name: change(*(getattr(each, name) for each in (self, *others)))
+            for name in ("positions_m", "orientations", "angles_rad", "speeds_rad_s", "torques_nm")
+            if getattr(self, name) is not None
+        }
+        return Trajectory(self.times_s if times_s is None else times_s, **changed)
+
+    @classmethod
+    def stacked(cls, trajectories: Sequence["Trajectory"], axis: int = 0) -> "Trajectory":
+        """Return trajectories of the same times as one, along a new axis."""
+        first, *others = trajectories
+        return first.mapped(lambda *each: np.stack(each, axis=axis), *others)
 
 
 @dataclass(frozen=True, eq=False)

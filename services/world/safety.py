@@ -94,7 +94,7 @@ def extremes(world: World, motion: Motion | Loop, recording: Recording, fitness:
         torque=_largest(recording.torques_nm),
         tilt=float(tilts.max()),
         height=float(poses[:, 2].min()),
-        clearance=float(clearances_m(world.bodies[0], poses[:, :3], poses[:, 3:]).min()),
+        clearance=float(clearances_m(world.bodies[0], poses[:, :3], poses[:, 3:]).min()) - world.ground_m,
         fitness=fitness,
         out_of_range=tuple(_out_of_range(world, motion, recording)),
     )

@@ -17,7 +17,7 @@ from numpy.random import Generator
 
 from gaplab.services.core.arrays import FloatArray, Genome, frozen, no_readings
 from gaplab.services.core.streams import stream
-from gaplab.services.world.kinematics import TOUCHING_M, Clearances, inverse, rotated
+from gaplab.services.world.kinematics import TOUCHING_M, Clearances, inverse, rotated, turn_by
 from gaplab.services.world.motions import LEVEL, Loop, Motion, Tilt
 from gaplab.services.world.world import Body, Noise, World
 
@@ -131,11 +131,16 @@ def feet(world: World) -> tuple[Body, ...]:
 
 
 def gravity_m_s2(world: World) -> FloatArray:
-    """Return `(3,)`: gravity, which a slope turns in place of the ground."""
-    pull = world.gravity_m_s2
-    if not world.slope_rad:
-        return np.array([0.0, 0.0, -pull])
-    return np.array([-pull * np.sin(world.slope_rad), 0.0, -pull * np.cos(world.slope_rad)])
+    """Return `(3,)`: gravity, which a slope turns in place of the ground, and then its own tilt."""
+    if not world.slope_rad and not any(world.gravity_tilt_rad):
+        return np.array([0.0, 0.0, -world.gravity_m_s2])
+    return world.gravity_m_s2 * _down(world)
+
+
+def _down(world: World) -> FloatArray:
+    """Return `(3,)`: the direction of gravity."""
+    down = np.array([-np.sin(world.slope_rad), 0.0, -np.cos(world.slope_rad)])
+    return rotated(turn_by(world.gravity_tilt_rad), down) if any(world.gravity_tilt_rad) else down
 
 
 @dataclass(frozen=True)
@@ -158,12 +163,12 @@ def _actuated(world: World, values: FloatArray) -> FloatArray:
 
 
 def _tilt(world: World, bearing: Bearing) -> FloatArray:
-    down = np.array([-np.sin(world.slope_rad), 0.0, -np.cos(world.slope_rad)])
-    return rotated(inverse(bearing.poses[:, 3:]), down)
+    return rotated(inverse(bearing.poses[:, 3:]), _down(world))
 
 
 def _contacts(world: World, bearing: Bearing) -> FloatArray:
-    return (_clearances(world)(bearing.poses, bearing.angles_rad) < TOUCHING_M).astype(float)
+    heights = _clearances(world)(bearing.poses, bearing.angles_rad) - world.ground_m
+    return (heights < TOUCHING_M).astype(float)
 
 
 @lru_cache(maxsize=WORLDS_KEPT)

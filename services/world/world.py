@@ -1,10 +1,12 @@
 """Engine-neutral description of what is simulated: immutable, edited by `dataclasses.replace` and `World.edited`.
 
-SI units throughout; lengths of boxes are full edges, not halves; z points up; the ground is the plane z = 0.
+SI units throughout; lengths of boxes are full edges, not halves; z points up; the ground is the plane z = 0, or
+at the height `ground_m` of a world.
 """
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import exp
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from pydantic import Field
@@ -191,6 +193,8 @@ class Joint:
         limits: smallest and largest angle, rad; None if it has none.
         damping: torque by speed, N·m·s/rad.
         dry_friction: torque that the joint withstands at rest, and that brakes it in motion, N·m.
+        static_friction: torque that it withstands at rest beyond the dry friction, N·m: it sticks.
+        stribeck_speed: speed at which a share 1/e of the static friction is left, rad/s.
         armature: inertia of what turns with the joint, seen from the joint, kg m².
         start: angle at time 0, rad.
         swing: how far its motor usually moves it to each side of the start, in the unit of the motor's targets; it is
@@ -211,6 +215,8 @@ class Joint:
     armature: float = 0.0
     start: float = 0.0
     swing: float = 0.5
+    static_friction: float = 0.0
+    stribeck_speed: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -237,6 +243,7 @@ class Noise:
 
 
 Surfaces: TypeAlias = Annotated[tuple[tuple[str, Material], ...], Field(fail_fast=True)]
+Biases: TypeAlias = Annotated[tuple[tuple[str, float], ...], Field(fail_fast=True)]
 
 
 @dataclass(frozen=True)
@@ -253,9 +260,13 @@ class World:
         start_turn: rotation of the base at time 0.
         fixed: true if the base never moves.
         surfaces: material of each named surface, in contact with the ground.
-        slope_rad: angle by which the ground rises along x. The ground stays the plane z = 0; gravity turns.
+        slope_rad: angle by which the ground rises along x. The ground stays level; gravity turns.
         noise: noise of commands and observations.
         observed: name of the body whose motion is the trajectory; "" for the base.
+        ground_m: height of the ground, in the frame in which sensors tell positions.
+        gravity_tilt_rad: rotation of gravity about x and y, besides the slope's: how far that frame is from upright.
+        time_offset_s: by how much later than the sensors' clock says the commands of a motion begin; may be negative.
+        biases: what is added to the readings of sensors, by name, like `angle NAME` of a joint, in their units.
         origin: world that this one was edited from, in fields that most engines set in place; None if it is as built.
         edits: names of these fields, as in the `honours` of engines.
     """
@@ -273,6 +284,10 @@ class World:
     slope_rad: float = 0.0
     noise: Noise = Noise()
     observed: str = ""
+    ground_m: float = 0.0
+    gravity_tilt_rad: tuple[float, float] = (0.0, 0.0)
+    time_offset_s: float = 0.0
+    biases: Biases = ()
     origin: "World | None" = field(default=None, compare=False, repr=False)
     edits: frozenset[str] = field(default=frozenset(), compare=False, repr=False)
 
@@ -302,6 +317,14 @@ class World:
     @cached_property
     def _as_built(self) -> "World":
         return replace(self.kind, origin=None, edits=frozenset())
+
+
+def friction_nm(dry: float, static: float, stribeck_speed: float, speed: float) -> float:
+    """Return the largest torque of a joint's friction at a speed: dry + static · exp(-(speed / stribeck_speed)²).
+
+    Source: Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, of the Stribeck effect, with an exponent of 2.
+    """
+    return dry + static * exp(-((speed / stribeck_speed) ** 2)) if static > 0.0 else dry
 
 
 STIFFNESS, DAMPING, FEED, STRONGEST = 0, 1, 2, 3

@@ -24,7 +24,10 @@ TRIANGLE = 1e-9
 SHORTEST_STEP_S = 1e-5
 
 LATEST_S = 10.0
-"""Largest delay and latency, and largest noise in its unit."""
+"""Largest delay, offset of time and latency, and largest noise in its unit."""
+
+HIGHEST_M = 1.0
+"""Largest height of the ground, up or down: engines take a base that is deeper for one that fell through it."""
 
 SHORTEST_M, LONGEST_M = 1e-6, 1e4
 """Smallest and largest dimension of a shape."""
@@ -122,9 +125,10 @@ def _joint_checks(joint: Joint) -> Iterator[_Check]:
     yield _name_check("/name", joint.name)
     yield "/axis", joint.axis, _is_unit(joint.axis), "a vector of length 1"
     yield "/turn", joint.turn, _is_unit(joint.turn), "a quaternion of length 1"
-    for name in ("damping", "dry_friction", "armature"):
+    for name in ("damping", "dry_friction", "static_friction", "armature"):
         yield f"/{name}", getattr(joint, name), getattr(joint, name) >= 0, "at least 0"
-    yield "/swing", joint.swing, joint.swing > 0, "above 0"
+    for name in ("swing", "stribeck_speed"):
+        yield f"/{name}", getattr(joint, name), getattr(joint, name) > 0, "above 0"
     if joint.limits is not None:
         lower, upper = joint.limits
         yield "/limits", joint.limits, lower < upper, "the smaller limit, then the larger one"
@@ -151,6 +155,11 @@ def _world_checks(world: World) -> Iterator[_Check]:
     yield "/solver_iterations", world.solver_iterations, 1 <= world.solver_iterations <= 1000, "1 to 1000"
     yield "/start_turn", world.start_turn, _is_unit(world.start_turn), "a quaternion of length 1"
     yield "/slope_rad", world.slope_rad, abs(world.slope_rad) < math.pi / 2, "between -π/2 and π/2"
+    yield "/ground_m", world.ground_m, abs(world.ground_m) <= HIGHEST_M, f"-{HIGHEST_M:g} to {HIGHEST_M:g}"
+    tilts = world.gravity_tilt_rad
+    yield "/gravity_tilt_rad", tilts, math.hypot(*tilts) < math.pi / 2, "a rotation by less than π/2"
+    late = f"-{LATEST_S:g} to {LATEST_S:g}"
+    yield "/time_offset_s", world.time_offset_s, abs(world.time_offset_s) <= LATEST_S, late
     yield from _material_checks(world.material, "/material")
     for name, value in vars(world.noise).items():
         yield f"/noise/{name}", value, 0 <= value <= LATEST_S, f"0 to {LATEST_S:g}"

@@ -14,7 +14,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.engines import engines, stepped
 from gaplab.services.engines.base import USES, WARM_SCENES, Engine
-from gaplab.services.world.motions import Motion, Trajectory, open_loop
+from gaplab.services.world.motions import NO_MEMORY, Loop, Motion, Start, Trajectory, open_loop
 from gaplab.services.world.robot_library import IMPORTED
 from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
@@ -124,12 +124,15 @@ WITH_OR_WITHOUT: dict[str, tuple[Callable[[World], World], Callable[[World], Wor
     ),
     "body.parts": (lambda world: world, lambda world: in_parts(world, Sphere(0.025))),
     "fixed": (lambda world: world, lambda world: replace(world, fixed=True, observed=world.bodies[-1].name)),
+    "gravity_tilt_rad": (lambda world: world, lambda world: replace(world, gravity_tilt_rad=(0.05, -0.1))),
+    "ground_m": (lambda world: world, lambda world: replace(world, ground_m=-0.02)),
     "joint.armature": (lambda world: world, lambda world: each_joint(world, armature=0.01)),
     "joint.damping": (lambda world: world, lambda world: each_joint(world, damping=0.5)),
     "joint.dry_friction": (lambda world: world, lambda world: each_joint(world, dry_friction=1.0)),
     "joint.limits": (lambda world: world, lambda world: each_joint(world, limits=(-0.1, 0.1))),
     "joint.slides": (lambda world: world, lambda world: each_joint(world, slides=True)),
     "joint.start": (lambda world: world, lambda world: each_joint(world, start=0.2)),
+    "joint.static_friction": (lambda world: world, lambda world: each_joint(world, static_friction=1.0)),
     "joint.turn": (lambda world: world, lambda world: each_joint(world, turn=TURN)),
     "motor.delay_s": (with_pd, lambda world: with_pd(world, delay_s=0.1)),
     "motor.follows": (
@@ -344,6 +347,65 @@ def test_looking_more_often_changes_nothing_that_is_seen_and_time_zero_is_the_st
     assert np.array_equal(seen.positions_m[numbers], expected.positions_m)
     assert seen.positions_m[0] == pytest.approx([0.0, 0.0, world.start_height_m])
     assert seen.orientations[0] == pytest.approx([0.0, 0.0, 0.0, 1.0])
+
+
+def bend(_: Any, seen: FloatArray, memory: FloatArray, now_s: float) -> tuple[FloatArray, FloatArray]:
+    return 0.5 * seen + 0.1 * np.sin(now_s), memory
+
+
+def begun(world: World, seconds: FloatArray, *, loops: bool, start: Start | None) -> Motion | Loop:
+    """A motion, or a loop, whose targets depend on what it does."""
+    count = len(world.actuators)
+    if not loops:
+        return Motion(np.zeros(1), np.full((1, count), 0.2), seconds, start=start)
+    return Loop(bend, ("angles",), np.zeros(1), NO_MEMORY, 0.03, seconds, latency_s=0.01, start=start)
+
+
+@pytest.mark.parametrize("loops", [False, True])
+def test_encoders_and_starts_are_those_of_each_rollout_alone_and_encoders_move_nothing(
+    embodied: Pair, loops: bool
+) -> None:
+    engine, world = embodied.engine, with_pd(embodied.robot.world, delay_s=0.05)
+    angles, speeds = np.linspace(-0.3, 0.3, 2 * len(world.joints)).reshape(2, -1).tolist()
+    thrown = Start((0.1, 0.0, 0.6), TURN, (1.0, 0.5, 2.0), (1.0, -2.0, 3.0), tuple(angles), tuple(speeds))
+    bent, seconds = Start(angles_rad=tuple(angles)), np.array([0.0, 0.02, 0.5, 1.0])
+    motions = [begun(world, seconds, loops=loops, start=start) for start in (thrown, None, bent)]
+    worlds = [world, world.edited("ground_m", ground_m=-0.05)]
+
+    blind = engine.rollouts(worlds, motions)
+    told = engine.rollouts(worlds, [motion.observed_at(seconds, joints=True) for motion in motions])
+    twice = engine.rollouts(worlds, [motion.observed_at(seconds, joints=True) for motion in motions])
+
+    assert blind.angles_rad is None
+    assert np.array_equal(flat(blind), flat(told))
+    assert len({path.tobytes() for path in told.positions_m.reshape(6, -1)}) == 6
+    assert told.angles_rad is not None
+    assert told.torques_nm is not None
+    assert told.angles_rad[:, 0, 0] == pytest.approx(np.array([angles, [0.0] * len(angles), angles]), abs=1e-6)
+    assert np.abs(told.torques_nm[:, :, 0]).max() == 0.0
+    assert np.abs(told.torques_nm[:, :, -1]).max(axis=-1).min() > 0.0
+    for row, motion in enumerate(motions):
+        for column, each in enumerate(worlds):
+            alone = engine.rollout(each, motion.observed_at(seconds, joints=True))
+            recorded = engine.record(each, motion, seconds)
+            for name in ("positions_m", "orientations", "angles_rad", "speeds_rad_s", "torques_nm"):
+                assert np.array_equal(getattr(alone, name), getattr(told, name)[row, column])
+                assert np.array_equal(getattr(twice, name), getattr(told, name))
+            assert np.array_equal(recorded.angles_rad, alone.angles_rad)
+            assert np.array_equal(recorded.torques_nm, alone.torques_nm)
+
+
+def test_a_start_of_another_robot_is_refused(embodied: Pair) -> None:
+    world, seconds = embodied.robot.world, np.array([0.5])
+    fixed = replace(world, fixed=True, observed=world.bodies[-1].name)
+
+    for here, start, why in (
+        (world, Start(angles_rad=(0.1,)), "starts 1 joints, but the robot has"),
+        (world, Start(speeds_rad_s=(0.1,) * 99), "starts 99 joints"),
+        (fixed, Start(velocity_m_s=(1.0, 0.0, 0.0)), "it never moves"),
+    ):
+        with pytest.raises(PluginBroken, match=why):
+            embodied.engine.rollouts([here], [begun(here, seconds, loops=False, start=start)])
 
 
 def test_the_pose_is_of_the_bodys_frame_not_of_its_center_of_mass(embodied: Pair) -> None:

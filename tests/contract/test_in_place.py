@@ -98,9 +98,12 @@ IN_PLACE: dict[str, Callable[[World, float], dict[str, Any]]] = {
     },
     "body.mass_kg": lambda world, f: {"bodies": each_body(world, lambda body: heavier(body, f))},
     "gravity_m_s2": lambda world, f: {"gravity_m_s2": f * world.gravity_m_s2},
+    "gravity_tilt_rad": lambda _, f: {"gravity_tilt_rad": (0.1 * f, -0.05 * f)},
+    "ground_m": lambda _, f: {"ground_m": -0.05 * f},  # robots that begin in the ground explode
     "joint.armature": lambda world, f: {"joints": each_joint(world, armature=0.01 * f)},
     "joint.damping": lambda world, f: {"joints": each_joint(world, damping=0.1 * f)},
     "joint.dry_friction": lambda world, f: {"joints": each_joint(world, dry_friction=0.1 * f)},
+    "joint.static_friction": lambda world, f: {"joints": each_joint(world, static_friction=0.5 * f)},
     "motor.delay_s": lambda world, f: {"joints": each_motor(world, delay_s=0.02 * f)},
     "motor.kd": lambda world, f: {"joints": each_motor(world, kd=1.5 * f)},
     "motor.kp": lambda world, f: {"joints": each_motor(world, kp=50.0 * f)},

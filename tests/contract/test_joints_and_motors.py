@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.base import Engine
 from gaplab.services.world.kinematics import about, product
+from gaplab.services.world.motions import Start
 from gaplab.services.world.world import (
     UNTURNED,
     Body,
@@ -103,6 +106,40 @@ def test_dry_friction_holds_below_its_threshold_and_brakes_above(engine: Engine,
 
     assert np.abs(below).max() < 2e-3
     assert above == pytest.approx(0.5 * 0.5 * friction / inertia * seen**2, rel=0.05, abs=0.01)
+
+
+@pytest.mark.parametrize("dry", [0.0, 2.0])
+def test_a_joint_that_sticks_breaks_loose_and_then_has_its_dry_friction(engine: Engine, dry: float) -> None:
+    static, stribeck = 3.0, 0.2
+    world = rig(axis=X, slides=True, dry_friction=dry, static_friction=static, stribeck_speed=stribeck, motor=PUSH)
+    seen = times(0.5)
+
+    below = angles(engine, world, held(seen, 0.9 * (dry + static)))
+    above = angles(engine, world, held(seen, 1.3 * (dry + static)))
+
+    def moves(_: float, state: FloatArray) -> list[float]:
+        friction = dry + static * np.exp(-((state[1] / stribeck) ** 2))
+        return [state[1], (1.3 * (dry + static) - friction) / KG]
+
+    expected = solve_ivp(moves, (0, seen[-1]), [0.0, 0.0], t_eval=seen, rtol=1e-8).y[0]
+    assert np.abs(below).max() < 2e-3
+    assert above == pytest.approx(expected, rel=0.05, abs=0.01)
+
+
+def test_a_pendulum_swings_on_from_the_angle_and_the_speed_that_a_motion_begins_with(engine: Engine) -> None:
+    reach, start = 0.4, Start(angles_rad=(2.0,), speeds_rad_s=(3.0,))
+    bob = Body("bob", 1.0, Sphere(0.05), (0.0, 0.0, -reach), collides=False)
+    world = replace(rig(bob, gravity_m_s2=G, start=0.3), time_step_s=1 / 2000)
+    seen = np.arange(0, 1.0001, 0.1)
+
+    told = engine.rollout(world, replace(held(seen), start=start, joints=True))
+
+    pull = reach * G / (0.4 * 0.05**2 + reach**2)
+    swung = solve_ivp(lambda _, y: [y[1], -pull * np.sin(y[0])], (0, 1.1), [2.0, 3.0], t_eval=seen, rtol=1e-9).y
+    assert told.angles_rad is not None
+    assert told.speeds_rad_s is not None
+    assert told.angles_rad[:, 0] == pytest.approx(swung[0], abs=0.01)
+    assert told.speeds_rad_s[:, 0] == pytest.approx(swung[1], abs=0.05)
 
 
 def test_dry_friction_stops_what_slides(engine: Engine) -> None:

@@ -8,11 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-from gaplab.services.world.motions import Motion
+from gaplab.services.world.kinematics import product, rotated
+from gaplab.services.world.motions import Motion, Start
 from gaplab.services.world.world import Body, Box, Joint, Material, Motor, Sphere, World
 
 G = 9.81
@@ -132,6 +135,53 @@ def test_a_dropped_ball_falls_freely(engine: Engine) -> None:
     assert np.all(
         np.abs(heights - parabola)[falling] <= 0.5 * G * times[falling] * STEP_S + 1e-6
     )  # half a step's worth
+
+
+@pytest.mark.parametrize("center_m", [(0.0, 0.0, 0.0), (0.05, -0.1, 0.2)])
+def test_a_thrown_box_flies_a_parabola_and_spins_as_euler_says(
+    engine: Engine, center_m: tuple[float, float, float]
+) -> None:
+    """The velocity is that of its frame, in the world; the angular velocity is in its frame, not the world's."""
+    if not engine.sets_starts:
+        pytest.skip(f"{engine.name} starts no motion in the air")
+    box = Body("box", 2.0, Box((0.3, 0.2, 0.1)), center_m)
+    world = World((box,), start_height_m=1.0, time_step_s=1 / 2000, gravity_tilt_rad=(0.1, 0.2))
+    if lacked := engine.lacks(world):
+        pytest.skip(f"{engine.name} does not honour {', '.join(lacked)}")
+    start = Start((1.0, -2.0, 5.0), (0.0, 0.6, 0.0, 0.8), (2.0, 1.0, 3.0), (0.5, 8.0, -0.5))
+    seen = np.linspace(0.0, 0.8, 9)
+
+    told = engine.rollout(world, Motion(np.zeros(1), np.zeros((1, 0)), seen, start=start, joints=True))
+
+    x, y, z = ((b**2 + c**2) / 12 for b, c in ((0.2, 0.1), (0.3, 0.1), (0.3, 0.2)))
+
+    def spins(_: float, state: FloatArray) -> FloatArray:
+        turn, (a, b, c) = state[:4], state[4:]
+        faster = [(y - z) / x * b * c, (z - x) / y * c * a, (x - y) / z * a * b]
+        return np.array([*product(turn, np.array([a, b, c, 0.0])) / 2, *faster])
+
+    spun = solve_ivp(spins, (0, 0.8), [*start.turn, *start.turning_rad_s], t_eval=seen, rtol=1e-9).y[:4].T  # type: ignore[misc]
+    turn = np.array(start.turn)
+    off = rotated(turn, np.array(center_m))
+    launched = np.array(start.velocity_m_s) + np.cross(rotated(turn, np.array(start.turning_rad_s)), off)
+    pull = Rotation.from_rotvec([0.1, 0.2, 0.0]).apply([0.0, 0.0, -G])
+    flown = np.array(start.position_m) + off + np.outer(seen, launched) + np.outer(seen**2 / 2, pull)
+    assert np.abs(np.sum(told.orientations * spun, axis=1)) == pytest.approx(1, abs=2e-4)
+    assert told.positions_m + rotated(told.orientations, np.array(center_m)) == pytest.approx(flown, abs=0.01)
+    assert told.positions_m[0] == pytest.approx(start.position_m, abs=1e-6)
+    assert told.angles_rad is not None
+    assert told.angles_rad.shape == (9, 0)
+
+
+@pytest.mark.parametrize("ground_m", [-0.3, 0.0, 0.2])
+def test_a_ball_lands_on_the_ground_wherever_it_is(engine: Engine, ground_m: float) -> None:
+    if ground_m and "ground_m" not in engine.honours:
+        pytest.skip(f"{engine.name} has its ground at 0")
+    world = replace(BALL, start_height_m=0.5, ground_m=ground_m)
+
+    heights = engine.rollout(world, Motion(np.zeros(1), np.zeros((1, 0)), np.array([0.0, 2.0]))).positions_m[:, 2]
+
+    assert heights == pytest.approx([0.5, 0.05 + ground_m], abs=2e-3)
 
 
 @pytest.mark.parametrize("restitution", [0.3, 0.6, 0.85])

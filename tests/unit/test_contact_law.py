@@ -22,7 +22,7 @@ from gaplab.services.world.world import PDLaw
 
 WORLD = Quadruped().world
 STEP_S = WORLD.time_step_s
-KNOWN = settings(WORLD, 7, 1)
+KNOWN = settings(WORLD, 7)
 NO_SINGLES = (0, 0)
 SURFACE = np.array([1.0, 1.0, 0.8, 0.5, 0.0])
 
@@ -102,7 +102,7 @@ def test_what_is_in_the_ground_is_pushed_out_a_fifth_of_its_depth_in_a_step() ->
 
 
 def test_a_motor_that_is_told_no_number_gives_none() -> None:
-    known = settings(WORLD, 7, 1, [Servo(6, 0.1, 20.0, 8.0, 0.01)])
+    known = settings(WORLD, 7, [Servo(6, 0.1, 20.0, 8.0, 0.01)])
     forces = np.array([*np.zeros(6), np.nan])
 
     drive(known, forces, np.zeros(8), np.zeros(7), np.zeros(7))
@@ -171,7 +171,7 @@ def test_friction_limits_and_contacts_obey_their_laws_all_at_once(seed: Any) -> 
 
 def test_damping_slows_the_joints_that_have_it() -> None:
     motor = PD(6, PDLaw(1.0, 0.0, 0.0, 9.0), 0.0)
-    known, forces = settings(WORLD, 7, 1, [], [motor], [(5, 0.5)]), np.ones(7)
+    known, forces = settings(WORLD, 7, [], [motor], [(5, 0.5)]), np.ones(7)
 
     damp(known, forces, np.full(7, 4.0))
 
@@ -182,7 +182,7 @@ def test_damping_slows_the_joints_that_have_it() -> None:
     ("target", "took", "torque"), [(0.3, 0.0, 1.2), (9.0, 0.0, 2.0), (9.0, 5.0, 2.5), (-9.0, 5.0, -2.0)]
 )
 def test_a_pd_motor_adds_what_its_rotor_took_to_its_limit(target: Any, took: Any, torque: Any) -> None:
-    known = settings(WORLD, 7, 1, [], [PD(6, PDLaw(10.0, 1.0, 0.0, 2.0), 0.1)])
+    known = settings(WORLD, 7, [], [PD(6, PDLaw(10.0, 1.0, 0.0, 2.0), 0.1)])
     forces, angles = np.array([*np.zeros(6), target]), np.array([*np.zeros(7), 0.1])
 
     drive(known, forces, angles, np.full(7, 0.8), np.full(7, took))

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from gaplab.services.engines.stepped import checked_s, explodes
+from gaplab.services.engines.stepped import checked_s, explodes, thrown
+from gaplab.services.world.motions import Motion, Start
 from gaplab.services.world.sensing import gravity_m_s2
 from gaplab.services.world.world import Body, Box, Joint, Sphere, World
 
@@ -33,6 +34,24 @@ def test_a_base_is_as_fast_as_its_joints_sweep_and_as_gravity_pulls(
     angles = joint_rad_s * TIMES_S[:, None]
 
     assert explodes(HOPPER, poses, angles, gravity_m_s2(HOPPER)) == expected
+
+
+@pytest.mark.parametrize(
+    ("start", "expected"),
+    [
+        (Start(), True),
+        (Start(velocity_m_s=(0.0, 3.0, 4.0)), False),
+        (Start(turning_rad_s=(0.0, 20.0, 0.0)), False),
+        (Start(speeds_rad_s=(-20.0,)), False),
+        (Start(velocity_m_s=(0.0, 1.0, 0.0)), True),
+    ],
+)
+def test_a_base_is_as_fast_as_it_is_thrown(start: Start, expected: bool) -> None:
+    poses, angles = np.zeros((len(TIMES_S), 7)), np.zeros((len(TIMES_S), 1))
+    poses[:, 0] = 5.0 * TIMES_S
+    motion = Motion(np.zeros(1), np.zeros((1, 0)), TIMES_S, start=start)
+
+    assert explodes(HOPPER, poses, angles, gravity_m_s2(HOPPER), thrown(HOPPER, motion)) == expected
 
 
 def test_a_joint_that_only_shakes_makes_no_base_fast() -> None:

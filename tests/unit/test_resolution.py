@@ -1,6 +1,7 @@
 """From what a user wrote to what is run."""
 
 from copy import deepcopy
+from dataclasses import replace
 from functools import reduce
 from operator import getitem
 from typing import Any
@@ -15,6 +16,8 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
 from gaplab.services.specs.defaults import PRESETS
 from gaplab.services.specs.resolution import expected_rollouts, resolve, resolve_experiment
+from gaplab.services.specs.violations import engine_violations
+from gaplab.services.world.motions import Start
 from gaplab.services.world.robots.quadruped import Quadruped
 
 EMBODIED = [name for name, engine in engines.items() if engine.runs(Quadruped().world)]
@@ -229,6 +232,25 @@ def test_a_strategy_that_selects_by_readings_is_refused_for_a_robot_without_sens
     assert "toy_function has no sensors" in violation.message
     assert resolve_experiment(experiment(strategy=by_readings))
     assert resolve_experiment(experiment(strategy="estimation_exploration", robot="toy_function"))
+
+
+def test_an_engine_that_tells_no_joints_or_sets_no_starts_is_refused_where_a_robot_needs_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = Quadruped()
+    monkeypatch.setattr(robot, "joints", True)
+    begun = replace(robot.motion(robot.known), start=Start(velocity_m_s=(1.0, 0.0, 0.0)))
+    monkeypatch.setattr(robot, "motion", lambda _: begun)
+
+    able = engines["pybullet"]
+    plain = type("Plain", (able,), {"tells_joints": False, "sets_starts": False})
+
+    joints, start = engine_violations(robot, {plain: "/engine"})
+
+    assert not list(engine_violations(robot, {able: "/engine"}))
+    assert "needs its joints, and pybullet tells nothing" in joints.message
+    assert "says how it begins, and pybullet begins" in start.message
+    assert "pybullet" in joints.permitted
 
 
 def test_tunables_that_a_strategy_names_must_be_tuned_unless_they_are_its_default() -> None:

@@ -7,7 +7,7 @@ otherwise, so pyproject.toml permits one minor version of MuJoCo. Numba's values
 
 import ctypes
 from ctypes import CDLL, c_int, c_void_p
-from functools import cache, reduce
+from functools import cache, partial, reduce
 from importlib import import_module
 from operator import mul
 from pathlib import Path
@@ -25,10 +25,13 @@ from gaplab.services.engines.mujoco.law import (
     coast,
     damp,
     drive,
+    drive_torques,
     press,
+    stick,
     stop,
     touch,
 )
+from gaplab.services.world.world import friction_nm
 
 Offsets = dict[str, int]
 
@@ -100,6 +103,13 @@ def callbacks() -> Callbacks:
     return Callbacks(law.ctypes, clock.ctypes, sensor.ctypes)
 
 
+@cache
+def torque_teller() -> Any:
+    """Return `drive_torques` with its first argument, compiled."""
+    compiled = import_module("numba").njit(error_model="numpy")
+    return partial(compiled(drive_torques), compiled(drive))
+
+
 def _law(numba: Any) -> Any:
     """Compute torques, then forces of joints and contacts, which are added; MuJoCo's solver has no rows left."""
     at, settings_of = layout("mjData")[0], layout("mjModel")[0]["numeric_data"] // 8
@@ -166,7 +176,7 @@ def _meet(numba: Any) -> Any:
         frictions = view(pointer(fields[frictions_of]), rows, np.float64)
         impulses = view(pointer(fields[impulses_of]), rows, np.float64)
         begin(step, jacobian, before, free, excess, impulses)
-        singles = aim(data, known, excess, frictions)
+        singles = aim(data, known, before, excess, frictions)
         land(data, known, jacobian, before, excess, frictions)
         inverse = view(pointer(fields[inverse_of]), (rows, rows), np.float64)
         balance(int(known[SWEEPS]), singles, inverse, excess, frictions, impulses)
@@ -179,13 +189,15 @@ def _aim(numba: Any) -> Any:
     """Set the bounds of dry friction's impulses, and the target speeds of limits; return the numbers of their rows."""
     at = layout("mjData")[0]
     brakes_of, limits_of, gaps_of = at["nf"] // 4, at["nl"] // 4, at["efc_pos"] // 8
-    view, pointer, end = numba.carray, _pointer(numba), numba.njit(error_model="numpy")(stop)
+    view, pointer = numba.carray, _pointer(numba)
+    end, hold, friction_of = (numba.njit(error_model="numpy")(each) for each in (stop, stick, friction_nm))
 
-    def aim(data: Any, known: Any, excess: Any, frictions: Any) -> Any:
+    def aim(data: Any, known: Any, before: Any, excess: Any, frictions: Any) -> Any:
         fields, counts = view(data, MANY, np.int64), view(data, MANY, np.int32)
         brakes = int(counts[brakes_of])
         singles = brakes + int(counts[limits_of])
         gaps = view(pointer(fields[gaps_of]), singles, np.float64)
+        hold(known, friction_of, before, frictions)
         for row in range(brakes):
             frictions[row] *= known[STEP]
         for row in range(brakes, singles):

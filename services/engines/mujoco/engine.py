@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -12,10 +12,10 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.base import USUALLY_IN_PLACE, SceneEngine
-from gaplab.services.engines.mujoco.law import drive_torques
+from gaplab.services.engines.mujoco.callback import torque_teller
 from gaplab.services.engines.mujoco.pool import Looping, Pool
-from gaplab.services.engines.mujoco.worlds import TIME, Controls, Models, Prepared, States, Steps
-from gaplab.services.engines.stepped import checked_s, consecutive, explodes, plausible, recording
+from gaplab.services.engines.mujoco.worlds import POSITIONS, TIME, Controls, Models, Prepared, States, Steps
+from gaplab.services.engines.stepped import checked_s, consecutive, explodes, plausible, recording, thrown, trajectory
 from gaplab.services.world.kinematics import observed_poses, observes_base
 from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.world.sensing import gravity_m_s2
@@ -40,33 +40,33 @@ class MuJoCoScene:
         self._rows = ROWS * threads
         self._looping = Looping(self.pool, self.states, self.controls)
 
-    def poses(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> FloatArray:
-        """Return `(n, m, t, 7)`: positions and quaternions x, y, z, w of the observed body; nan if physics failed."""
-        found = np.empty((len(motions), len(worlds), len(motions[0].observe_s), 7))
+    def observed(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> FloatArray:
+        """Return `(n, m, t, 7)`: positions and quaternions x, y, z, w of the observed body; nan if physics failed.
+
+        If the motions ask for joints, return `(n, m, t, 7 + 3 · joints)`: the same, and encoders.
+        """
+        width = 7 + 3 * motions[0].joints * len(self.world.joints)
+        found = np.empty((len(motions), len(worlds), len(motions[0].observe_s), width))
         rows = self._rows if isinstance(motions[0], Motion) else LOOPING_ROWS
         with self.pool.in_force():
             for down in _slices(len(motions), max(1, rows // len(worlds))):
                 for across in _slices(len(worlds), rows):
-                    seen = self._seen(self.models[worlds[across]], motions[down])
-                    found[down, across] = seen.reshape(*found[down, across].shape)
+                    rolled = self._rolled(self.models[worlds[across]], motions[down])
+                    seen = found[down, across]
+                    seen[..., :7] = self._checked(rolled, motions[0].observe_s).reshape(*seen.shape[:3], 7)
+                    if motions[0].joints:
+                        seen[..., 7:] = self._encoders(rolled).reshape(*seen.shape[:3], -1)
         return found
 
-    def record(
-        self, world: World, motion: Motion | Loop, times_s: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the result of `poses`, `(t, 7)`; base and joints at other times, `(k, 7 + joints)`; and torques.
-
-        The torques `(k, joints)`, N·m, are the motors' in the step before; zeros at time 0.
-        """
-        prepared, kept = self.models[[world]], np.arange(max(1, int(self.steps(motion.observe_s)[-1])) + 1)
-        controls = np.zeros((1, int(kept[-1]), self.controls.width))
+    def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
+        """Return the same rollout with joint angles and torques."""
+        often = motion.observed_at(np.union1d(motion.observe_s, times_s), joints=True)
+        observed, recorded = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, times_s))
         with self.pool.in_force():
-            states = self._states(prepared, [motion], kept, controls)
-        chosen = self.steps(times_s)
-        looked = states[0, chosen]
-        seen = np.hstack([self.states.base(looked), self.states.angles(looked)])
-        torques = self._torques(prepared[0], controls[0], states[0])[chosen]
-        return self._checked(prepared, states, kept, motion.observe_s)[0], seen, torques
+            rolled = self._rolled(self.models[[world]], [often])
+        encoders = self._encoders(rolled)[0]
+        seen = trajectory(motion, self._checked(rolled, motion.observe_s)[0], encoders[observed])
+        return recording(seen, times_s, self.states.base(rolled.at(self.steps(times_s))[0]), encoders[recorded])
 
     def close(self) -> None:
         """End the threads."""
@@ -76,54 +76,37 @@ class MuJoCoScene:
         """Return the time steps at which times are."""
         return np.rint(times_s / self.world.time_step_s).astype(int)
 
-    def _seen(self, prepared: Sequence[Prepared], motions: Sequence[Motion | Loop]) -> FloatArray:
-        """Return `(n · m, t, 7)`: observed poses, by motion and world."""
-        observe_s = motions[0].observe_s
-        observed = self.steps(observe_s)
-        kept = np.union1d([*observed, max(1, observed[-1])], self._checks(observe_s))
-        return self._checked(prepared, self._states(prepared, motions, kept), kept, observe_s)
-
-    def _states(
-        self,
-        prepared: Sequence[Prepared],
-        motions: Sequence[Motion | Loop],
-        kept: Steps,
-        told: FloatArray | None = None,
-    ) -> FloatArray:
-        """Return `(n · m, t, state)`: states after steps `(t,)`, ascending, the last of which ends the rollouts.
-
-        The targets in each step are written to `told`, `(n · m, steps, degrees of freedom)`, if it is given.
-        """
-        loops = [motion for motion in motions if isinstance(motion, Loop)]
-        if loops:
-            return self._looping.run(prepared, loops, kept, told)
-        known = [motion for motion in motions if isinstance(motion, Motion)]
-        controls = self.controls.of(known, int(kept[-1]), [each.delays for each in prepared])
-        if told is not None:
-            told[:] = controls
-        starts = self.states.starts(motions, len(prepared))
-        found = self.pool.rolled([each.model for each in prepared] * len(motions), starts, controls)[:, kept - 1]
-        found[:, kept == 0] = starts[:, None]
-        return found
+    def _rolled(self, prepared: Sequence[Prepared], motions: Sequence[Motion | Loop]) -> "_Rolled":
+        """Run n motions in m worlds."""
+        observed, checks = self.steps(motions[0].observe_s), self._checks(motions[0].observe_s)
+        joints = motions[0].joints
+        before, earlier = (np.maximum(observed - ago, 0) if joints else observed[:0] for ago in (1, 2))
+        kept = np.unique(np.concatenate([observed, [max(1, int(observed[-1]))], checks, before, earlier]))
+        if loops := [motion for motion in motions if isinstance(motion, Loop)]:
+            controls = np.empty((len(loops) * len(prepared), joints * int(kept[-1]), self.controls.width))
+            states = self._looping.run(prepared, loops, kept, controls if joints else None)
+        else:
+            known = [motion for motion in motions if isinstance(motion, Motion)]
+            controls = self.controls.of(known, int(kept[-1]), [each.delays for each in prepared])
+            starts = self.states.starts(motions, len(prepared))
+            states = self.pool.rolled([each.model for each in prepared] * len(motions), starts, controls)[:, kept - 1]
+            states[:, kept == 0] = starts[:, None]
+        return _Rolled(prepared, motions, kept, states, controls[:, before] if joints else controls)
 
     def _checks(self, observe_s: FloatArray) -> Steps:
         """Return the steps after which energy is checked."""
         return self.steps(checked_s(self.world, float(observe_s[-1])))
 
-    def _checked(
-        self, prepared: Sequence[Prepared], states: FloatArray, kept: Steps, observe_s: FloatArray
-    ) -> FloatArray:
-        """Return `(rows, t, 7)`: observed poses in states after steps; nan if MuJoCo stopped, or a rollout failed.
-
-        The rows belong to the worlds in turns.
-        """
-        places = (np.searchsorted(kept, each) for each in (self.steps(observe_s), self._checks(observe_s)))
-        seen, checked = (states[:, place] for place in places)
+    def _checked(self, rolled: "_Rolled", observe_s: FloatArray) -> FloatArray:
+        """Return `(rows, t, 7)`: observed poses; nan if MuJoCo stopped, or a rollout failed."""
+        prepared, motions, kept, states, _ = rolled
+        seen, checked = (rolled.at(steps) for steps in (self.steps(observe_s), self._checks(observe_s)))
         poses = self.states.base(seen)
         finished = states[:, -1, TIME] > (kept[-1] - 0.5) * self.world.time_step_s
         failed = ~(finished & plausible(poses))
-        gravity = np.tile([gravity_m_s2(each.world) for each in prepared], (len(seen) // len(prepared), 1))
-        failed |= explodes(self.world, self.states.base(checked), self.states.angles(checked), gravity)
+        gravity = np.tile([gravity_m_s2(each.world) for each in prepared], (len(motions), 1))
+        energy = np.repeat([thrown(self.world, motion) for motion in motions], len(prepared))
+        failed |= explodes(self.world, self.states.base(checked), self.states.angles(checked), gravity, energy)
         if not observes_base(self.world):
             rows = len(seen) * seen.shape[1]
             angles = self.states.angles(seen).reshape(rows, -1)
@@ -133,12 +116,40 @@ class MuJoCoScene:
             poses[failed] = np.nan
         return poses
 
-    def _torques(self, prepared: Prepared, controls: FloatArray, states: FloatArray) -> FloatArray:
-        """Return `(steps + 1, joints)`: torques of the motors before each state; zeros before the first."""
-        known = prepared.model.numeric_data
-        torques = drive_torques(known, controls, self.states.positions(states), self.states.speeds(states))
-        dofs = self.models.structure.dofs
-        return np.vstack([np.zeros((1, len(dofs))), torques[:, dofs]])
+    def _encoders(self, rolled: "_Rolled") -> FloatArray:
+        """Return `(rows, t, 3 · joints)`: angles, speeds and torques of motors at each observation."""
+        steps, tell, torques = self.steps(rolled.motions[0].observe_s), torque_teller(), rolled.controls
+        around = rolled.kept.searchsorted(np.maximum(steps - np.array([[2], [1], [0]]), 0))
+        for row, each in enumerate([*rolled.prepared] * len(rolled.motions)):
+            tell(each.model.numeric_data, torques[row], rolled.states[row, :, POSITIONS:], around)
+        torques[:, steps == 0] = 0.0  # no step has ended yet
+        now = rolled.at(steps)
+        return np.concatenate(
+            [self.states.angles(now), self.states.joint_speeds(now), torques[..., self.models.structure.dofs]], axis=-1
+        )
+
+
+class _Rolled(NamedTuple):
+    """n motions in m worlds.
+
+    Attributes:
+        prepared: the worlds.
+        motions: the motions.
+        kept: `(s,)`: steps, ascending, the last of which ends the rollouts.
+        states: `(n · m, s, state)`: states after them, by motion and world.
+        controls: `(n · m, ..., degrees of freedom)`: targets; if joints are asked for, in the step before each
+            observation.
+    """
+
+    prepared: Sequence[Prepared]
+    motions: Sequence[Motion | Loop]
+    kept: Steps
+    states: FloatArray
+    controls: FloatArray
+
+    def at(self, steps: Steps) -> FloatArray:
+        """Return the states after some of the kept steps."""
+        return self.states[:, self.kept.searchsorted(steps)]
 
 
 def _slices(count: int, size: int) -> Iterator[slice]:
@@ -172,6 +183,7 @@ class MuJoCo(SceneEngine[MuJoCoScene]):
         "body.center_m",
         "body.inertia",
         "gravity_m_s2",
+        "gravity_tilt_rad",
         "joint.armature",
         "joint.limits",
         "motor.follows",
@@ -189,24 +201,24 @@ class MuJoCo(SceneEngine[MuJoCoScene]):
     def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
         """Return the trajectory of the observed body, `(t, 3)`; times are rounded to whole time steps."""
         with self._turn:
-            poses = self._scenes[world.built(self.in_place)].poses([world], [motion])[0, 0]
-        return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
+            seen = self._scenes[world.built(self.in_place)].observed([world], [motion])[0, 0]
+        return trajectory(motion, seen[:, :7], seen[:, 7:])
 
     def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
         """Return every motion in every world; worlds that differ only in place share calls of MuJoCo."""
-        poses = np.empty((len(motions), len(worlds), len(motions[0].observe_s), 7))
+        width = 7 + 3 * motions[0].joints * len(worlds[0].joints)
+        seen = np.empty((len(motions), len(worlds), len(motions[0].observe_s), width))
         left = list(range(len(worlds)))
         while left:
             built = worlds[left[0]].built(self.in_place)
             alike = [column for column in left if worlds[column].built(self.in_place) == built]
             here = consecutive(alike)
             with self._turn:
-                poses[:, here] = self._scenes[built].poses([worlds[column] for column in alike], motions)
+                seen[:, here] = self._scenes[built].observed([worlds[column] for column in alike], motions)
             left = [column for column in left if column not in alike]
-        return Trajectory(motions[0].observe_s, poses[..., :3], poses[..., 3:])
+        return trajectory(motions[0], seen[..., :7], seen[..., 7:])
 
     def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
         """Return the same rollout with joint angles and torques."""
         with self._turn:
-            seen = self._scenes[world.built(self.in_place)].record(world, motion, times_s)
-        return recording(motion, times_s, *seen)
+            return self._scenes[world.built(self.in_place)].record(world, motion, times_s)

@@ -5,7 +5,7 @@ computes kinematics, collisions and the inverse inertia at contacts and limits, 
 plain functions on arrays. `callback` compiles them. What MuJoCo's model has no place for is an array of settings.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import hypot
 from typing import Any, NamedTuple
 
@@ -16,10 +16,10 @@ from gaplab.services.world.world import DAMPING as VISCOSITY
 from gaplab.services.world.world import FEED, STIFFNESS, PDLaw, World
 from gaplab.services.world.world import STRONGEST as STRONGEST_NM
 
-STEP, FALL, SWEEPS, DOFS, AHEAD, SERVOS, MOTORS, DAMPERS, FIRST = range(9)
+STEP, FALL, SWEEPS, DOFS, AHEAD, SERVOS, MOTORS, DAMPERS, STICKERS, FIRST = range(10)
 """Indices into the settings: time step, speed that gravity adds in it, solver iterations, number of degrees of freedom,
-by how much a joint's place among the positions is ahead of that among the speeds, numbers of servos, PD motors and
-damped joints, and the first of these."""
+by how much a joint's place among the positions is ahead of that among the speeds, numbers of servos, PD motors, damped
+and sticking joints, and the first of these."""
 
 DOF = 0
 """Index into the settings of a servo, a PD motor or a damped joint: its degree of freedom."""
@@ -32,6 +32,9 @@ LAW, MOTOR_ROTOR, EACH_MOTOR = 1, 5, 6
 
 DAMPING, EACH_DAMPER = 1, 2
 """Index into a damped joint's settings, and their number."""
+
+EACH_STICKER = 4
+"""Number of a sticking joint's settings: its place among those with friction, and three of `friction_nm`."""
 
 
 class Servo(NamedTuple):
@@ -59,21 +62,19 @@ class PD(NamedTuple):
 def settings(
     world: World,
     dofs: int,
-    ahead: int,
     servos: Sequence[Servo] = (),
     motors: Sequence[PD] = (),
     dampers: Sequence[tuple[int, float]] = (),
+    stickers: Sequence[tuple[int, float, float, float]] = (),
 ) -> FloatArray:
-    """Return the settings of a world, as an array for the law.
-
-    `ahead` is the number of positions, less that of degrees of freedom; dampers are these with their damping.
-    """
-    step, sweeps = world.time_step_s, max(1, world.solver_iterations)
-    counts = (len(servos), len(motors), len(dampers))
+    """Return the settings of a world, as an array for the law; dampers are degrees of freedom with their damping."""
+    step, sweeps, ahead = world.time_step_s, max(1, world.solver_iterations), 0 if world.fixed else 1
+    counts = (len(servos), len(motors), len(dampers), len(stickers))
     tables = [
         *(value for servo in servos for value in servo),
         *(value for dof, law, rotor in motors for value in (dof, *law, rotor)),
         *(value for damper in dampers for value in damper),
+        *(value for sticker in stickers for value in sticker),
     ]
     return np.array([step, abs(world.gravity_m_s2) * step, sweeps, dofs, ahead, *counts, *tables])
 
@@ -136,30 +137,51 @@ def damp(known: Any, forces: Any, speeds: Any) -> None:
         at += EACH_DAMPER
 
 
-def drive_torques(known: FloatArray, targets: FloatArray, angles: FloatArray, speeds: FloatArray) -> FloatArray:
-    """Return `(s, d)`: the torques that motors gave their joints in each step of a rollout, N·m; 0 without a motor.
+def drive_torques(turn: Any, known: Any, targets: Any, states: Any, around: Any) -> None:
+    """Compute the torques that motors gave their joints in some steps of a rollout, N·m; 0 without a motor.
 
     What the rotor takes is not the joint's. In an impact the rotor passes on more than its motor can; the motor's limit
-    counts. Targets are `(s, d)`; angles `(s + 1, d + ahead)` and speeds `(s + 1, d)` are before each step, and last.
+    counts.
+
+    Args:
+        turn: `drive`.
+        known: settings.
+        targets: `(k, d)`: in each step; overwritten with torques.
+        states: `(s, d + ahead + d)`: positions and speeds.
+        around: `(3, k)`: places of those before the step before, which may be the same; before each step; and after it.
     """
-    accelerations = np.diff(speeds, axis=0) / known[STEP]
-    before = np.vstack([np.zeros_like(accelerations[:1]), accelerations[:-1]])
-    found = np.array(targets)
-    for step, forces in enumerate(found):
-        drive(known, forces, angles[step], speeds[step], before[step])
-    for dof, strongest, rotor in _rotors(known):
-        found[:, dof] = np.clip(found[:, dof] - rotor * accelerations[:, dof], -strongest, strongest)
-    return found
+    servos, motors, step = int(known[SERVOS]), int(known[MOTORS]), known[STEP]
+    first, felt = int(known[DOFS]) + int(known[AHEAD]), np.empty(int(known[DOFS]))
+    for number in range(len(targets)):
+        earlier, now, after = states[around[0, number]], states[around[1, number]], states[around[2, number]]
+        for dof in range(len(felt)):
+            felt[dof] = (now[first + dof] - earlier[first + dof]) / step
+        turn(known, targets[number], now, now[first:], felt)
+        at = FIRST
+        for motor in range(servos + motors):
+            servo = motor < servos
+            dof = int(known[at + DOF])
+            rotor = known[at + ROTOR] if servo else known[at + MOTOR_ROTOR]
+            strongest = known[at + STRONGEST] if servo else known[at + LAW + STRONGEST_NM]
+            given = targets[number, dof] - rotor * ((after[first + dof] - now[first + dof]) / step)
+            targets[number, dof] = np.minimum(np.maximum(given, -strongest), strongest)
+            at += EACH_SERVO if servo else EACH_MOTOR
 
 
-def _rotors(known: FloatArray) -> Iterator[tuple[int, float, float]]:
-    """Yield the degree of freedom, the largest torque and the rotor's inertia of each motor."""
-    servos, motors = int(known[SERVOS]), int(known[MOTORS])
-    for at in range(FIRST, FIRST + EACH_SERVO * servos, EACH_SERVO):
-        yield int(known[at + DOF]), known[at + STRONGEST], known[at + ROTOR]
-    first = FIRST + EACH_SERVO * servos
-    for at in range(first, first + EACH_MOTOR * motors, EACH_MOTOR):
-        yield int(known[at + DOF]), known[at + LAW + STRONGEST_NM], known[at + MOTOR_ROTOR]
+def stick(known: Any, friction_of: Any, speeds: Any, frictions: Any) -> None:
+    """Set the largest torques of the joints that stick.
+
+    Args:
+        known: settings.
+        friction_of: `friction_nm`.
+        speeds: `(r,)`, of joints with friction, at the start of the step.
+        frictions: `(r,)`, overwritten.
+    """
+    at = FIRST + EACH_SERVO * int(known[SERVOS]) + EACH_MOTOR * int(known[MOTORS]) + EACH_DAMPER * int(known[DAMPERS])
+    for _ in range(int(known[STICKERS])):
+        row = int(known[at])
+        frictions[row] = friction_of(known[at + 1], known[at + 2], known[at + 3], speeds[row])
+        at += EACH_STICKER
 
 
 def coast(step: float, jacobian: Any, before: Any, accelerations: Any, excess: Any, impulses: Any) -> None:

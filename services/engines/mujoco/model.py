@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.engines.mujoco.law import EACH_DAMPER, EACH_MOTOR, FALL, FIRST, PD, Servo, settings
+from gaplab.services.engines.mujoco.law import EACH_DAMPER, EACH_MOTOR, EACH_STICKER, FALL, FIRST, PD, Servo, settings
 from gaplab.services.world.inertias import inertia_of
 from gaplab.services.world.kinematics import outwards
 from gaplab.services.world.sensing import gravity_m_s2
@@ -151,7 +151,7 @@ def _set_up_physics(mujoco: ModuleType, spec: Any, world: World) -> None:
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     option.disableflags = sum(int(getattr(mujoco.mjtDisableBit, each)) for each in SWITCHED_OFF)
     spec.compiler.autolimits = False
-    spec.add_numeric(name="settings", size=FIRST + (EACH_MOTOR + EACH_DAMPER) * len(world.joints))
+    spec.add_numeric(name="settings", size=FIRST + (EACH_MOTOR + EACH_DAMPER + EACH_STICKER) * len(world.joints))
     spec.add_sensor(
         name="accelerations",
         type=mujoco.mjtSensor.mjSENS_USER,
@@ -236,9 +236,10 @@ def write(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world
         _write_bodies(structure, model, world)
     if other_bodies or before is None or world.joints is not before.joints:
         _write_joints(mujoco, structure, model, data, world)
-    if before is None or (world.slope_rad, world.gravity_m_s2) != (before.slope_rad, before.gravity_m_s2):
-        model.numeric_data[FALL] = abs(world.gravity_m_s2) * world.time_step_s
-        model.opt.gravity[:] = gravity_m_s2(world)
+    model.numeric_data[FALL] = abs(world.gravity_m_s2) * world.time_step_s
+    model.opt.gravity[:] = gravity_m_s2(world)
+    model.geom_pos[0, 2] = world.ground_m  # the first geometry is the ground
+    model.geom_sameframe[0] = _sameframe((0.0, 0.0, world.ground_m), UNTURNED)
     _paint(structure, model, world)
 
 
@@ -301,7 +302,7 @@ def inertial(body: Body) -> tuple[Vector, Vector, Quaternion]:
 def _write_joints(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world: World) -> None:
     joints, dofs = world.joints, structure.dofs
     model.opt.disableflags = structure.model.opt.disableflags | _unused(mujoco, world)
-    model.dof_frictionloss[dofs] = [joint.dry_friction for joint in joints]
+    model.dof_frictionloss[dofs] = [joint.dry_friction + joint.static_friction for joint in joints]
     model.jnt_limited[structure.joints] = [joint.limits is not None for joint in joints]
     model.jnt_range[structure.joints] = [joint.limits or (0.0, 0.0) for joint in joints] or np.empty((0, 2))
     model.dof_armature[dofs] = [joint.armature for joint in joints]
@@ -314,7 +315,13 @@ def _write_joints(mujoco: ModuleType, structure: Structure, model: Any, data: An
     for dof, damping in dampers:
         model.dof_armature[dof] += world.time_step_s * damping  # the speed after the step is damped, not that before
     mujoco.mj_setConst(model, data)
-    known = settings(world, model.nv, structure.ahead, servos, motors, dampers)
+    rubbing = np.flatnonzero(model.dof_frictionloss).tolist()  # MuJoCo's rows of friction are in this order
+    stickers = [
+        (rubbing.index(dof), joint.dry_friction, joint.static_friction, joint.stribeck_speed)
+        for joint, dof in zip(joints, dofs.tolist(), strict=True)
+        if joint.static_friction
+    ]
+    known = settings(world, model.nv, servos, motors, dampers, stickers)
     model.numeric_data[: len(known)] = known
 
 
@@ -322,7 +329,7 @@ def _unused(mujoco: ModuleType, world: World) -> int:
     """Return the flags of rows that a world has none of: MuJoCo then does not look for them."""
     flags = mujoco.mjtDisableBit
     no_limits = all(joint.limits is None for joint in world.joints)
-    no_friction = not any(joint.dry_friction for joint in world.joints)
+    no_friction = not any(joint.dry_friction or joint.static_friction for joint in world.joints)
     return no_limits * int(flags.mjDSBL_LIMIT) | no_friction * int(flags.mjDSBL_FRICTIONLOSS)
 
 

@@ -21,7 +21,16 @@ from gaplab.services.world.motions import Motion
 from gaplab.services.world.sensing import gravity_m_s2
 from gaplab.services.world.world import Motor, PDMotor, World
 
-LOST = ("material.static_friction", "material.restitution", "motor.delay_s", "noise.")
+LOST = (
+    "material.static_friction",
+    "material.restitution",
+    "joint.static_friction",
+    "joint.stribeck_speed",
+    "motor.delay_s",
+    "noise.",
+    "time_offset_s",
+    "biases",
+)
 """How names of values begin that the file has no place for."""
 
 SPINNING_ROLLING = (0.005, 0.0001)
@@ -41,7 +50,7 @@ def mjcf_of(world: World, comments: Sequence[str] = ()) -> str:
     spec.option.timestep, spec.option.gravity = world.time_step_s, gravity_m_s2(world)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.compiler.autolimits = spec.compiler.degree = False
-    spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
+    spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], pos=[0, 0, world.ground_m])
     _complete(mujoco, spec, add_bodies(mujoco, spec, world, _called), world)
     try:
         model = spec.compile()

@@ -13,7 +13,7 @@ import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.mujoco.callback import Callbacks, callbacks
-from gaplab.services.engines.mujoco.worlds import Controls, Memory, Prepared, States, Steps, grouped, held
+from gaplab.services.engines.mujoco.worlds import Controls, Memory, Prepared, States, Steps, delayed, grouped, held
 from gaplab.services.engines.stepped import Acting, tick_steps
 from gaplab.services.world.motions import Loop
 from gaplab.services.world.sensing import observations
@@ -160,9 +160,10 @@ class Looping:
             told: `(n · m, steps, degrees of freedom)`: overwritten with the targets in each step, if it is given.
         """
         run, end = _Run(self._states, prepared, loops), int(kept[-1])
-        at = np.array(tick_steps(loops[0], prepared[0].world.time_step_s))
-        targets = np.empty((len(run.models), len(at), len(prepared[0].world.actuators)))  # of each call
-        delays = grouped([each.delays for each in prepared] * len(loops))
+        known, world = [each.delays for each in prepared], prepared[0].world
+        at = np.array(tick_steps(loops[0], world.time_step_s))
+        targets = np.empty((len(run.models), len(at), len(world.actuators)))  # of each call
+        delays = grouped([each for loop in loops for each in delayed(world, loop, known)])
         found = np.empty((len(run.models), len(kept), len(self._states.start)))
         found[:, kept == 0] = run.recent[:, -1:]
         now = Continued(run.recent[:, -1], np.zeros((len(run.models), self._controls.width)))
@@ -220,6 +221,6 @@ class _Run:
 
 
 def _looks(world: World) -> Hashable:
-    """Return what observations in worlds of one structure depend on: the slope, and the places of shapes."""
+    """Return what observations in worlds of one structure depend on: gravity, the ground, and the places of shapes."""
     solids = [body.center_m for body in world.bodies if not isinstance(body.shape, tuple)]
-    return world.slope_rad, *solids
+    return world.slope_rad, world.gravity_tilt_rad, world.ground_m, *solids

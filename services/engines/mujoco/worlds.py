@@ -17,8 +17,8 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.mujoco.model import Structure, compiled, start, write
 from gaplab.services.engines.stepped import check_targets, consecutive, delays
 from gaplab.services.world.controllers.parts import middles
-from gaplab.services.world.kinematics import tilted_pose
-from gaplab.services.world.motions import LEVEL, Loop, Motion
+from gaplab.services.world.kinematics import placed, started
+from gaplab.services.world.motions import Loop, Motion
 from gaplab.services.world.sensing import Bearing
 from gaplab.services.world.world import World
 
@@ -107,8 +107,12 @@ class States:
         """Return `(n · worlds, state)`: the states at time 0 of n motions, each in as many worlds."""
         found = np.tile(self.start, (len(motions), 1))
         for row, motion in zip(found, motions, strict=True):
-            if motion.start_tilt_rad != LEVEL:
-                row[TURNED_POSE] = tilted_pose(self._world, motion.start_tilt_rad)
+            begun = placed(self._world, motion)
+            if begun is not None:
+                row[self._angles], row[self._dofs] = begun.angles_rad, begun.speeds_rad_s
+            if begun is not None and self._fixed is None:
+                row[TURNED_POSE] = begun.pose
+                row[self._speeds_at : self._speeds_at + 6] = *begun.velocity_m_s, *begun.turning_rad_s
         return np.repeat(found, worlds, axis=0)
 
     def base(self, states: FloatArray) -> FloatArray:
@@ -121,20 +125,16 @@ class States:
         """Return `(..., joints)`: joint angles, in the world's order."""
         return states[..., self._angles]
 
-    def positions(self, states: FloatArray) -> FloatArray:
-        """Return `(..., positions)`: all positions, in MuJoCo's order."""
-        return states[..., POSITIONS : self._speeds_at]
-
-    def speeds(self, states: FloatArray) -> FloatArray:
-        """Return `(..., degrees of freedom)`: all speeds, in MuJoCo's order."""
-        return states[..., self._speeds_at :]
+    def joint_speeds(self, states: FloatArray) -> FloatArray:
+        """Return `(..., joints)`: speeds of the joints, in the world's order."""
+        return states[..., self._dofs]
 
     def bearing(self, states: FloatArray) -> Bearing:
         """Return the poses, angles and speeds of the robots in states `(n, state)`."""
         turning = np.zeros((len(states), 3))
         if self._fixed is None:
             turning = states[:, self._speeds_at + TURNING : self._speeds_at + TURNING + 3]
-        return Bearing(self.base(states), turning, self.angles(states), states[:, self._dofs])
+        return Bearing(self.base(states), turning, self.angles(states), self.joint_speeds(states))
 
     def _start(self, mujoco: ModuleType, models: Models) -> FloatArray:
         """Return `(state,)`: the state at time 0."""
@@ -180,7 +180,7 @@ class Controls:
         for motion, each in zip(motions, controls.reshape(len(motions), len(delays), steps, self.width), strict=True):
             check_targets(motion, self._world)
             at = np.rint(motion.times_s / self._world.time_step_s).astype(int)
-            for late, columns in grouped(delays):
+            for late, columns in grouped(delayed(self._world, motion, delays)):
                 targets = held(at, motion.targets, now, late)
                 for column in columns:
                     self.put(each[column], targets)
@@ -189,6 +189,14 @@ class Controls:
     def put(self, controls: FloatArray, targets: FloatArray) -> None:
         """Write targets `(..., a)` into controls `(..., degrees of freedom)`."""
         controls[..., self._dofs] = targets
+
+
+def delayed(world: World, motion: Motion | Loop, delays: Sequence[Delays | None]) -> list[Delays | None]:
+    """Return the delays of worlds, whose actuators begin where the motion does."""
+    if motion.start is None or motion.start.angles_rad is None:
+        return list(delays)
+    first = middles(started(world, motion))
+    return [None if each is None else each._replace(first=first) for each in delays]
 
 
 def held(at: Steps, targets: FloatArray, now: Steps, delays: Delays | None) -> FloatArray:

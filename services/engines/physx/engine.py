@@ -24,16 +24,18 @@ from gaplab.services.engines.physx.robot import (
 )
 from gaplab.services.engines.stepped import SteppedEngine
 from gaplab.services.world.inertias import inertia_of, inverse_inertias
-from gaplab.services.world.kinematics import tilted_pose
-from gaplab.services.world.motions import LEVEL, Tilt
+from gaplab.services.world.kinematics import Placed
 from gaplab.services.world.sensing import gravity_m_s2
-from gaplab.services.world.world import Material, Motor, Quaternion, Vector, World
+from gaplab.services.world.world import Motor, Quaternion, Vector, World
 
 BOUNCE_THRESHOLD_M_S = 0.2
 """Impacts slower than this do not bounce, as in Bullet. PhysX's default, 2 m/s, is faster than walking feet."""
 
-ALONG_AXIS, ABOUT_AXIS = 0, 3
-"""Indices of force along a joint's axis and torque about it, in the joint's frame, whose x is the axis."""
+TURNED_POSE = np.array((0, 1, 2, 4, 5, 6, 3))
+"""Indices of a pose as in a Trajectory, among PhysX's position and quaternion, which has w first."""
+
+FELT = {True: 0, False: 3}
+"""Index of force along a joint's axis if it slides, else of torque about it, in its frame, whose x is the axis."""
 
 LARGEST = float(np.finfo(np.float32).max)
 """Largest number in single precision, in which PhysX computes."""
@@ -61,9 +63,11 @@ class PhysXScene:
         self._enter_scene()
         self.articulation = self.robot.articulation
         active = self.articulation.active_joints
-        self._places = [active.index(joint) for joint in self.robot.joints]
-        self._links = [self.articulation.links.index(self.robot.links[joint.child]) for joint in world.joints]
-        self._axes = [ALONG_AXIS if joint.slides else ABOUT_AXIS for joint in world.joints]
+        self._places = np.array([active.index(joint) for joint in self.robot.joints], int)
+        links, count = self.articulation.links, len(world.joints)
+        felt = [6 * links.index(self.robot.links[each.child]) + FELT[each.slides] for each in world.joints]
+        after = [7 + self._places, 7 + count + self._places, 7 + 2 * count + np.array(felt, int)]
+        self._encoders = np.concatenate([TURNED_POSE, *after])
         self._forces = [0.0] * len(world.joints)
         if any(joint.start for joint in world.joints):
             self.articulation.qpos = self._in_order([joint.start for joint in world.joints])
@@ -74,39 +78,53 @@ class PhysXScene:
         self._system = _system(self._sapien, self.world)
         self._scene = self._sapien.Scene([self._system])
         for number, material in enumerate(self._materials.values()):
-            ground = self._scene.add_ground(0.0, render=False, material=material)
+            ground = self._scene.add_ground(self.world.ground_m, render=False, material=material)
             set_offsets(ground.components[0].collision_shapes[0])
             ground.components[0].collision_shapes[0].set_collision_groups(ground_groups(number))
         for entity in self.robot.entities:
             self._scene.add_entity(entity)
 
-    def start(self, world: World, tilt_rad: Tilt = LEVEL) -> None:
-        """Reset to time 0 of a world, with the base tilted about x and y.
+    def start(self, world: World, begun: Placed | None = None) -> None:
+        """Reset to time 0 of a world.
 
         PhysX itself drops contacts when bodies are moved. But it solves those of several shapes of a body in an order
-        that depends on all earlier contacts in the scene: such a robot moves to a new scene.
+        that depends on all earlier contacts in the scene: such a robot moves to a new scene. So does one whose ground
+        has another height.
         """
+        before, self.world = self.world, world
         if (
             world.bodies != self._bodies and _frames(world) != self._frames
         ):  # set in place, they would leave rounding errors in PhysX's joints
             self._build(world)
-        elif self._crowded:
+        elif self._crowded or world.ground_m != before.ground_m:
             for entity in self.robot.entities:
                 self._scene.remove_entity(entity)
             self._enter_scene()
-        self.world = world
-        named = dict(world.surfaces)
-        for name, ours in self._materials.items():
-            _set_material(ours, named.get(name, world.material))
+        self._set_materials()
         if world.bodies != self._bodies:
             self._bodies = world.bodies
             for body in world.bodies:
                 set_masses(self.robot.links[body.name], body)
         self._set_joints()
         self._system.unpack(self._initial)
-        if tilt_rad != LEVEL:
-            pose = tilted_pose(world, tilt_rad)
-            self.articulation.root_pose = pose_of(self._sapien, pose[:3].tolist(), pose[3:])
+        if begun is not None:
+            self._place(begun)
+
+    def _place(self, begun: Placed) -> None:
+        """Move and turn the base, and the joints."""
+        robot = self.articulation
+        if not self.world.fixed:
+            robot.root_pose = pose_of(self._sapien, begun.pose[:3].tolist(), begun.pose[3:])
+            robot.root_linear_velocity, robot.root_angular_velocity = begun.of_centre(self.world.bodies[0].center_m)
+        robot.qpos, robot.qvel = (self._in_order(each.tolist()) for each in (begun.angles_rad, begun.speeds_rad_s))
+
+    def _set_materials(self) -> None:
+        named = dict(self.world.surfaces)
+        for name, ours in self._materials.items():
+            material = named.get(name, self.world.material)
+            ours.static_friction = max(material.static_friction, material.dynamic_friction)
+            ours.dynamic_friction = material.dynamic_friction
+            ours.restitution = material.restitution
 
     def _set_joints(self) -> None:
         """Set motors, damping, dry friction and armature, and forget those of the last rollout."""
@@ -118,6 +136,9 @@ class PhysXScene:
         ]
         self._motors = [
             drive for drive, joint in zip(self._drives, world.joints, strict=True) if joint.motor is not None
+        ]
+        self._unpowered = [
+            (n, self._drives[n]) for n, each in enumerate(world.joints) if not isinstance(each.motor, Motor)
         ]
         self._stepped = [(place, drive) for place, drive in enumerate(self._drives) if drive.steps]
         self._forces = [0.0] * len(self._drives)
@@ -155,34 +176,33 @@ class PhysXScene:
     def pose(self) -> FloatArray:
         """Return `(7,)`: position and quaternion of the base's frame."""
         pose = self.articulation.root_pose
-        w, x, y, z = pose.q
-        return np.array([*pose.p, x, y, z, w], dtype=float)
+        return np.concatenate([pose.p, pose.q], dtype=float).take(TURNED_POSE)
 
     def angles(self) -> FloatArray:
         """Return the joint angles `(joints,)`, rad or m, in the world's order, which is not PhysX's."""
-        return np.asarray(self.articulation.qpos, dtype=float)[self._places]
+        return np.asarray(self.articulation.qpos, dtype=float).take(self._places)
 
     def speeds(self) -> FloatArray:
         """Return the joint speeds `(joints,)`, rad/s, in the world's order."""
-        return np.asarray(self.articulation.qvel, dtype=float)[self._places]
+        return np.asarray(self.articulation.qvel, dtype=float).take(self._places)
 
     def spin(self) -> FloatArray:
         """Return the angular velocity of the base, `(3,)`, rad/s, along the axes of the world."""
         return np.asarray(self.articulation.root_angular_velocity, dtype=float)
 
-    def torques(self) -> FloatArray:
-        """Return the torques of the motors in the last step, `(joints,)`, N·m or N.
+    def encoders(self) -> FloatArray:
+        """Return `(7 + 3 · joints,)`: pose, angles, speeds, and torques of the motors in the last step, N·m, or N.
 
-        Those of servos are all that acts about a joint's axis, less what is set beside its drive.
+        Torques of servos are all that acts about a joint's axis, less what is set beside its drive.
         """
-        measured = np.asarray(self.articulation.link_incoming_joint_forces, dtype=float)[self._links, self._axes]
-        angles, speeds = self.angles().tolist(), self.speeds().tolist()
-        for place, (joint, drive) in enumerate(zip(self.world.joints, self._drives, strict=True)):
-            if isinstance(joint.motor, Motor):
-                measured[place] -= drive.force
-            else:
-                measured[place] = drive.motor_nm(angles[place], speeds[place])
-        return measured
+        robot, count = self.articulation, len(self._drives)
+        pose, forces = robot.root_pose, robot.link_incoming_joint_forces.ravel()
+        told = np.concatenate([pose.p, pose.q, robot.qpos, robot.qvel, forces]).take(self._encoders).astype(float)
+        if any(self._forces):
+            told[7 + 2 * count :] -= self._forces
+        for place, drive in self._unpowered:
+            told[place - count] = drive.motor_nm(float(told[7 + place]), float(told[7 + count + place]))
+        return told
 
     def close(self) -> None:
         """Close the scene; PhysX frees it with the last reference."""
@@ -220,12 +240,6 @@ def _frames(world: World) -> list[tuple[Vector, Quaternion]]:
     return [(body.center_m, inertia_of(body).turn) for body in world.bodies]
 
 
-def _set_material(ours: Handle, material: Material) -> None:
-    ours.static_friction = max(material.static_friction, material.dynamic_friction)
-    ours.dynamic_friction = material.dynamic_friction
-    ours.restitution = material.restitution
-
-
 class PhysX(SteppedEngine[PhysXScene]):
     """PhysX on the CPU, the paper's own engine, which has all three coefficients itself.
 
@@ -254,8 +268,8 @@ class PhysX(SteppedEngine[PhysXScene]):
     def _build(self, world: World) -> PhysXScene:
         return PhysXScene(self._library, world)
 
-    def _start(self, scene: PhysXScene, world: World, tilt_rad: Tilt) -> Callable[[int], None]:
-        scene.start(world, tilt_rad)
+    def _start(self, scene: PhysXScene, world: World, begun: Placed | None) -> Callable[[int], None]:
+        scene.start(world, begun)
         return scene.step
 
 

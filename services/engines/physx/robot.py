@@ -32,6 +32,7 @@ from gaplab.services.world.world import (
     Sphere,
     Vector,
     World,
+    friction_nm,
     pd_law,
     pd_torque,
 )
@@ -216,7 +217,7 @@ def within(value: float, limit: float) -> float:
 def resists(joint: Joint) -> bool:
     """Return whether a joint needs torques in each step: for dry friction, or damping beside a motor."""
     follows = isinstance(joint.motor, Motor) or (isinstance(joint.motor, PDMotor) and joint.motor.follows != "torque")
-    return joint.dry_friction > 0 or (follows and joint.damping > 0)
+    return joint.dry_friction > 0 or joint.static_friction > 0 or (follows and joint.damping > 0)
 
 
 class JointDrive:
@@ -229,7 +230,8 @@ class JointDrive:
 
     def __init__(self, handle: Handle, joint: Joint, inverse_inertia: float, step_s: float) -> None:
         self._handle, self._step_s, self._kick = handle, step_s, step_s * inverse_inertia
-        self._damping, self._friction = joint.damping, joint.dry_friction
+        self._damping = joint.damping
+        self._frictions = joint.dry_friction, joint.static_friction, joint.stribeck_speed
         self._law = PDLaw()
         if isinstance(joint.motor, PDMotor):  # the law of a rigid joint: PhysX itself solves for the end of the step
             limit = min(joint.motor.max_torque_nm, STRONGEST)
@@ -281,7 +283,7 @@ class JointDrive:
         elif not self._driven:
             motor = within(self._law.feed * self._target, self._law.strongest_nm)
             ending = share * (coasting + self._kick * motor)
-        self._brake = within(-ending / (share * self._kick), self._friction)
+        self._brake = within(-ending / (share * self._kick), friction_nm(*self._frictions, speed))
         self.force = motor + self._brake
         if self._servo:
             self.force -= self._damping * (ending + share * self._kick * self._brake)

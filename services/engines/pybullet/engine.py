@@ -13,7 +13,7 @@ import numpy as np
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.engines.base import ALL_FIELDS, USUALLY_IN_PLACE
+from gaplab.services.engines.base import USUALLY_IN_PLACE
 from gaplab.services.engines.pybullet.robot import (
     BASE,
     MOST_LINKS,
@@ -25,8 +25,7 @@ from gaplab.services.engines.pybullet.robot import (
     set_masses,
 )
 from gaplab.services.engines.stepped import SteppedEngine
-from gaplab.services.world.kinematics import tilted_pose
-from gaplab.services.world.motions import LEVEL, Tilt
+from gaplab.services.world.kinematics import Placed
 from gaplab.services.world.sensing import gravity_m_s2
 from gaplab.services.world.world import UNTURNED, Material, Motor, Quaternion, Vector, World
 
@@ -65,8 +64,8 @@ class PyBulletScene:
         self._set_joints()
         self._initial: int = self.bullet.saveState()
 
-    def start(self, world: World, tilt_rad: Tilt = LEVEL) -> None:
-        """Reset to time 0 of a world, with the static friction of all contacts, and the base tilted about x and y.
+    def start(self, world: World, begun: Placed | None = None) -> None:
+        """Reset to time 0 of a world, with the static friction of all contacts.
 
         `restoreState` keeps contact points of the last rollout, with their impulses, where a foot ended near its start.
         Far from the ground they are dropped.
@@ -76,8 +75,8 @@ class PyBulletScene:
         bullet.performCollisionDetection()
         bullet.restoreState(self._initial)
         self._become(world)
-        if tilt_rad != LEVEL:
-            self._place(tilted_pose(world, tilt_rad))
+        if begun is not None:
+            self._place(begun)
         self._torques.reset()
         named = dict(world.surfaces)
         for link, body in self._robot.colliding.items():
@@ -130,25 +129,28 @@ class PyBulletScene:
         """Return the angular velocity of the base, `(3,)`, rad/s, along the axes of the world."""
         return np.array(self.bullet.getBaseVelocity(self.robot)[1])
 
-    def torques(self) -> FloatArray:
-        """Return the torques of the motors in the last step, `(joints,)`, N·m or N."""
-        torques = self._states(MOTOR_TORQUE)
-        for number, joint in enumerate(self.world.joints):
-            if not isinstance(joint.motor, Motor):  # Bullet's motor is the dry friction there
-                torques[number] = self._torques.motor_nm(number)
-        return torques
+    def encoders(self) -> FloatArray:
+        """Return `(7 + 3 · joints,)`: pose, angles, speeds, and torques of the motors in the last step, N·m, or N."""
+        told = np.concatenate([self.pose(), self._states(ANGLE, SPEED, MOTOR_TORQUE)])
+        for number in self._unpowered:
+            told[number - len(self._robot.joints)] = self._torques.motor_nm(number)
+        return told
 
-    def _place(self, pose: FloatArray) -> None:
-        """Move the base's frame to a pose `(7,)`; joints keep their angles."""
-        frame = inertial_frame(self.world.bodies[0])
-        position, turn = self.bullet.multiplyTransforms(pose[:3].tolist(), pose[3:].tolist(), *frame)
-        self.bullet.resetBasePositionAndOrientation(self.robot, position, turn)
+    def _place(self, begun: Placed) -> None:
+        """Move and turn the base, and the joints."""
+        bullet, frame = self.bullet, inertial_frame(self.world.bodies[0])
+        if not self.world.fixed:
+            place = bullet.multiplyTransforms(begun.pose[:3].tolist(), begun.pose[3:].tolist(), *frame)
+            bullet.resetBasePositionAndOrientation(self.robot, *place)
+            bullet.resetBaseVelocity(self.robot, *(each.tolist() for each in begun.of_centre(frame[0])))
+        for link, angle, speed in zip(self._robot.joints, begun.angles_rad, begun.speeds_rad_s, strict=True):
+            bullet.resetJointState(self.robot, link, angle, speed)
 
-    def _states(self, place: int) -> FloatArray:
-        """Return one of Bullet's numbers about each joint, `(joints,)`."""
+    def _states(self, *places: int) -> FloatArray:
+        """Return some of Bullet's numbers about all joints, one after the other, `(numbers · joints,)`."""
         joints = self._robot.joints
         states = self.bullet.getJointStates(self.robot, joints) if joints else ()
-        return np.array([state[place] for state in states], dtype=float)
+        return np.array([state[place] for place in places for state in states], dtype=float)
 
     def _set_up_physics(self) -> None:
         bullet = self.bullet
@@ -171,8 +173,10 @@ class PyBulletScene:
             set_masses(self.bullet, self._robot, world)
         if world.joints != before.joints or world.bodies != before.bodies:
             self._set_joints()
-        if (world.gravity_m_s2, world.slope_rad) != (before.gravity_m_s2, before.slope_rad):
-            self.bullet.setGravity(*gravity_m_s2(world))
+        if (pull := gravity_m_s2(world).tolist()) != gravity_m_s2(before).tolist():
+            self.bullet.setGravity(*pull)
+        if world.ground_m or before.ground_m:
+            self.bullet.resetBasePositionAndOrientation(self.ground, (0.0, 0.0, world.ground_m), UNTURNED)
 
     def _set_joints(self) -> None:
         """Set dry friction, and choose how to step: with torques that Bullet has no motor for, or without."""
@@ -180,10 +184,12 @@ class PyBulletScene:
         self._motors = tuple((numbers[joint.name], joint.motor) for joint in self.world.actuators)
         self._torques = Torques(self.world)
         self._set_inner_steps(self._torques.inner_steps)
-        for link, joint in zip(self._robot.joints, self.world.joints, strict=True):
-            if not isinstance(joint.motor, Motor):
-                kind = self.bullet.VELOCITY_CONTROL
-                self.bullet.setJointMotorControl2(self.robot, link, kind, targetVelocity=0.0, force=joint.dry_friction)
+        # Bullet's motor is the dry friction there
+        self._unpowered = [n for n, joint in enumerate(self.world.joints) if not isinstance(joint.motor, Motor)]
+        for number in self._unpowered:
+            link, joint, kind = self._robot.joints[number], self.world.joints[number], self.bullet.VELOCITY_CONTROL
+            friction = 0.0 if joint.static_friction else joint.dry_friction
+            self.bullet.setJointMotorControl2(self.robot, link, kind, targetVelocity=0.0, force=friction)
         self._driven = [self._robot.joints[number] for number in self._torques.joints]
         self.advance = self._driven_step if self._driven else self._bare_step
 
@@ -301,8 +307,8 @@ class PyBullet(SteppedEngine[PyBulletScene]):
     name = "pybullet"
     source = "https://pybullet.org, version 3.2.7"
     library = "pybullet"
-    honours = ALL_FIELDS - {"joint.armature"}
-    in_place = USUALLY_IN_PLACE | {"gravity_m_s2", "slope_rad"}
+    honours = SteppedEngine.honours - {"joint.armature"}
+    in_place = USUALLY_IN_PLACE | {"gravity_m_s2", "gravity_tilt_rad", "slope_rad"}
     install = "pip install pybullet, which has wheels up to Python 3.11, or choose another engine, like mujoco"
 
     def __init__(self, options: Frozen | None = None) -> None:
@@ -321,7 +327,7 @@ class PyBullet(SteppedEngine[PyBulletScene]):
     def _build(self, world: World) -> PyBulletScene:
         return PyBulletScene(self._bullet, world)
 
-    def _start(self, scene: PyBulletScene, world: World, tilt_rad: Tilt) -> Callable[[int], None]:
-        scene.start(world, tilt_rad)
+    def _start(self, scene: PyBulletScene, world: World, begun: Placed | None) -> Callable[[int], None]:
+        scene.start(world, begun)
         switches = any(each.dynamic_friction < each.static_friction for each in scene.materials.values())
         return StickSlip(scene).step if switches else scene.step

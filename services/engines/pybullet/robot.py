@@ -34,6 +34,7 @@ from gaplab.services.world.world import (
     Sphere,
     Vector,
     World,
+    friction_nm,
     pd_law,
     pd_torque,
 )
@@ -267,14 +268,14 @@ class _Resisted(NamedTuple):
     Attributes:
         kick: speed by torque at the end of a step, without damping.
         share: 1 / (1 + kick · damping).
-        friction_nm: largest torque of its dry friction, if no motor of Bullet's is free for it.
+        frictions: its dry, its static friction and the speed of that, N·m, if no motor of Bullet's can be them.
     """
 
     law: PDLaw
     kick: float
     damping: float
     share: float
-    friction_nm: float
+    frictions: tuple[float, float, float] | None
 
 
 class Torques:
@@ -317,13 +318,14 @@ class Torques:
         total = []
         for place, (target, state, resisted) in enumerate(zip(self._targets, states, self._resisted, strict=True)):
             angle, speed = state[0], state[1]
-            law, kick, damping, share, friction = resisted
+            law, kick, damping, share, frictions = resisted
             expected = self._expected[place]
             coasting = share * (speed if expected is None else speed + (speed - expected))
             torque = self._motors_nm[place] = pd_torque(target, angle, coasting, law)
             ending = coasting + share * kick * torque
             torque -= damping * ending
-            if friction:
+            if frictions is not None:
+                friction = friction_nm(*frictions, speed)
                 torque -= min(max(ending / (share * kick), -friction), friction)
             self._expected[place] = speed + kick * torque
             total.append(torque)
@@ -332,8 +334,12 @@ class Torques:
 
 def needs_torque(joint: Joint) -> bool:
     """Return whether Bullet lacks a motor for what acts in a joint."""
-    beside_servo = isinstance(joint.motor, Motor) and joint.dry_friction > 0
-    return isinstance(joint.motor, PDMotor) or joint.damping > 0 or beside_servo
+    return isinstance(joint.motor, PDMotor) or joint.damping > 0 or _needs_friction(joint)
+
+
+def _needs_friction(joint: Joint) -> bool:
+    """Return whether Bullet lacks a motor for a joint's friction: beside a servo, or if it sticks."""
+    return joint.static_friction > 0 or (isinstance(joint.motor, Motor) and joint.dry_friction > 0)
 
 
 def _inner_steps(pairs: Sequence[tuple[Joint, float]], step_s: float) -> int:
@@ -356,8 +362,8 @@ def _strength(joint: Joint, step_s: float) -> float:
 def _resisted(joint: Joint, inverse: float, step_s: float) -> _Resisted:
     share = 1.0 / (1.0 + step_s * joint.damping * inverse)
     law = pd_law(joint.motor, share * inverse, step_s) if isinstance(joint.motor, PDMotor) else PDLaw()
-    friction = joint.dry_friction if isinstance(joint.motor, Motor) else 0.0
-    return _Resisted(law, step_s * inverse, joint.damping, share, friction)
+    frictions = (joint.dry_friction, joint.static_friction, joint.stribeck_speed) if _needs_friction(joint) else None
+    return _Resisted(law, step_s * inverse, joint.damping, share, frictions)
 
 
 def _without_armature(world: World) -> World:

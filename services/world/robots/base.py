@@ -41,6 +41,7 @@ class Robot(Plugin):
         space: space of its genomes.
         known: `(g,)`, a hand-designed genome.
         sensors: what is read during a rollout; by default nothing.
+        joints: whether `fitness` or `sense` need the joints of trajectories.
         label: name that people know it by.
     """
 
@@ -54,6 +55,7 @@ class Robot(Plugin):
     space: Space
     known: Genome
     sensors: Sensors = Sensors()
+    joints: bool = False
     label: str
     _controller: Controller
     _task: Task
