@@ -1,5 +1,6 @@
 """Attachments, and traces: the recorded motion of a robot's base, from which its code computes fitness and readings."""
 
+import re
 from typing import Annotated, ClassVar
 
 from pydantic import Field
@@ -8,6 +9,39 @@ from gaplab.schemas.base import Examples, Frozen, Read, Real, Statistic, Unit
 
 TRACE_COLUMNS = ("time_s", "x", "y", "z", "qx", "qy", "qz", "qw")
 """Columns of a trace in CSV: seconds on a clock of its own, metres, and a quaternion."""
+
+QUANTITIES = {
+    "angle": ("angle", "position", "pos"),
+    "speed": ("speed", "velocity", "vel"),
+    "torque": ("torque", "effort"),
+    "command": ("command", "target", "action"),
+}
+"""What a column of a trace says of a joint, and how its heading may call that: `angle elbow`, `position_elbow`."""
+
+_HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<how>[^\])]*)[\])]?)?\s*")
+_HOW = re.compile(r"(?P<sign>[-−]?)\s*(?P<unit>[^@]*?)\s*(?:@\s*(?P<zero>.*))?")
+
+
+def heading_parts(heading: str) -> tuple[str, str]:
+    """Return the name of a column, and how it counts: `x` and `mm` of `x [mm]` or `x (mm)`."""
+    match = _HEADING.fullmatch(heading)
+    return (match["name"], (match["how"] or "").strip()) if match else (heading, "")
+
+
+def how_parts(how: str) -> tuple[str, str, str | None]:
+    """Return sign, unit and zero of a column: `-`, `deg` and `90` of `-deg @ 90`."""
+    match = _HOW.fullmatch(how)
+    return ("-" if match["sign"] else "", match["unit"], match["zero"]) if match else ("", how, None)
+
+
+def said_of(name: str) -> tuple[str, str]:
+    """Return the quantity and the joint of a column, like `position_elbow`; no quantity if it names none."""
+    for quantity, names in QUANTITIES.items():
+        for each in names:
+            if name.startswith(each) and name[len(each) : len(each) + 1] in {" ", "_", ".", "/"}:
+                return quantity, name[len(each) + 1 :]
+    return "", name
+
 
 Hash = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 """SHA-256 of the content of an attachment, in hexadecimal."""
@@ -55,18 +89,6 @@ class TraceRead(Read):
     after_rest: bool = Field(False, description="whether the rest before the motion shows when it began")
 
 
-class AlignedTrace(TraceRead):
-    """A trace beside the motion that the best simulator expects, to see whether their clocks agree."""
-
-    times_s: tuple[float, ...] = Field(description="seconds since the motion began", examples=[(0.0, 0.02)])
-    heights_m: tuple[float, ...] = Field(description="height of the base", examples=[(0.17, 0.171)])
-    distances_m: tuple[float, ...] = Field(description="distance over ground from the start", examples=[(0.0, 0.004)])
-    expected_heights_m: tuple[float, ...] | None = Field(
-        None, description="as the simulator expects; null: physics failed", examples=[(0.17, 0.172)]
-    )
-    expected_distances_m: tuple[float, ...] | None = Field(None, examples=[(0.0, 0.005)])
-
-
 class TracesRead(Read):
     """What traces say: the values and readings of an answer, which is not given by this."""
 
@@ -77,9 +99,9 @@ class TracesRead(Read):
         description="readings of the sensors in each repeat, computed from its trace; null: the robot has none",
         examples=[[[[0.02, None]]]],
     )
-    traces: tuple[AlignedTrace, ...]
+    traces: tuple[TraceRead, ...]
     doubts: tuple[str, ...] = Field(
         (),
         description="what is unlikely about the traces; an answer with them is refused unless it is `confirmed`",
-        examples=[("trace 1: there is no pose from 1.5 to 3.5 s",)],
+        examples=[("trace 1: there is no row from 1.5 to 3.5 s",)],
     )

@@ -9,8 +9,8 @@ from gaplab.api.clients.bodies import json_of, numbers_of, readings_of
 from gaplab.api.clients.connection import Connected, Connection, Of, Rows, id_of, segment
 from gaplab.api.clients.driving import Driving, TakenRequest
 from gaplab.api.clients.journal import Journal
-from gaplab.api.clients.mcap_traces import mcap_to_csv
 from gaplab.api.clients.studies import Studies
+from gaplab.api.clients.trace_files import Chosen, trace_csv
 from gaplab.schemas.corrections import BranchRead, Consequences
 from gaplab.schemas.measurements import AnswerRead, AttachmentRead, DoubtsRead, RequestRead
 from gaplab.schemas.records import Page
@@ -161,30 +161,31 @@ class Bench(Connected):
         path = Path(file)
         return self._attach(path.name, path.read_bytes(), media_type)
 
-    def attach_trace(self, file: str | Path, topic: str | None = None, body: str | None = None) -> AttachmentRead:
-        """Store a trace, CSV or MCAP, and return its hash; a recording in MCAP is stored as CSV.
+    def attach_trace(
+        self, file: str | Path, columns: Mapping[str, str] | None = None, **chosen: Unpack[Chosen]
+    ) -> AttachmentRead:
+        """Store a recording as a trace in CSV, and return its hash.
 
         Args:
-            file: the recording; with the suffix .mcap, the extra `gaplab[mcap]` reads it.
-            topic: topic of the base's pose in MCAP; left out: the only one that has poses.
-            body: `child_frame_id` of the base, if the topic has several.
+            file: CSV; MCAP, for the extra `gaplab[mcap]`; the folder of a LeRobot data set, for `gaplab[lerobot]`.
+            columns: what each joint is called there, and in brackets how it counts: sign, unit, and what is read where
+                the joint is at zero; by `*`, how all others count: `{"elbow": "Elbow [-deg @ 90]", "*": "[deg]"}`.
+            chosen: `topic` of the base's pose or the joints' states in MCAP, if there are several; `body`: its
+                `child_frame_id`, if the topic has several; `episode` of a LeRobot data set.
 
         Raises:
-            ExtraMissing: the libraries for MCAP are not installed.
-            ValueError: the recording has no such topic or body, or several.
+            ExtraMissing: the libraries for this format are not installed.
+            ValueError: the recording has no such topic, body, episode or column, or several.
         """
-        path = Path(file)
-        if path.suffix.lower() != ".mcap":
-            return self.attach(path, "text/csv")
-        return self._attach(path.with_suffix(".csv").name, mcap_to_csv(path, topic, body).encode(), "text/csv")
+        name = Path(file).with_suffix(".csv").name
+        return self._attach(name, trace_csv(file, columns, **chosen), "text/csv")
 
     def traces(self, id: Of, traces: Sequence[Of], lags_s: Sequence[float | None] | None = None) -> TracesRead:
         """Return fitness and readings that traces of a request say, and how their clocks were aligned.
 
         Args:
             id: id of the request.
-            traces: hashes of attachments, one for each repeat; CSV with `time_s`, `x`, `y`, `z`, `qx`, `qy`, `qz` and
-                `qw`.
+            traces: hashes of attachments, one for each repeat, as of `attach_trace`.
             lags_s: when the motion began on the clock of each trace; None: found by cross-correlation.
         """
         body = _without_none({"traces": list(map(id_of, traces)), "lags_s": lags_s})

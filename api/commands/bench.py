@@ -4,6 +4,7 @@ import json
 import re
 import signal
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
@@ -100,9 +101,18 @@ def measured(  # noqa: PLR0913, PLR0917 - each is an option of the command
 def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
     client: Client,
     id: RequestId,
-    files: Annotated[list[Path], typer.Argument(help="recorded motion of the base, CSV or MCAP; one for each repeat")],
-    topic: Annotated[str | None, typer.Option(help="topic of the base's pose in MCAP")] = None,
+    files: Annotated[
+        list[Path], typer.Argument(help="recorded motion: CSV, MCAP, or a LeRobot data set; one for each repeat")
+    ],
+    topic: Annotated[str | None, typer.Option(help="topic in MCAP of the base's pose, or of the joints")] = None,
     body: Annotated[str | None, typer.Option(help="child_frame_id of the base, if it has several")] = None,
+    episode: Annotated[int | None, typer.Option(help="number of the episode of a LeRobot data set")] = None,
+    columns: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map", metavar="JOINT=COLUMN", help="a joint's columns, and how they count: 'elbow=E [-deg @ 90]'"
+        ),
+    ] = None,
     answer: Annotated[bool, typer.Option("--answer", help="answer the request with them")] = False,
     lag_s: Annotated[
         list[float] | None, typer.Option("--lag", help="when the motion began on the clock of each recording, s")
@@ -113,7 +123,9 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
     """Compute fitness and readings from recordings of a motion, and answer its request with --answer."""
     if operator and not answer:
         raise typer.BadParameter("it names who answers; add --answer", param_hint="--operator")
-    stored = [client.bench.attach_trace(file, topic, body).id for file in files]
+    joints = dict(_pair(each) for each in columns or ())
+    attach = partial(client.bench.attach_trace, columns=joints, topic=topic, body=body, episode=episode)
+    stored = [attach(file).id for file in files]
     said = client.bench.traces(id, stored, lag_s)
     if not answer:
         return Answer(said, _words_of(said))
@@ -169,6 +181,13 @@ def reopen(
     """Open a request again that was taken too often without an answer; with a reason, one that somebody has taken."""
     found = client.bench.reopen(id, reason=reason, operator=operator)
     return Answer(found, f"Request {found.id} is {found.state.value}.")
+
+
+def _pair(text: str) -> tuple[str, str]:
+    joint, equals, column = text.partition("=")
+    if not (joint and equals):
+        raise typer.BadParameter(f"{text!r} is not JOINT=COLUMN, like 'elbow=Elbow [deg]'", param_hint="--map")
+    return joint.strip(), column.strip()
 
 
 def _given(**details: str | None) -> Details:

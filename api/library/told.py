@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from gaplab.api.clients.mcap_traces import mcap_to_csv
+from gaplab.api.clients.trace_files import trace_csv
 from gaplab.api.library.robots import invalid
 from gaplab.samples import samples_of
 from gaplab.schemas.measurements import KnownSample, MeasurementSpec
@@ -19,7 +19,7 @@ from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.measuring.attachments import store_attachment
 from gaplab.services.measuring.telling import Told
 from gaplab.services.replay.process import sent
-from gaplab.services.replay.traces import refuse_other_bodies, said_by_files
+from gaplab.services.replay.traces import said_by_files
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.sample_tables import read_samples
 from gaplab.services.store.session import Store
@@ -73,6 +73,7 @@ def sample_of(
     simulator: Sequence[float],
     genome: Genome,
     traces: Sequence[str | Path],
+    columns: Mapping[str, str] | None = None,
     **parts: Any,  # noqa: ANN401 - of an answer
 ) -> Told:
     """Return one measurement of a genome `(g,)`, whose traces are stored, and read beside a simulator `(p,)`.
@@ -80,14 +81,13 @@ def sample_of(
     Raises:
         InvalidSpec: it is not an answer, or a trace does not contain the motion; with every violation.
     """
-    files = dict(_attached(store, Path(each)) for each in traces)
+    files = dict(_attached(store, Path(each), columns) for each in traces)
     try:
         answer = MeasurementSpec.model_validate(parts | ({"traces": tuple(files)} if files else {}))
     except ValidationError as error:
         raise invalid(error) from error
     if answer.traces is None:
         return genome, answer, None
-    refuse_other_bodies(robot_of(spec).world)
     asked = TracesSpec(traces=answer.traces, lags_s=answer.lags_s)
     found = said_by_files(sent(spec), genome.tolist(), simulator, asked, files)
     if not isinstance(found, TracesRead):
@@ -95,7 +95,7 @@ def sample_of(
     return genome, answer, found
 
 
-def _attached(store: Store, path: Path) -> tuple[str, bytes]:
+def _attached(store: Store, path: Path, columns: Mapping[str, str] | None) -> tuple[str, bytes]:
     """Store a recording as CSV, and return its hash and its content."""
-    content = mcap_to_csv(path).encode() if path.suffix.lower() == ".mcap" else path.read_bytes()
+    content = trace_csv(path, columns)
     return store_attachment(store, content, path.with_suffix(".csv").name, "text/csv").id, content

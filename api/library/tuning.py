@@ -185,10 +185,10 @@ class Tuning(Result):
             fitness: in the robot's unit: one value, or one for each repeat; None or nan for a repeat that failed.
             readings: what the sensors said, `(times, sensors)`, in their units, nan where one failed; of several
                 repeats, `(r, times, sensors)`.
-            trace: in place of both: a recording of the robot's base, CSV or MCAP, or one for each repeat.
+            trace: in place of both: a recording of the robot, or one for each repeat, as of `Bench.attach_trace`.
             confirmed: take unlikely traces and values without a doubt.
             parts: `failed`: why there is no fitness; `lags_s`: when the motion began on the clock of each trace;
-                `unit`, `operator`, `note`.
+                `columns`: what each joint is called in the traces, and how it counts; `unit`, `operator`, `note`.
 
         Raises:
             InvalidSpec: the controller or its measurement does not fit the robot; with every violation.

@@ -194,11 +194,14 @@ def check_answer(id: Id, spec: MeasurementSpec, store: StoreDep) -> DoubtsRead:
 
 @router.post("/requests/{id}/traces", summary="Evaluate traces", responses=documented(409, 429))
 def evaluate_traces(id: Id, spec: TracesSpec, store: StoreDep, process: RolloutProcessDep) -> TracesRead:
-    """Compute fitness and readings from the recorded motion of the base, and store nothing.
+    """Compute fitness and readings from recorded motions, and store nothing.
 
-    A trace is a CSV file with the columns `time_s`, `x`, `y`, `z` (metres, z upwards from the ground) and `qx`, `qy`,
-    `qz`, `qw`, stored as an attachment. It contains the whole motion; its clock, origin and heading do not matter. The
-    clock is aligned by cross-correlation with the motion that the best simulator expects.
+    A trace is a CSV file with the column `time_s`, and the pose of the base or the joints, stored as an attachment. The
+    pose is `x`, `y`, `z` (metres, z upwards from the ground) and `qx`, `qy`, `qz`, `qw`. Joints are `angle JOINT`, and
+    perhaps `speed JOINT`, `torque JOINT` and `command JOINT`, in the units of the heading: `angle elbow [-deg @ 90]`
+    counts against the joint, in degrees, from 90. It contains the whole motion; clock, origin and heading do not
+    matter. The clock is aligned by cross-correlation of the commands, or else with the motion that the best simulator
+    expects.
     """
     return traces.evaluate_traces(store, process, id, spec)
 

@@ -4,6 +4,7 @@ A controller drives a walking robot, and an arm of other motors.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from operator import itemgetter
 from typing import TypeAlias
@@ -213,7 +214,7 @@ def _check_seconds(name: str, times_s: FloatArray) -> None:
 def rates_many_trajectories_as_each(plugin: type[Rates]) -> None:
     """Returns for many trajectories at once the fitness of each."""
     rates, observe_s = _rating(plugin)
-    many = trajectories(observe_s)
+    many = trajectories(observe_s, _world(rates))
     together = np.asarray(rates.fitness(many))
     one_by_one = [[float(rates.fitness(_one(many, row, column))) for column in range(5)] for row in range(4)]
     assert together.shape == (4, 5), f"its fitness of (4, 5) trajectories has the shape {together.shape}"
@@ -223,8 +224,7 @@ def rates_many_trajectories_as_each(plugin: type[Rates]) -> None:
 def has_no_fitness_of_failed_physics(plugin: type[Rates]) -> None:
     """Returns nan for a trajectory of nan."""
     rates, observe_s = _rating(plugin)
-    count = len(observe_s)
-    nothing = Trajectory(frozen(observe_s), frozen(np.full((count, 3), np.nan)), frozen(np.full((count, 4), np.nan)))
+    nothing = trajectories(observe_s, _world(rates)).mapped(lambda each: np.full(each.shape[2:], np.nan))
     fitness = float(rates.fitness(nothing))
     assert np.isnan(fitness), f"its fitness of a trajectory of nan is {fitness}"
 
@@ -243,7 +243,7 @@ def reads_its_sensors(plugin: type[Rates]) -> None:
     periods = np.asarray(sensors.periods)
     assert len(periods) in {0, len(noises)}, "its sensors lack periods"
     assert np.all(periods >= 0), f"periods must be 0 or above, and are {periods.tolist()}"
-    many = trajectories(sensors.times_s)
+    many = trajectories(sensors.times_s, _world(rates))
     values = np.asarray(rates.sense(many))
     expected = (4, 5, len(sensors.times_s), len(sensors.names))
     assert values.shape == expected, f"its readings have the shape {values.shape}, not {expected}"
@@ -256,16 +256,24 @@ def _rating(plugin: type[Rates]) -> tuple[Rates, FloatArray]:
         robot = plugin.example()
         return robot, robot.motion(frozen(robot.known)).observe_s
     task = plugin()
+    task.prepare(arm())
     return task, task.observe_s
 
 
-def trajectories(times_s: FloatArray) -> Trajectory:
-    """Return `(4, 5)` trajectories at times `(t,)`, read-only."""
+def _world(rates: Rates) -> World:
+    return rates.world if isinstance(rates, Robot) else arm()
+
+
+def trajectories(times_s: FloatArray, world: World) -> Trajectory:
+    """Return `(4, 5)` trajectories at times `(t,)` with the joints of a world, read-only."""
     rng = np.random.default_rng(0)
     positions_m = rng.normal(size=(4, 5, len(times_s), 3))
     turns = rng.normal(size=(4, 5, len(times_s), 4))
     orientations = turns / np.linalg.norm(turns, axis=-1, keepdims=True)
-    return Trajectory(frozen(times_s), frozen(positions_m), frozen(orientations))
+    found = Trajectory(frozen(times_s), frozen(positions_m), frozen(orientations))
+    joints = [frozen(rng.normal(size=(4, 5, len(times_s), len(world.joints)))) for _ in range(3)]
+    commands = frozen(rng.normal(size=(4, 5, len(times_s), len(world.actuators))))
+    return replace(found, angles_rad=joints[0], speeds_rad_s=joints[1], torques_nm=joints[2], commands=commands)
 
 
 def _one(many: Trajectory, row: int, column: int) -> Trajectory:

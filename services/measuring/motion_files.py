@@ -17,7 +17,7 @@ from gaplab.services.store.session import Session, snapshot
 from gaplab.services.world.controllers.parts import middles
 from gaplab.services.world.motions import Loop, Motion, open_loop
 from gaplab.services.world.robots.base import Robot
-from gaplab.services.world.world import Joint, PDMotor, World
+from gaplab.services.world.world import Joint, World
 
 MotionFormat = Literal["csv", "json", "ros2"]
 
@@ -95,16 +95,12 @@ def _why_none(robot: Robot, genome: FloatArray) -> str | None:
 
 def _others(robot: Robot) -> list[str]:
     """Return the actuators whose targets are velocities or torques, with what they follow."""
-    followed = [(joint.name, _follows(joint)) for joint in robot.world.actuators]
+    followed = [(joint.name, joint.follows) for joint in robot.world.actuators]
     return [f"{name} ({follows})" for name, follows in followed if follows != "position"]
 
 
-def _follows(joint: Joint) -> str:
-    return joint.motor.follows if isinstance(joint.motor, PDMotor) else "position"
-
-
 def _unit_of(joint: Joint) -> str:
-    return _UNITS[_follows(joint)][joint.slides]
+    return _UNITS[joint.follows][joint.slides]
 
 
 def _plain(motion: Motion, world: World) -> dict[str, Any]:

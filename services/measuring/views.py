@@ -18,7 +18,7 @@ from gaplab.services.store.session import Session
 from gaplab.services.world.robot_library import label_of
 from gaplab.services.world.safety import expected
 
-READINGS = "The experiment tunes on readings: send a trace of the base for each repeat, or let a driver return them."
+READINGS = "The experiment tunes on readings: send a trace for each repeat, or let a driver return them."
 
 
 def view_requests(session: Session, rows: Sequence[RequestRow]) -> tuple[RequestRead, ...]:

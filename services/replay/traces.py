@@ -7,7 +7,7 @@ import numpy as np
 
 from gaplab.schemas.measurements import MeasurementSpec
 from gaplab.schemas.records import MeasurementKind
-from gaplab.schemas.traces import AlignedTrace, TracesRead, TracesSpec
+from gaplab.schemas.traces import TraceRead, TracesRead, TracesSpec
 from gaplab.services.core.arrays import FloatArray, frozen, known
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.replay.process import RolloutProcess, SentSpec, received, sent
@@ -20,13 +20,10 @@ from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import attachments, replays, requests
 from gaplab.services.store.session import Session, Store
 from gaplab.services.world.kinematics import observes_base
-from gaplab.services.world.motions import Trajectory
+from gaplab.services.world.logs import Trace, read_trace
+from gaplab.services.world.motions import commands_at
 from gaplab.services.world.robots.base import Robot
-from gaplab.services.world.traces import Alignment, TooShort, Trace, align, placed, read_trace, unlikely
-from gaplab.services.world.world import World
-
-LONGEST_PLOT_S = 20.0
-"""Longest part of a motion whose alignment is shown."""
+from gaplab.services.world.traces import TooShort, align, placed, unlikely
 
 
 def evaluate_traces(
@@ -46,7 +43,6 @@ def evaluate_traces(
         row, repetition = requests.get(session, request)
         experiment = session.get_one(ExperimentRow, repetition.experiment_id)
         resolved = spec_of(experiment.spec)
-        refuse_other_bodies(robot_of(resolved).world)
         _check(session, spec, resolved.reality.repeats, answer=answer)
         tuned = row.iteration - (row.kind is MeasurementKind.SAMPLE)
         simulators = replays.tuned_parameters(session, experiment.id, repetition.number, tuned)
@@ -75,11 +71,12 @@ def said_by_files(
     robot = robot_of(received(sent_spec))
     try:
         read = {
-            digest: read_trace(files[digest].decode("utf-8", "replace"), f"/traces/{spec.traces.index(digest)}")
+            digest: read_trace(
+                files[digest].decode("utf-8", "replace"), f"/traces/{spec.traces.index(digest)}", robot.world
+            )
             for digest in dict.fromkeys(spec.traces)
         }
-        times_s, poses, _ = expected_motion(sent_spec, genes, parameters)
-        expected = Trace(times_s, poses[:, :3], poses[:, 3:])
+        expected, _ = expected_motion(sent_spec, genes, parameters)
         return evaluated(robot, frozen(genes), [read[digest] for digest in spec.traces], expected, spec)
     except InvalidSpec as error:
         return error.violations
@@ -92,10 +89,8 @@ def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec
     return evaluate_traces(store, process, request, TracesSpec(traces=spec.traces, lags_s=spec.lags_s), answer=True)
 
 
-def expected_motion(
-    sent_spec: SentSpec, genes: Sequence[float], parameters: Sequence[float]
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return times, poses and fitness as `expected_in` does, in a simulator of a spec."""
+def expected_motion(sent_spec: SentSpec, genes: Sequence[float], parameters: Sequence[float]) -> tuple[Trace, float]:
+    """Return motion and fitness as `expected_in` does, in a simulator of a spec."""
     spec = received(sent_spec)
     robot = robot_of(spec)
     simulation = simulation_of(spec, robot)
@@ -104,24 +99,13 @@ def expected_motion(
 
 def expected_in(
     simulation: Simulation, robot: Robot, genome: FloatArray, parameters: FloatArray
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return times `(k,)`, poses `(k, 7)` and fitness of a genome in a simulator; nan if the physics failed."""
+) -> tuple[Trace, float]:
+    """Return the motion and the fitness of a genome in a simulator; nan if the physics failed."""
     end_s = float(robot.motion(genome).observe_s[-1])
     times = np.unique(np.append(frame_times(end_s), end_s))
     _, recording = simulation.record(genome, parameters, times)
-    return times, recording.poses, float(robot.fitness(recording.trajectory))
-
-
-def refuse_other_bodies(world: World) -> None:
-    """Refuse traces, which are of a base, for a robot whose task rates another body, or whose base cannot move.
-
-    Raises:
-        InvalidSpec: the motion that counts is not that of a base that moves.
-    """
-    if world.fixed or not observes_base(world):
-        body = world.observed or world.bodies[0].name
-        message = f"a trace is of a base that moves, but the motion that counts here is that of {body!r}; give values"
-        raise InvalidSpec([Violation("/traces", None, message)])
+    motion = Trace(times, recording.poses[:, :3], recording.poses[:, 3:], recording.angles_rad)
+    return motion, float(robot.fitness(recording.trajectory))
 
 
 def _check(session: Session, spec: TracesSpec, repeats: int, *, answer: bool) -> None:
@@ -157,22 +141,23 @@ def evaluated(
     """
     aligned, values, readings, violations, doubts = [], list[float](), [], list[Violation](), list[str]()
     lags = spec.lags_s or (None,) * len(traces)
-    observe_s, sensors = robot.motion(genome).observe_s, robot.sensors
+    motion, sensors, world = robot.motion(genome), robot.sensors, robot.world
     for place, (digest, trace) in enumerate(zip(spec.traces, traces, strict=True)):
         try:
-            found = align(trace, expected, lags[place])
+            found = align(trace, expected, lags[place], motion)
         except TooShort as error:
             violations.append(Violation(f"/traces/{place}", digest, f"the trace does not contain the motion: {error}"))
             continue
-        values.append(float(robot.fitness(placed(trace, found.lag_s, observe_s, robot.world))))
+        values.append(float(robot.fitness(placed(trace, found.lag_s, motion.observe_s, world, motion))))
         if not isfinite(values[-1]):
-            message = f"the {robot.label} computes no finite fitness from this trace"
+            message = f"the {robot.label} computes no finite fitness from this trace{_lacks(trace, robot)}"
             violations.append(Violation(f"/traces/{place}", digest, message))
         if sensors.size:
-            seen = robot.sense(placed(trace, found.lag_s, sensors.times_s, robot.world))
+            seen = robot.sense(placed(trace, found.lag_s, sensors.times_s, world, motion))
             readings.append(tuple(tuple(map(known, row)) for row in seen.tolist()))
-        aligned.append(_beside(digest, trace, expected, found, robot.world))
-        doubts += [f"trace {place + 1}: {what}" for what in unlikely(trace, expected, found)]
+        aligned.append(TraceRead.filled_from(found, attachment=digest))
+        sent = commands_at(motion, np.clip(trace.times_s - found.lag_s, 0.0, None))
+        doubts += [f"trace {place + 1}: {what}" for what in unlikely(trace, expected, found, world, sent)]
     if violations:
         raise InvalidSpec(violations)
     return TracesRead(
@@ -184,27 +169,9 @@ def evaluated(
     )
 
 
-def _beside(digest: str, trace: Trace, expected: Trace, alignment: Alignment, world: World) -> AlignedTrace:
-    """Return a trace beside the expected motion."""
-    times = expected.times_s[expected.times_s <= LONGEST_PLOT_S]
-    known = bool(np.all(np.isfinite(expected.positions_m)))
-    seen, wanted = placed(trace, alignment.lag_s, times, world), placed(expected, 0.0, times, world) if known else None
-    return AlignedTrace(
-        attachment=digest,
-        lag_s=alignment.lag_s,
-        match=alignment.match,
-        after_rest=alignment.after_rest,
-        times_s=tuple(times.tolist()),
-        heights_m=_heights(seen),
-        distances_m=_distances(seen),
-        expected_heights_m=None if wanted is None else _heights(wanted),
-        expected_distances_m=None if wanted is None else _distances(wanted),
-    )
-
-
-def _heights(seen: Trajectory) -> tuple[float, ...]:
-    return tuple(np.round(seen.positions_m[:, 2], 4).tolist())
-
-
-def _distances(seen: Trajectory) -> tuple[float, ...]:
-    return tuple(np.round(np.linalg.norm(seen.positions_m[:, :2], axis=1), 4).tolist())
+def _lacks(trace: Trace, robot: Robot) -> str:
+    """Return what a robot's code may miss in a trace; "" if it has everything."""
+    lacking = ["the pose of the base"] if trace.positions_m is None and not robot.world.fixed else []
+    needs_joints = robot.joints or robot.world.fixed or not observes_base(robot.world)
+    lacking += ["the angles of its joints"] if needs_joints and trace.angles_rad is None else []
+    return f", which lacks {' and '.join(lacking)}" if lacking else ""

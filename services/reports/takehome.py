@@ -142,14 +142,23 @@ def _expected(home: _Home, process: RolloutProcess) -> Iterator[tuple[str, str]]
     for each in home.outcome.measured[:MOST_SHOWN]:
         name = f"{each.repetition}-{each.iteration}-{each.kind.value}"
         try:
-            times_s, poses, expected = call(expected_motion, spec, each.genome, parameters)
-            plain_m = call(plain_motion, spec, parameters, each.genome, times_s) if tuned else None
+            motion, expected = call(expected_motion, spec, each.genome, parameters)
+            assert motion.positions_m is not None
+            assert motion.orientations is not None
+            plain_m = call(plain_motion, spec, parameters, each.genome, motion.times_s) if tuned else None
         except GaplabError:
             return
         if plain_m is not None:
-            apart_m[name] = known(np.linalg.norm(plain_m - poses[:, :3], axis=1).max())
+            apart_m[name] = known(np.linalg.norm(plain_m - motion.positions_m, axis=1).max())
         text, header = io.StringIO(), ",".join(TRACE_COLUMNS)
-        np.savetxt(text, np.column_stack([times_s, poses]), "%.9g", ",", header=header, comments="")
+        np.savetxt(
+            text,
+            np.column_stack([motion.times_s, motion.positions_m, motion.orientations]),
+            "%.9g",
+            ",",
+            header=header,
+            comments="",
+        )
         fitness[name] = known(expected)
         yield f"expected/{name}.csv", text.getvalue()
     yield "expected/fitness.json", _json(fitness)

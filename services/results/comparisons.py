@@ -3,9 +3,11 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Fitness
+from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.records import common_count
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
@@ -22,6 +24,7 @@ from gaplab.services.store.queries import experiments
 from gaplab.services.store.queries.requests import bench_key
 from gaplab.services.store.session import Session, Store
 from gaplab.services.world.robot_library import label_of
+from gaplab.services.world.tasks.base import ReadOptions
 
 MOST_WITH_INTERVALS = 20
 """Most experiments whose comparison has intervals unless it is asked for without them."""
@@ -162,7 +165,7 @@ def _warnings(first: _Setting, second: _Setting) -> Iterator[str]:
     one, other = first.spec, second.spec
     if one.robot != other.robot:
         yield sentences.unlike("robots", label_of(one.robot), label_of(other.robot))
-    elif one.task != other.task:
+    elif _rates(one.task) != _rates(other.task):
         yield sentences.unlike("tasks", *(spec.task.name if spec.task else "its own" for spec in (one, other)))
     if first.study == second.study:
         return
@@ -170,6 +173,14 @@ def _warnings(first: _Setting, second: _Setting) -> Iterator[str]:
         yield sentences.HIDDEN
     elif _reality(one) != _reality(other):
         yield sentences.OTHER_REALITY
+
+
+def _rates(task: PluginRef | None) -> tuple[str, dict[str, Any]] | None:
+    """Return the task without what it reads, on which fitness does not depend."""
+    reads = {*ReadOptions.model_fields, "noise_tilt"}
+    if task is None:
+        return None
+    return task.name, {name: value for name, value in task.options.items() if name not in reads}
 
 
 def _setup(spec: ResolvedSpec) -> tuple[object, ...]:

@@ -50,6 +50,8 @@ def differences(columns: Sequence[SpecColumn]) -> SpecDiff:
     values = {path: tuple(_distinct(path, table) for table in tables) for path in pointers}
     hidden = {path for path in values if any(_is_hidden(path, cell) for cell in values[path])}
     differing = {path for path in values if _differs([cell for cell in values[path] if not _is_hidden(path, cell)])}
+    if ("task",) not in values and ("task", "name") not in differing:  # a spec of the same task lacks what nobody gave
+        differing |= {path for path in values if path[:2] == ("task", "options") and not all(values[path])}
     equal, concealed = len(values) - len(differing | hidden), sorted(hidden - differing, key=_order)
     later = f" Parameters of reality are compared once they may be shown: {len(concealed)} are hidden."
     return SpecDiff(

@@ -16,6 +16,7 @@ from gaplab.services.world.robot_files import RobotFile
 from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.tasks import tasks
+from gaplab.services.world.tasks.base import Task
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,10 @@ def sensors(spec: NamesARobot) -> SensorsRead | None:
     try:
         robot = robots.create(spec.robot)
         rating = spec.task or (robot.usual_task if spec.controller else None)
-        found = tasks.create(rating).sensors if rating else robot.sensors
+        task: Task | Robot = tasks.create(rating) if rating else robot
+        if isinstance(task, Task):
+            task.prepare(robot.world)
+        found = task.sensors
     except GaplabError:
         return None
     return SensorsRead(

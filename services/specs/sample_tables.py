@@ -216,5 +216,6 @@ def _unknown(line: int, heading: str, robot: Robot, *, hint: bool) -> CellError:
 def _permitted(robot: Robot) -> str:
     genes = "gene_0" if robot.space.size == 1 else f"gene_0 to gene_{robot.space.size - 1}"
     sensors = robot.sensors
-    read = f", SENSOR@TIME for {', '.join(sensors.names)} at {', '.join(sensors.times)} s"
+    times = sensors.times if len(sensors.times) <= 12 else (*sensors.times[:3], "…", sensors.times[-1])
+    read = f", SENSOR@TIME for {', '.join(sensors.names)} at {', '.join(times)} s"
     return f"{genes}, value or value_1, value_2 …{read if sensors.size else ''}"

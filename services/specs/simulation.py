@@ -1,9 +1,10 @@
 """The simulation of a robot on an engine, in worlds that tunables edit; and what it forecasts for a physical robot."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 from operator import itemgetter
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.engines.base import Engine
-from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory
+from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory, commands_at
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.safety import MOST_SIMULATORS, Extremes, extremes, recording_times, safety
 from gaplab.services.world.sensing import QUIET, disturbed
@@ -41,7 +42,7 @@ class Simulation:
         An infinite fitness counts as failed physics.
         """
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
-        motions = [self._robot.motion(genome) for genome in genomes]
+        motions = [self._motion(genome) for genome in genomes]
         return self._fitnesses(self._rollouts(genomes, worlds, motions), len(genomes), len(parameters))
 
     def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
@@ -51,7 +52,7 @@ class Simulation:
         """
         sensors = self._robot.sensors
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
-        motions = [self._robot.motion(genome) for genome in genomes]
+        motions = [self._motion(genome) for genome in genomes]
         times = _all_times(*(frozen(each).tobytes() for each in (motions[0].observe_s, sensors.times_s)))
         longer = [motion.observed_at(times.all_s) for motion in motions]
         seen = self._rollouts(genomes, worlds, longer)
@@ -80,15 +81,34 @@ class Simulation:
     def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
         """Return the world of a simulator `(p,)`, and the rollout of a genome in it, recorded at times `(k,)` too."""
         world = self.world(parameters)
-        motion = disturbed(world, self._robot.motion(genome), genome)
-        return world, self._engine.record(world, motion, times_s)
+        motion = self._motion(genome)
+        found = self._engine.record(world, disturbed(world, motion, genome), times_s)
+        return world, replace(found, trajectory=self._with_commands(found.trajectory, [motion], 0))
+
+    def _motion(self, genome: Genome) -> Motion | Loop:
+        motion = self._robot.motion(genome)
+        return motion.observed_at(motion.observe_s, joints=True) if self._robot.joints else motion
+
+    def _with_commands(self, seen: Trajectory, motions: Sequence[Motion | Loop], place: Any) -> Trajectory:  # noqa: ANN401 - an index
+        """Return trajectories with the commands of motions, at a place among these, if the robot needs joints."""
+        if not self._robot.joints:
+            return seen
+        if seen.angles_rad is None:
+            needs = f"which the {self._robot.label} needs"
+            raise PluginBroken(f"the engine {self._engine.name!r} tells no angles of joints, {needs}")
+        commands = [each for motion in motions if (each := commands_at(motion, seen.times_s)) is not None]
+        return replace(seen, commands=np.array(commands)[place]) if commands else seen
 
     def world(self, parameters: FloatArray) -> World:
         """Return the world of a simulator `(p,)`."""
         return self._world(tuple(parameters.tolist()))
 
     def _rollouts(self, genomes: Genomes, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
-        """Return the trajectories `(n, m, ...)`; the worlds of one noise are simulated together."""
+        """Return the trajectories `(n, m, ...)`, with commands if the robot needs joints."""
+        return self._with_commands(self._simulated(genomes, worlds, motions), motions, np.s_[:, None])
+
+    def _simulated(self, genomes: Genomes, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
+        """Return the trajectories without commands; the worlds of one noise are simulated together."""
         noises = {world.noise: None for world in worlds}
         if len(noises) == 1:
             return self._engine.rollouts(worlds, _disturbed(worlds[0], motions, genomes))

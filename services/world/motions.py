@@ -110,6 +110,13 @@ class Loop:
         return int(np.floor(float(self.observe_s[-1]) / self.period_s + 1e-6)) + 1
 
 
+def commands_at(motion: Motion | Loop, times_s: FloatArray) -> FloatArray | None:
+    """Return the targets `(t, a)` at times `(t,)`; None if they depend on what the controller observes."""
+    if isinstance(motion, Loop):
+        return None
+    return np.asarray(motion.targets[np.searchsorted(motion.times_s, times_s + 1e-9, side="right") - 1])
+
+
 def open_loop(motion: Motion | Loop) -> Motion:
     """Return a motion whose targets are known in advance.
 
@@ -134,6 +141,8 @@ class Trajectory:
             that slides; None, as the next two, unless the motion's `joints` asks for them.
         speeds_rad_s: `(..., t, joints)`: their speeds.
         torques_nm: `(..., t, joints)`: torques of their motors in the time step before; 0 at time 0.
+        commands: `(..., t, a)`: targets that the controller asks for; axes of size 1 stand for any size; None, too, if
+            they are not known in advance.
     """
 
     times_s: FloatArray
@@ -142,6 +151,7 @@ class Trajectory:
     angles_rad: FloatArray | None = None
     speeds_rad_s: FloatArray | None = None
     torques_nm: FloatArray | None = None
+    commands: FloatArray | None = None
 
     def mapped(
         self, change: Callable[..., FloatArray], *others: "Trajectory", times_s: FloatArray | None = None
@@ -152,7 +162,7 @@ class Trajectory:
         """
         changed = {
             name: change(*(getattr(each, name) for each in (self, *others)))
-            for name in ("positions_m", "orientations", "angles_rad", "speeds_rad_s", "torques_nm")
+            for name in ("positions_m", "orientations", "angles_rad", "speeds_rad_s", "torques_nm", "commands")
             if getattr(self, name) is not None
         }
         return Trajectory(self.times_s if times_s is None else times_s, **changed)

@@ -9,20 +9,18 @@ expects. The place is aligned by the pose at the start of the motion. Heights ar
 Source: gaplab.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
-from gaplab.schemas.traces import TRACE_COLUMNS
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.csv_tables import CsvRow, finite, read_csv
-from gaplab.services.world.kinematics import from_start
-from gaplab.services.world.motions import Trajectory
-from gaplab.services.world.world import World
+from gaplab.services.world.kinematics import from_start, observed_poses
+from gaplab.services.world.logs import TICKS, Trace
+from gaplab.services.world.motions import Loop, Motion, Trajectory, commands_at
+from gaplab.services.world.world import Joint, World
 
 STEP_S = 0.005
 """Resolution of the alignment."""
@@ -39,23 +37,6 @@ AROUND_S = 0.03
 LEAST_CHANGE = 1e-9
 """Standard deviation of a feature below which it says nothing about time."""
 
-_UNITS: dict[str, tuple[str, ...]] = {"time_s": ("", "s", "ms")} | dict.fromkeys("xyz", ("", "m", "cm", "mm"))
-_UNITS |= dict.fromkeys(TRACE_COLUMNS[4:], ("", "1"))
-"""Units that a heading may state, by column; without one, seconds and metres."""
-
-_SHARES = {"": 1.0, "1": 1.0, "s": 1.0, "ms": 1000.0, "m": 1.0, "cm": 100.0, "mm": 1000.0}
-"""How many of a unit are a second or a metre."""
-
-MOST_LINES = 500_000
-"""Most lines of a trace: 500 s at a kilohertz."""
-
-LONGEST_S = 3_600.0
-"""Longest trace."""
-
-MOST_ERRORS = 100
-"""Most errors that are told of one trace."""
-
-
 LONGEST_GAP_S = 0.25
 """Longest time without a pose, or with the same one, that is not remarked on; gaps also exceed four usual distances."""
 
@@ -68,33 +49,15 @@ HIGHER_M = 0.1
 TILTED_RAD = 0.5
 """Difference from the expected tilt at the start that is remarked on."""
 
+BEYOND = 0.05
+"""How far beyond its limits a joint may be, as a share of their distance: files and calibrations differ."""
+
+AGAINST, SCALED, AWAY_RAD = 0.5, 8.0, 0.5
+"""Correlation with the commands, either way, from which a sign is judged; and then the ratio of their deviations, and
+the mean difference, that are remarked on: springs and loads explain less."""
+
 WEAK, WEAKEST = 0.8, 0.1
 """Match below which a start is uncertain: where it was found by correlation alone, and after rest."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trace:
-    """The recorded motion of a base.
-
-    Attributes:
-        times_s: `(k,)`, ascending, on a clock of its own.
-        positions_m: `(k, 3)`.
-        orientations: `(k, 4)`: quaternions x, y, z, w.
-    """
-
-    times_s: FloatArray
-    positions_m: FloatArray
-    orientations: FloatArray
-
-    @cached_property
-    def _turns(self) -> "scipy.spatial.transform.Slerp":
-        transform = scipy.spatial.transform
-        return transform.Slerp(self.times_s, transform.Rotation.from_quat(self.orientations))
-
-    def at(self, times_s: FloatArray) -> Trajectory:
-        """Return the poses at times `(t,)` within the trace, interpolated."""
-        position = [np.interp(times_s, self.times_s, column) for column in self.positions_m.T]
-        return Trajectory(times_s, np.stack(position, axis=-1), self._turns(times_s).as_quat())
 
 
 @dataclass(frozen=True)
@@ -116,7 +79,7 @@ class TooShort(ValueError):
     """A trace does not contain the whole motion."""
 
 
-def align(trace: Trace, expected: Trace, lag_s: float | None = None) -> Alignment:
+def align(trace: Trace, expected: Trace, lag_s: float | None = None, motion: Motion | Loop | None = None) -> Alignment:
     """Return when the motion began on the clock of a trace, which must contain the whole motion.
 
     Args:
@@ -125,6 +88,7 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None) -> Alignmen
             failed.
         lag_s: the lag if it is known; None: it is found. If the expected motion does not change, the trace begins with
             the motion.
+        motion: that of the robot; if the trace has its commands, they alone show when it began.
 
     Raises:
         TooShort: the trace does not contain the whole motion.
@@ -139,14 +103,11 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None) -> Alignmen
         return Alignment(float(np.clip(lag_s, first, max(first, latest))))
     if latest < first - STEP_S:
         raise TooShort(f"it lasts {last - first:g} s, and the motion {duration:g} s")
-    count = int((last - first) / STEP_S + 1e-6) + 1
-    moving = _features(trace, frozen(first + np.arange(count) * STEP_S))
-    length = min(count, int(duration / STEP_S + 1e-6) + 1)
-    template = _features(expected, frozen(np.arange(length) * STEP_S))
-    scores = _correlations(moving, template)
+    sent = trace.commands is not None and isinstance(motion, Motion)
+    scores = _scores(trace, expected, motion if sent else None)
     if scores is None:
         return Alignment(float(first))
-    near, begun = np.ones(len(scores), dtype=bool), _onset(trace)
+    near, begun = np.ones(len(scores), dtype=bool), None if sent else _onset(trace)
     if begun is not None and (expected_to := _onset(expected, at_once=True)) is not None:
         away = np.abs(first + np.arange(len(scores)) * STEP_S - (begun - expected_to))
         near = away <= max(AROUND_S, float(away.min()))
@@ -155,52 +116,90 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None) -> Alignmen
     return Alignment(lag_s, float(min(scores[best], 1.0)), after_rest=not near.all())
 
 
+def _scores(trace: Trace, expected: Trace, motion: Motion | Loop | None) -> FloatArray | None:
+    """Return how well each shift `(shifts,)` fits: of the commands, if the motion is given; None if nothing changes."""
+    first, last = trace.times_s[0], trace.times_s[-1]
+    count = int((last - first) / STEP_S + 1e-6) + 1
+    length = min(count, int(float(expected.times_s[-1]) / STEP_S + 1e-6) + 1)
+    times_s, elapsed_s = frozen(first + np.arange(count) * STEP_S), frozen(np.arange(length) * STEP_S)
+    sent, logged = None if motion is None else commands_at(motion, elapsed_s), trace.at(times_s).commands
+    if sent is not None and logged is not None:
+        return _correlations(logged.T, sent.T)
+    return _correlations(_features(trace, times_s, expected), _features(expected, elapsed_s, trace))
+
+
 def _onset(trace: Trace, *, at_once: bool = False) -> float | None:
-    """Return when a base begins to move, on the clock of its trace; None if it does not, or not after rest.
+    """Return when a robot begins to move, on the clock of its trace; None if it does not, or not after rest.
 
     There is no rest if the motion begins `at_once`, with the trace.
     """
     resting = trace.times_s <= trace.times_s[0] + (0.0 if at_once else REST_S)
-    away_m = np.linalg.norm(trace.positions_m - trace.positions_m[resting].mean(axis=0), axis=1)
-    cosine = np.abs(trace.orientations @ trace.orientations[0])
-    away_rad = 2.0 * np.arccos(np.clip(cosine, 0.0, 1.0))
-    moved = (away_m > MOVED_M) | (away_rad > MOVED_RAD)
+    moved = np.zeros(len(trace.times_s), dtype=bool)
+    if trace.positions_m is not None and trace.orientations is not None:
+        away_m = np.linalg.norm(trace.positions_m - trace.positions_m[resting].mean(axis=0), axis=1)
+        cosine = np.abs(trace.orientations @ trace.orientations[0])
+        away_rad = 2.0 * np.arccos(np.clip(cosine, 0.0, 1.0))
+        moved = (away_m > MOVED_M) | (away_rad > MOVED_RAD)
+    if trace.angles_rad is not None:
+        moved |= np.any(np.abs(trace.angles_rad - trace.angles_rad[resting].mean(axis=0)) > MOVED_RAD, axis=1)
     if np.any(moved[resting]) or not np.any(moved):
         return None
     return float(trace.times_s[int(np.argmax(moved))])
 
 
-def placed(trace: Trace, lag_s: float, times_s: FloatArray, world: World) -> Trajectory:
-    """Return the poses of a trace at times `(t,)` of the motion, which began at the lag, as in a simulation.
+def placed(
+    trace: Trace, lag_s: float, times_s: FloatArray, world: World, motion: Motion | Loop | None = None
+) -> Trajectory:
+    """Return a trace at times `(t,)` of the motion, which began at the lag, as in a simulation of it.
 
     There a motion begins above the origin, with the base turned as `world.start_turn`; only a turn about z is removed.
+    What the trace does not say is nan.
     """
     seen = trace.at(np.clip(times_s + lag_s, trace.times_s[0], trace.times_s[-1]))
+    if world.fixed:
+        poses = np.tile([0.0, 0.0, world.start_height_m, *world.start_turn], (len(times_s), 1))
+    elif trace.positions_m is None:
+        poses = np.full((len(times_s), 7), np.nan)
+    else:
+        poses = _level(trace, lag_s, seen, world)
+    angles = np.full((len(times_s), len(world.joints)), np.nan) if seen.angles_rad is None else seen.angles_rad
+    poses = observed_poses(world, poses, angles)
+    commands = None if motion is None else commands_at(motion, times_s)
+    return replace(seen, times_s=times_s, positions_m=poses[:, :3], orientations=poses[:, 3:], commands=commands)
+
+
+def _level(trace: Trace, lag_s: float, seen: Trajectory, world: World) -> FloatArray:
+    """Return the poses `(t, 7)` of a base as if its motion had begun above the origin, in the heading of the start."""
     start = trace.at(frozen([lag_s]))
     rotation = scipy.spatial.transform.Rotation
     heading = rotation.from_quat(from_start(world, start.orientations)[0]).apply([1.0, 0.0, 0.0])
     back = rotation.from_rotvec([0.0, 0.0, -np.arctan2(heading[1], heading[0])])
     moved = seen.positions_m - start.positions_m[0] * [1.0, 1.0, 0.0]
     turned = (back * rotation.from_quat(seen.orientations)).as_quat()
-    return Trajectory(times_s, back.apply(moved), turned)
+    return np.hstack([back.apply(moved), turned])
 
 
-def _features(trace: Trace, times_s: FloatArray) -> FloatArray:
-    """Return features `(3, t)` that depend on no place and no heading: speed over ground, vertical speed, and tilt."""
-    if not np.all(np.isfinite(trace.positions_m)):
-        return np.zeros((3, len(times_s)))
+def _features(trace: Trace, times_s: FloatArray, other: Trace) -> FloatArray:
+    """Return features `(f, t)` that both traces have, and that depend on no place and no heading.
+
+    They are speed over ground, vertical speed and tilt of the base, and the angles of the joints.
+    """
     seen = trace.at(np.clip(times_s, trace.times_s[0], trace.times_s[-1]))
+    angles = None if other.angles_rad is None else seen.angles_rad
+    joints = np.empty((0, len(times_s))) if angles is None else angles.T
+    if trace.positions_m is None or other.positions_m is None or not np.all(np.isfinite(trace.positions_m)):
+        return np.vstack([np.zeros((3, len(times_s))), joints])
     speeds = np.gradient(seen.positions_m, axis=0) if len(times_s) > 1 else np.zeros_like(seen.positions_m)
     x, y = seen.orientations[:, 0], seen.orientations[:, 1]
     tilts = np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0))
-    return np.stack([np.linalg.norm(speeds[:, :2], axis=1), speeds[:, 2], tilts])
+    return np.vstack([np.linalg.norm(speeds[:, :2], axis=1), speeds[:, 2], tilts, joints])
 
 
 def _correlations(moving: FloatArray, template: FloatArray) -> FloatArray | None:
     """Return the mean Pearson correlation of features at each shift, `(shifts,)`; None if no feature changes."""
     found, length = [], template.shape[1]
     for recorded, wanted in zip(moving, template, strict=True):
-        if wanted.std() < LEAST_CHANGE or recorded.std() < LEAST_CHANGE:
+        if not (wanted.std() >= LEAST_CHANGE and recorded.std() >= LEAST_CHANGE):  # or nan: no column says it
             continue
         centred, recorded_too = wanted - wanted.mean(), recorded - recorded.mean()
         shared = scipy.signal.correlate(recorded_too, centred, mode="valid")
@@ -213,129 +212,107 @@ def _correlations(moving: FloatArray, template: FloatArray) -> FloatArray | None
     return np.mean(found, axis=0) if found else None
 
 
-def read_trace(text: str, pointer: str) -> Trace:
-    """Return the trace of a CSV file.
-
-    A heading may state another unit than seconds and metres: `x [mm]`; further columns do not matter.
-
-    Raises:
-        InvalidSpec: with every error, each with its line and column, at the pointer.
-    """
-    header, rows, lines = read_csv(text)
-    if lines > MOST_LINES:
-        message = f"the trace has {lines:,} lines"
-        raise InvalidSpec([Violation(pointer, f"{lines:,} lines", message, f"at most {MOST_LINES:,}")])
-    names, units = zip(*map(_named, header.cells or [""]), strict=True)
-    if missing := [name for name in TRACE_COLUMNS if names.count(name) != 1]:
-        message = header.error or f"the trace needs one column each of {', '.join(missing)}"
-        found = ",".join(header.cells)[:200]
-        raise InvalidSpec([Violation(pointer, found, f"line {header.line}: {message}", ", ".join(TRACE_COLUMNS))])
-    places = {name: names.index(name) for name in TRACE_COLUMNS}
-    numbers, errors = _table(rows, places)
-    errors = [*_unknown(header.line, {name: units[place] for name, place in places.items()}), *errors]
-    if not errors:
-        table = np.array(numbers).reshape(-1, len(places)) / [_SHARES[units[place]] for place in places.values()]
-        errors = list(_nonsense(table))
-    if errors:
-        raise InvalidSpec([Violation(pointer, None, message) for message in errors[:MOST_ERRORS]])
-    return Trace(frozen(table[:, 0]), frozen(table[:, 1:4]), frozen(table[:, 4:]))
-
-
-def _named(heading: str) -> tuple[str, str]:
-    """Return the name and the unit of a column: `x [mm]`, `x (mm)` or `x`."""
-    name, _, unit = heading.replace("(", "[").partition("[")
-    return name.strip(), unit.strip(" ])")
-
-
-def _unknown(line: int, units: Mapping[str, str]) -> Iterator[str]:
-    for name, unit in units.items():
-        if unit not in (permitted := _UNITS[name]):
-            known = ", ".join(filter(None, permitted))
-            yield f"line {line}, {name}: the unit {unit!r} is not known; permitted: {known}"
-
-
-def _table(rows: Iterable[CsvRow], places: Mapping[str, int]) -> tuple[list[list[float]], list[str]]:
-    """Return the numbers of all poses, and what is wrong; nothing is read after `MOST_ERRORS`.
-
-    Rows are those below the header, places those of `TRACE_COLUMNS`.
-    """
-    numbers, errors = list[list[float]](), list[str]()
-    for line, cells, error in rows:
-        found = [finite(cells[place]) if place < len(cells) else None for place in places.values()]
-        known = [number for number in found if number is not None]
-        if error:
-            errors.append(f"line {line}: {error}")
-        elif len(known) == len(found):
-            numbers.append(known)
-        else:
-            wrong = (name for name, number in zip(places, found, strict=True) if number is None)
-            shown = ((name, "".join(cells[places[name] : places[name] + 1])[:50]) for name in wrong)
-            errors += [f"line {line}, {name}: {cell!r} is not a finite number" for name, cell in shown]
-        if len(errors) >= MOST_ERRORS:
-            break
-    return numbers, errors
-
-
-def _nonsense(table: FloatArray) -> Iterator[str]:
-    """Yield what is wrong with poses `(k, 8)`: too few, times that do not ascend, quaternions whose norm is not 1."""
-    if len(table) < 2:
-        yield f"the trace has {len(table)} poses; at least 2 are needed"
-        return
-    backwards = np.nonzero(np.diff(table[:, 0]) <= 0)[0]
-    for place in backwards[:3]:
-        before, after = table[place : place + 2, 0].tolist()
-        yield f"pose {place + 2}: time_s must ascend, and {after} follows {before}"
-    duration = table[-1, 0] - table[0, 0]
-    if duration > LONGEST_S:
-        yield f"the trace lasts {duration:g} s; at most {LONGEST_S:g} s are permitted"
-    sizes = np.linalg.norm(table[:, 4:], axis=1)
-    for place in np.nonzero(np.abs(sizes - 1.0) > 0.01)[0][:3]:
-        yield f"pose {place + 1}: qx, qy, qz, qw have norm {sizes[place]:.3g}; permitted: 1, as of a rotation"
-
-
-def unlikely(trace: Trace, expected: Trace, alignment: Alignment) -> Iterator[str]:
+def unlikely(
+    trace: Trace, expected: Trace, alignment: Alignment, world: World, commands: FloatArray | None = None
+) -> Iterator[str]:
     """Yield what is unlikely about a trace, each as a clause.
 
-    The expected motion, of a simulator, is nan if its physics failed.
+    The expected motion, of a simulator, is nan if its physics failed. Commands `(k, a)` are those of the motion at the
+    trace's times; None if they are not known.
     """
     inside = (trace.times_s >= alignment.lag_s) & (trace.times_s <= alignment.lag_s + expected.times_s[-1])
-    yield from _holes(trace.times_s[inside], np.hstack([trace.positions_m, trace.orientations])[inside])
-    if not np.all(np.isfinite(expected.positions_m)):
+    parts = [each for each in (trace.positions_m, trace.orientations, trace.angles_rad) if each is not None]
+    yield from _holes(trace.times_s[inside], np.hstack(parts)[inside])
+    yield from unlikely_joints(trace, world, commands)
+    if expected.positions_m is None or not np.all(np.isfinite(expected.positions_m)):
         return
-    yield from _jump(trace.times_s[inside], trace.positions_m[inside], expected)
-    seen = trace.at(np.clip(alignment.lag_s + expected.times_s, trace.times_s[0], trace.times_s[-1]))
-    yield from _start(seen.positions_m[0, 2], expected.positions_m[0, 2], seen.orientations, expected.orientations)
-    far, wanted = (
-        float(np.linalg.norm(positions_m[:, :2] - positions_m[0, :2], axis=1).max())
-        for positions_m in (seen.positions_m, expected.positions_m)
-    )
-    if far > FARTHER * wanted + FARTHER_M:
-        yield f"the base moves {far:.2g} m, and the simulators expect {wanted:.2g} m"
+    if trace.positions_m is not None:
+        yield from _unlike(trace, expected.at(expected.times_s), alignment.lag_s, trace.positions_m, inside)
     if alignment.match is None or alignment.match >= (WEAKEST if alignment.after_rest else WEAK):
         return
     why = "" if alignment.after_rest else " and the recording does not begin at rest"
-    yield f"the match with the expected motion is {alignment.match:.2f}{why}: state when it began, or look at the plot"
+    yield f"the match with the expected motion is {alignment.match:.2f}{why}: state when it began"
+
+
+def _unlike(
+    trace: Trace, wanted: Trajectory, lag_s: float, positions_m: FloatArray, inside: NDArray[np.bool_]
+) -> Iterator[str]:
+    """Yield how the motion of a base differs from the expected one more than a wrong simulator explains."""
+    yield from _jump(trace.times_s[inside], positions_m[inside], wanted)
+    seen = trace.at(np.clip(lag_s + wanted.times_s, trace.times_s[0], trace.times_s[-1]))
+    yield from _start(seen.positions_m[0, 2], wanted.positions_m[0, 2], seen.orientations, wanted.orientations)
+    far, expected = (
+        float(np.linalg.norm(places_m[:, :2] - places_m[0, :2], axis=1).max())
+        for places_m in (seen.positions_m, wanted.positions_m)
+    )
+    if far > FARTHER * expected + FARTHER_M:
+        yield f"the base moves {far:.2g} m, and the simulators expect {expected:.2g} m"
+
+
+def unlikely_joints(trace: Trace, world: World, commands: FloatArray | None = None) -> Iterator[str]:
+    """Yield which joints move as they cannot, or against their commands, with the column and the likely mistake.
+
+    Commands `(k, a)`, at the trace's times, are by default its own.
+    """
+    if trace.angles_rad is None:
+        return
+    commands, targets = trace.commands if commands is None else commands, {}
+    if commands is not None:
+        targets = {joint.name: column for joint, column in zip(world.actuators, commands.T, strict=True)}
+    for joint, angles in zip(world.joints, trace.angles_rad.T, strict=True):
+        told = targets.get(joint.name) if joint.follows == "position" else None
+        if not (wrong := _wrong(joint, angles, told, trace.lines)):
+            continue
+        ways = {"-": -angles, "ticks @ 2048": (angles - TICKS / 2) * 2 * np.pi / TICKS}
+        if joint.limits is None or np.nanmax(np.abs(angles)) > joint.limits[1] - joint.limits[0]:
+            ways = {"deg": np.deg2rad(angles), "-deg": -np.deg2rad(angles), **ways}
+        likely = (f"is it `[{how}]`?" for how, values in ways.items() if not _wrong(joint, values, told))
+        column = (trace.headings or {}).get(f"angle {joint.name}", f"angle {joint.name}")
+        advice = next(likely, "say `[@ ZERO]`, what it reads where the joint is at zero, or map another column")
+        yield f"the column {column!r}{wrong}; {advice}"
+
+
+def _wrong(joint: Joint, angles: FloatArray, targets: FloatArray | None, lines: Sequence[int] = ()) -> str:
+    """Return why a joint cannot have had these angles; "" if it can. Targets are None if they are not angles."""
+    low, high = joint.limits or (-np.inf, np.inf)
+    slack = BEYOND * (high - low) if joint.limits else 0.0
+    beyond = np.flatnonzero((angles < low - slack) | (angles > high + slack))
+    if beyond.size:
+        where = f", line {lines[beyond[0]]}" if len(lines) else ""
+        return f"{where}: {angles[beyond[0]]:.4g} is outside the limits of {joint.name}, {low:.4g} to {high:.4g}"
+    there = np.isfinite(angles) & np.isfinite(angles if targets is None else targets)
+    if targets is None or not there.any() or targets[there].std() < MOVED_RAD or angles[there].std() < LEAST_CHANGE:
+        return ""
+    seen, told = angles[there], targets[there]
+    match, scale, away = np.corrcoef(seen, told)[0, 1], seen.std() / told.std(), (seen - told).mean()
+    if match < -AGAINST:
+        return f" goes against the commands of {joint.name} (correlation {match:.2f})"
+    if match > AGAINST and not 1 / SCALED < scale < SCALED:
+        return f" moves {scale:.2g} times as far as the commands of {joint.name}"
+    if match > AGAINST and abs(away) > AWAY_RAD:
+        return f" is {away:.2g} from the commands of {joint.name} on average"
+    return ""
 
 
 def _holes(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
-    """Yield sentences: where poses are missing or stay the same for too long, or that the base never moves."""
+    """Yield sentences: where rows are missing or stay the same for too long, or that nothing ever moves."""
     if len(times_s) < 2:
         return
     steps = np.diff(times_s)
     at = int(np.argmax(steps))
     if steps[at] > max(LONGEST_GAP_S, 4.0 * float(np.median(steps))):
-        yield f"there is no pose from {times_s[at]:.10g} to {times_s[at + 1]:.10g} s"
+        yield f"there is no row from {times_s[at]:.10g} to {times_s[at + 1]:.10g} s"
     changes = np.flatnonzero(np.any(np.diff(poses, axis=0) != 0.0, axis=1))
     if not changes.size:
-        yield "the base does not move"
+        yield "nothing moves"
         return
     begins, ends = times_s[changes[:-1] + 1], times_s[changes[1:]]
     still = ends - begins
     if still.size and still.max() > 2 * LONGEST_GAP_S:
-        yield f"the pose stays the same from {begins[int(np.argmax(still))]:.10g} s for {still.max():.2g} s"
+        yield f"everything stays the same from {begins[int(np.argmax(still))]:.10g} s for {still.max():.2g} s"
 
 
-def _jump(times_s: FloatArray, positions_m: FloatArray, expected: Trace) -> Iterator[str]:
+def _jump(times_s: FloatArray, positions_m: FloatArray, expected: Trajectory) -> Iterator[str]:
     """Yield the largest step that the base cannot make between two poses."""
     (steps, durations), (wanted, times) = (
         (np.linalg.norm(np.diff(places, axis=0), axis=1), np.diff(at))

@@ -218,6 +218,11 @@ class Joint:
     static_friction: float = 0.0
     stribeck_speed: float = 0.1
 
+    @property
+    def follows(self) -> Literal["position", "velocity", "torque"]:
+        """What the targets of its motor are."""
+        return self.motor.follows if isinstance(self.motor, PDMotor) else "position"
+
 
 @dataclass(frozen=True)
 class Noise:

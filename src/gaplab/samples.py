@@ -13,14 +13,14 @@ from gaplab.schemas.traces import TracesSpec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.csv_tables import read_csv
-from gaplab.services.replay.traces import evaluated, expected_in, refuse_other_bodies
+from gaplab.services.replay.traces import evaluated, expected_in
 from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.defaults import default_engine
 from gaplab.services.specs.sample_tables import checked, collected
 from gaplab.services.specs.sample_tables import read_samples as read_table
 from gaplab.services.specs.simulation import Simulation
+from gaplab.services.world.logs import read_trace
 from gaplab.services.world.robots.base import Robot
-from gaplab.services.world.traces import Trace, read_trace
 
 
 def read_samples(path: str | Path, robot: AnyRobot, *, confirmed: bool = False) -> list[dict[str, Any]]:
@@ -30,7 +30,7 @@ def read_samples(path: str | Path, robot: AnyRobot, *, confirmed: bool = False) 
 
     The columns are `gene_0`, `gene_1` and so on; `value`, or `value_1`, `value_2` and so on for repeats; and optionally
     readings like `roll@0.75`, or `roll@0.75#2` of repeat 2. In place of values and readings, `trace`, or `trace_1`,
-    `trace_2` and so on, may name recordings of the robot's base beside the file, from which its code computes both;
+    `trace_2` and so on, may name recordings in CSV beside the file, from which its code computes both;
     `lag_s`, or `lag_s_1` and so on, may state when the motion began on their clocks.
 
     Args:
@@ -53,16 +53,12 @@ def samples_of(file: Path, robot: Robot, *, confirmed: bool) -> SamplesRead:
 
     The motion that is expected is that in the robot's own world and engine. A trace that is missing, wrong, or
     doubtful and not confirmed is an error of its line.
-
-    Raises:
-        InvalidSpec: traces of this robot's base say nothing about it.
     """
     text = file.read_text("utf-8", "replace")
     head, rows, _ = read_csv(text)
     repeats = [name.removeprefix("trace") for name in head.cells if name.startswith("trace")]
     if not repeats:
         return read_table(text, robot)
-    refuse_other_bodies(robot.world)
 
     def found() -> Iterator[KnownSample | CellError]:
         for row in rows:
@@ -85,11 +81,11 @@ def _measured(
     named, genome = [each for each in repeats if cells.get(f"trace{each}")], frozen(genes)
     contents = [(folder / cells[f"trace{each}"]).read_bytes() for each in named]
     lags = tuple(float(lag) if (lag := cells.get(f"lag_s{each}")) else None for each in named)
-    traces = [read_trace(content.decode("utf-8", "replace"), "/traces") for content in contents]
+    traces = [read_trace(content.decode("utf-8", "replace"), "/traces", robot.world) for content in contents]
     spec = TracesSpec(traces=tuple(sha256(content).hexdigest() for content in contents), lags_s=lags)
     simulation = Simulation(robot, engine_of(PluginRef(name=default_engine(robot))), ())
-    times_s, poses, _ = expected_in(simulation, robot, genome, frozen([]))
-    found = evaluated(robot, genome, traces, Trace(times_s, poses[:, :3], poses[:, 3:]), spec)
+    expected, _ = expected_in(simulation, robot, genome, frozen([]))
+    found = evaluated(robot, genome, traces, expected, spec)
     if found.doubts and not confirmed:
         raise ValueError(f"{'; '.join(found.doubts)}; if that is right, read with confirmed=True")
     return KnownSample(genome=tuple(genes), values=found.values, readings=found.readings)

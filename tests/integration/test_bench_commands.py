@@ -7,18 +7,24 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from rich.console import Console
 
-from gaplab import Client
+from gaplab import Client, read_robot
 from gaplab.api.clients.progress import RecordProgress, Snapshot, log
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.measurements import TakeSpec
+from gaplab.services.core.arrays import frozen
+from gaplab.services.engines.mujoco.engine import MuJoCo
+from gaplab.services.experiments import stored_robots
 from gaplab.services.experiments.limits import FREELY
 from gaplab.services.measuring import taking
 from gaplab.services.store.models import EventRow
 from gaplab.services.store.session import Store
+from gaplab.services.world.motions import commands_at, open_loop
 from tests.commands import Gaplab
+from tests.drawn_arm import imported
 from tests.experiments import submit_one, toy
 from tests.integration.test_bench import compute, measure, pending
 from tests.integration.test_bench_http import traces_of
@@ -214,6 +220,36 @@ def test_traces_are_computed_and_stored_as_an_answer(sqlite_store: Store, gaplab
     assert pending(sqlite_store)[0].answers == ()
     assert "is stored: counted" in gaplab("traces", request.id, *files, "--answer", "--operator", "Ada").out
     assert " by Ada\n" in gaplab("requests", request.id).out
+
+
+def test_encoders_of_an_arm_answer_a_request(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> None:
+    stored_robots.add_robot(sqlite_store, imported(tmp_path).read_text())
+    request = asked(sqlite_store, robot="arm", engine="mujoco", budget="smoke", iterations=1)
+    robot: Any = read_robot(tmp_path / "arm.json")
+    motion = open_loop(robot.motion(np.array(request.genome)))
+    times_s = frozen(np.arange(101) * 0.02)
+    recorded = MuJoCo().record(robot.world, motion, times_s)
+    degrees = np.rad2deg(recorded.angles_rad)
+    rows = np.column_stack([times_s + 3.0, -degrees[:, 0], degrees[:, 1], *commands_at(motion, times_s).T])
+    file = tmp_path / "run.csv"
+    head = "time_s,position_Pan,Tilt,command shoulder,command elbow"
+    np.savetxt(file, rows, delimiter=",", header=head, comments="")
+    mapping = ["--map", "shoulder=Pan [-deg]", "--map", "elbow=Tilt [deg]"]
+
+    plain = gaplab("traces", request.id, str(file))
+    without = gaplab("traces", request.id, str(file), "--map", "shoulder=Pan", "--map", "elbow=Tilt")
+    answered = gaplab("traces", request.id, str(file), *mapping, "--answer", "--operator", "Ada")
+
+    assert "the trace needs one column each of angle shoulder, angle elbow" in plain.err
+    assert "doubtful: trace 1: the column 'angle elbow', line " in without.out
+    assert "is it `[deg]`?" in without.out
+    assert "the motion begins at 3.000 s (match 1.00)" in answered.out
+    assert "is stored: counted" in answered.out
+    assert "is not JOINT=COLUMN" in gaplab("traces", request.id, str(file), "--map", "Pan").err
+    (found,) = taking.list_requests(sqlite_store, taking.RequestFilter(pending=False)).items
+    fitness = float(robot.fitness(recorded.trajectory))
+    assert found.answers[0].values == pytest.approx((fitness,), abs=1e-3)
+    assert np.shape(found.answers[0].readings) == (1, len(robot.sensors.times_s), 3)
 
 
 def test_what_one_takes_home_is_saved_as_a_zip(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> None:

@@ -394,7 +394,7 @@ def test_a_driver_is_told_before_the_first_run_that_readings_are_needed(client: 
 
     assert task.sensors is not None
     assert (task.sensors.names[0], task.sensors.needed) == ("roll", True)
-    assert "send a trace of the base for each repeat, or let a driver return them" in task.request.needs
+    assert "send a trace for each repeat, or let a driver return them" in task.request.needs
     assert task.request.expected[0].startswith("simulators expect ")
 
 
@@ -562,7 +562,7 @@ def test_a_trace_with_a_gap_is_refused_unless_it_is_confirmed(client: Client, st
         client.bench.answer(request.id, traces=holed)
     answer = client.bench.answer(request.id, traces=holed, confirmed=True)
 
-    assert doubt.startswith("trace 1: there is no pose from ")
+    assert doubt.startswith("trace 1: there is no row from ")
     assert doubt in str(refused.value)
     assert (refused.value.problem.status, answer.state) == (409, "counted")
 

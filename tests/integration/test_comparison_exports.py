@@ -191,6 +191,17 @@ def test_what_differs_besides_the_strategy_is_said(
     assert "! different robots (slippery; toy_function)" in gaplab("diff", plain, slippery).out
 
 
+def test_tasks_that_read_other_sensors_rate_alike(sqlite_store: Store) -> None:
+    robot = {"repetitions": 2, "robot": "quadruped", "engine": "mujoco"}
+    options: Any = ({}, {"sensors": ["base", "angles"], "every_s": 0.02}, {"counted_s": 2.0})
+    plain, reads, shorter = (
+        submit_one(sqlite_store, toy(**robot, task={"name": "walk", "options": each})).id for each in options
+    )
+
+    assert not any("different tasks" in each for each in warnings_of(sqlite_store, [plain, reads]))
+    assert any("different tasks" in each for each in warnings_of(sqlite_store, [plain, shorter]))
+
+
 def test_all_ways_to_ask_begin_at_the_same_count(ids: list[str], gaplab: Gaplab, url: str, sqlite_store: Store) -> None:
     with TestClient(create_app(sqlite_store), base_url="http://localhost") as api, Client(url) as client:
         http = api.get("/comparisons", params={"study": ids}).json()

@@ -7,7 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.schemas.replays import Replay
+from gaplab.schemas.replays import Replay, ReplayReadings
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Probed, Transferred, Tuned
@@ -104,6 +104,26 @@ def test_readings_of_a_robot_without_sensors_are_an_empty_figure(replay: Any, fo
     assert figure.nothing == "the robot has no sensors"
     assert chart(figure)["data"] == []
     assert render_file(figure, format_).startswith(FORMATS[format_])
+
+
+def test_readings_of_many_joints_are_two_in_a_row_each_with_its_name(replay: Any) -> None:
+    names = [f"{what} joint {place}" for what in ("angle", "speed", "torque") for place in range(12)]
+    rows = tuple((0.1 * place,) * 50 for place in range(36))
+    readings = ReplayReadings(
+        sensors=tuple(names),
+        units=("rad",) * 12 + ("rad/s",) * 12 + ("N·m",) * 12,
+        noises=(0.002,) * 12 + (0.05,) * 24,
+        times_s=tuple((np.arange(50) * 0.02).tolist()),
+        simulation=rows,
+        reality=rows,
+    )
+
+    figure = readings_figure(replay.model_copy(update={"readings": readings}))
+
+    assert (len(figure.panels), figure.columns) == (36, 2)
+    assert [panel.title for panel in figure.panels] == names
+    assert figure.caption.endswith("are divided: angle 0.002 rad, speed 0.05 rad/s, torque 0.05 N·m.")
+    assert render_file(figure, "png").startswith(FORMATS["png"])
 
 
 def test_the_toy_has_what_the_papers_figure_has(store: Store) -> None:

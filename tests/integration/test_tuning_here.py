@@ -32,6 +32,7 @@ from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from gaplab.services.world.motions import Motion
+from tests import drawn_arm
 from tests.archiving import exported, imported
 from tests.commands import Gaplab
 from tests.experiments import same, submit_one, toy
@@ -343,6 +344,31 @@ def test_a_robot_of_a_plug_in_is_tuned(put: Callable[..., Path], monkeypatch: py
     assert genome.motion.actuators == ("hip",)
     tuning.tell(genome, 0.1)
     assert tuning.simulator.values.keys() == {"friction"}
+
+
+def test_an_arm_is_told_by_its_encoders(tmp_path: Path) -> None:
+    """The joints of the recording have other names and units; its fitness and readings are those of the motion."""
+    task: Any = {"name": "track", "options": {"sensors": ["angles"], "every_s": 0.1}}
+    tuning = Tuning(
+        drawn_arm.imported(tmp_path), ["kp(elbow)"], strategy="random", engine="mujoco", budget="smoke", task=task
+    )
+    robot: Any = read_robot(tuning.spec)
+    genome = tuning.ask()
+    times_s = frozen(np.arange(101) * 0.02)
+    engine, motion = engine_of(PluginRef(name="mujoco")), robot.motion(frozen(genome))
+    angles = engine.rollout(robot.world, motion.observed_at(times_s, joints=True)).angles_rad
+    assert angles is not None
+    log = np.column_stack([times_s + 5.0, np.rad2deg(angles)])
+    np.savetxt(tmp_path / "run.csv", log, delimiter=",", header="time_s,S,E", comments="")
+
+    tuning.tell(genome, trace=tmp_path / "run.csv", columns={"shoulder": "S", "elbow": "E", "*": "[deg]"})
+
+    (sample,) = (step.sample for step in tuning._log() if isinstance(step, Measured))
+    values = robot.sensors.values(sample.readings)
+    assert values == pytest.approx(angles[5::5], abs=1e-3)
+    rated, readings = robot.rated(times_s, dict(zip(("shoulder", "elbow"), angles.T, strict=True)), frozen(genome))
+    assert sample.fitness == pytest.approx(rated, abs=1e-3)
+    assert readings == pytest.approx(values, abs=1e-3)
 
 
 def driven(robot: str, sent: DriverMotion) -> float:

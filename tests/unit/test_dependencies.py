@@ -23,7 +23,7 @@ def declared(*extras: str) -> list[Requirement]:
 def needed() -> dict[str, str]:
     """Every distribution that gaplab needs, directly or not, with the version that is installed."""
     found: dict[str, str] = {}
-    waiting = [(each, frozenset[str]()) for each in declared("mujoco", "physx", "mcap", "collada", "dev")]
+    waiting = [(each, frozenset[str]()) for each in declared("mujoco", "physx", "mcap", "lerobot", "collada", "dev")]
     while waiting:
         requirement, extras = waiting.pop()
         if requirement.marker and not any(requirement.marker.evaluate({"extra": each}) for each in extras or {""}):
@@ -52,7 +52,7 @@ def test_every_line_of_the_constraints_is_a_version() -> None:
     assert len(PINS) == len(LINES)
 
 
-@pytest.mark.parametrize("requirement", declared("mujoco", "physx", "mcap", "collada", "dev"), ids=str)
+@pytest.mark.parametrize("requirement", declared("mujoco", "physx", "mcap", "lerobot", "collada", "dev"), ids=str)
 def test_what_is_declared_has_a_lower_bound_that_its_pin_fulfils(requirement: Requirement) -> None:
     assert requirement.specifier
     assert requirement.specifier.contains(PINS[canonicalize_name(requirement.name)])

@@ -67,6 +67,15 @@ def test_an_option_differs_between_experiments_that_have_it_and_is_empty_elsewhe
     assert found["simulators of the strategy"][1] == ((20,), (5,), ())
 
 
+def test_what_a_task_reads_differs_from_what_nobody_said() -> None:
+    walk, reads = {"robot": "quadruped", "task": "walk"}, {"name": "walk", "options": {"sensors": ["angles"]}}
+
+    found = told(spec(**walk), spec(**walk | {"task": reads}))
+
+    assert found == {"sensors of the task": ("/task/options/sensors", ((), (["angles"],)))}
+    assert told(spec(**walk), spec(robot="quadruped")) == {}
+
+
 def test_hidden_parameters_of_reality_are_not_compared() -> None:
     secret = spec(reality={"parameters": {"static_friction": 0.9}})
 

@@ -1,17 +1,6 @@
 /* Made by `make docs` from the OpenAPI document; what is changed here is lost. */
 
 declare namespace Api {
-  interface AlignedTrace {
-    attachment: string;
-    lag_s: number;
-    match: number | null;
-    after_rest: boolean;
-    times_s: Array<number>;
-    heights_m: Array<number>;
-    distances_m: Array<number>;
-    expected_heights_m: Array<number> | null;
-    expected_distances_m: Array<number> | null;
-  }
   interface Alive {
     status: string;
   }
@@ -858,7 +847,7 @@ declare namespace Api {
     values: Array<number>;
     unit: string;
     readings: Array<Array<Array<number | null>>> | null;
-    traces: Array<AlignedTrace>;
+    traces: Array<TraceRead>;
     doubts: Array<string>;
   }
   interface TracesSpec {

@@ -11,6 +11,9 @@ COUNTED = Style(INK, "dotted", "circle")
 
 SIMULATED, MEASURED = "In simulation", "In reality"
 
+MOST_ROWS = 6
+"""Most panels of sensors below each other; more are drawn two in a row."""
+
 NO_SENSORS = Panel((), Axis("Time (s)", (0.0, 1.0)), Axis("", (0.0, 1.0)))
 
 Named = tuple[str, ReplayWorld]
@@ -140,6 +143,7 @@ def readings_figure(replay: Replay, *, title: str | None = None) -> FigureDefini
         caption=_noises(found) if found else "",
         alt=f"{own}: readings of {', '.join(found.sensors)}." if found else own,
         share_x=True,
+        columns=1 if found is None or len(found.sensors) <= MOST_ROWS else 2,
         table=_differences(found) if found else Table((), ()),
         nothing="the robot has no sensors",
     )
@@ -156,15 +160,16 @@ def _panel(found: ReplayReadings, place: int) -> Panel:
         row = found.reality[place]
         marks.append(Points(MEASURED, found.times_s, row, style_of(1)))
         values += [value + side * noise for value in row if value is not None for side in (-1, 1)]
-    label = f"{found.sensors[place]} ({found.units[place]})"
-    return Panel(tuple(marks), Axis("Time (s)", limits(found.times_s)), Axis(label, limits(values)))
+    name, unit = found.sensors[place], found.units[place]
+    small = len(found.sensors) > MOST_ROWS
+    y = Axis(unit if small else f"{name} ({unit})", limits(values))
+    return Panel(tuple(marks), Axis("Time (s)", limits(found.times_s)), y, title=name if small else "")
 
 
 def _noises(found: ReplayReadings) -> str:
-    noises = (
-        f"{name} {number(noise)} {unit}"
-        for name, noise, unit in zip(found.sensors, found.noises, found.units, strict=True)
-    )
+    """Return the noise of each sensor; of those of one name for each joint, like `angle knee`, once."""
+    named = zip(found.sensors, found.noises, found.units, strict=True)
+    noises = dict.fromkeys(f"{name.partition(' ')[0]} {number(noise)} {unit}" for name, noise, unit in named)
     return f"Noise of the sensors, by which differences are divided: {', '.join(noises)}."
 
 

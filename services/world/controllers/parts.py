@@ -15,8 +15,8 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.world.kinematics import body_poses, chain, rotated
 from gaplab.services.world.motions import Motion
-from gaplab.services.world.sensing import GROUPS, names
-from gaplab.services.world.world import Joint, PDMotor, World
+from gaplab.services.world.sensing import GROUPS, in_order, listed, names
+from gaplab.services.world.world import Joint, World
 
 Gait: TypeAlias = Literal["trot", "pace", "bound", "walk"]
 
@@ -26,7 +26,7 @@ LEAST_APART_M = 1e-6
 
 def follows_angle(joint: Joint) -> bool:
     """Return whether the targets of a joint's motor are angles, not speeds or torques."""
-    return not isinstance(joint.motor, PDMotor) or joint.motor.follows == "position"
+    return joint.follows == "position"
 
 
 def middles(world: World) -> FloatArray:
@@ -113,19 +113,11 @@ SPEED_SCALE, TURNING_SCALE = 10.0, 5.0
 """Speed of a joint, and of the base, in rad/s, that counts as 1: gaplab's choice."""
 
 
-def _listed(value: object) -> object:
-    return [name.strip() for name in value.split(",") if name.strip()] if isinstance(value, str) else value
-
-
-def _ordered(value: tuple[str, ...]) -> tuple[str, ...]:
-    unknown = [name for name in value if name not in GROUPS]
-    if unknown:
-        raise ValueError(f"unknown group of observations {unknown[0]!r}; permitted: {', '.join(GROUPS)}")
-    return tuple(name for name in GROUPS if name in value)
-
-
 Senses: TypeAlias = Annotated[
-    tuple[str, ...], BeforeValidator(_listed), AfterValidator(_ordered), Field(max_length=len(GROUPS))
+    tuple[str, ...],
+    BeforeValidator(listed),
+    AfterValidator(lambda each: in_order(each, GROUPS, "observations")),
+    Field(max_length=len(GROUPS)),
 ]
 """An option: groups of observations, separated by commas; they are put into the order of `GROUPS`."""
 

@@ -11,15 +11,18 @@ import numpy as np
 from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import FloatArray, Genome
+from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.space import Space
 from gaplab.services.world.controllers import controllers
 from gaplab.services.world.controllers.base import Controller
-from gaplab.services.world.kinematics import from_start, observed_poses, observes_base
+from gaplab.services.world.kinematics import from_start, observes_base
+from gaplab.services.world.logs import Trace
 from gaplab.services.world.motions import Loop, Motion, Trajectory
 from gaplab.services.world.sensing import Sensors as Sensors
 from gaplab.services.world.tasks import tasks
 from gaplab.services.world.tasks.base import Task
+from gaplab.services.world.traces import placed
 from gaplab.services.world.world import World
 
 
@@ -83,9 +86,16 @@ class Robot(Plugin):
         return robot
 
     def _perform(self, controller: Controller, task: Task) -> None:
+        if task.commanded and controller.loops:
+            message = (
+                f"{task.name} needs the commands in advance, and those of {controller.name} depend on what it observes"
+            )
+            raise InvalidSpec([Violation("/task", task.name, message, "another task, or a controller without a loop")])
+        task.prepare(self.world)
         controller.prepare(self.world, task.observe_s)
         self._controller, self._task = controller, task
-        self.unit, self.sensors, self.space = task.unit, task.sensors, controller.space
+        self.unit, self.sensors, self.joints = task.unit, task.sensors, task.joints
+        self.space = controller.space
         known = self.designed.get(controller.name)
         fits = known is not None and known.shape == controller.known.shape
         self.known = known if known is not None and fits else controller.known
@@ -108,32 +118,33 @@ class Robot(Plugin):
             trajectory = replace(trajectory, orientations=from_start(self.world, trajectory.orientations))
         return self._task.sense(trajectory)
 
-    def rated(self, times_s: FloatArray, angles: Mapping[str, FloatArray]) -> float | tuple[float, FloatArray]:
+    def rated(
+        self, times_s: FloatArray, angles: Mapping[str, FloatArray], genome: Genome | None = None
+    ) -> float | tuple[float, FloatArray]:
         """Return the fitness of a recorded motion on a fixed base, with readings `(r, s)` if the robot has sensors.
 
         Args:
             times_s: `(k,)`, ascending: seconds from the start of the motion.
             angles: `(k,)` of each joint by its name, rad, or m if it slides; of those left out, they stay at the start.
+            genome: `(g,)`: the controller; without it, the fitness of a task that needs commands is nan.
 
         Raises:
             ValueError: the base moves, a joint is unknown, or the record ends before the last observation.
         """
-        observe_s, joints = self.motion(self.known).observe_s, self.world.joints
+        motion, joints = None if genome is None else self.motion(genome), self.world.joints
+        observe_s = self.motion(self.known).observe_s
         unknown = sorted(angles.keys() - {joint.name for joint in joints})
         if not self.world.fixed or unknown or times_s[-1] < observe_s[-1]:
             why = (
                 f"it needs a fixed base, joints that it has, not {unknown}, and a record of {observe_s[-1]:g} s or more"
             )
             raise ValueError(f"the motion of the {self.label} does not follow from these angles: {why}")
-
-        def seen(at_s: FloatArray) -> Trajectory:
-            base = np.tile([0.0, 0.0, self.world.start_height_m, *self.world.start_turn], (len(at_s), 1))
-            rows = [angles.get(joint.name, np.full(len(times_s), joint.start)) for joint in joints]
-            poses = observed_poses(self.world, base, np.array([np.interp(at_s, times_s, row) for row in rows]).T)
-            return Trajectory(at_s, poses[:, :3], poses[:, 3:])
-
-        fitness = float(self.fitness(seen(observe_s)))
-        return (fitness, self.sense(seen(self.sensors.times_s))) if self.sensors.size else fitness
+        rows = [angles.get(joint.name, np.full(len(times_s), joint.start)) for joint in joints]
+        trace = Trace(times_s, angles_rad=np.array(rows).T)
+        fitness = float(self.fitness(placed(trace, 0.0, observe_s, self.world, motion)))
+        if not self.sensors.size:
+            return fitness
+        return fitness, self.sense(placed(trace, 0.0, self.sensors.times_s, self.world, motion))
 
     @property
     def loops(self) -> bool:

@@ -1,14 +1,20 @@
 """The contract of a task: how long a rollout lasts, what is fit, and what is read."""
 
 from abc import abstractmethod
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from gaplab.services.core.arrays import FloatArray
+from gaplab.schemas.base import Frozen, Real
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.registry import Plugin
 from gaplab.services.world.motions import Trajectory
-from gaplab.services.world.sensing import Sensors
+from gaplab.services.world.sensing import Sensors, in_order, listed
+from gaplab.services.world.world import World
 
 
 class Task(Plugin):
@@ -18,11 +24,22 @@ class Task(Plugin):
         unit: unit of fitness.
         observe_s: `(t,)`, ascending: times at which a trajectory is observed for its fitness; the last one ends it.
         sensors: what is read during a rollout; by default nothing.
+        joints: true if it needs the joints of trajectories.
+        commanded: true if it needs their commands, which only a controller without a loop has in advance.
     """
 
     unit: ClassVar[str]
     observe_s: FloatArray
     sensors: Sensors = Sensors()
+    joints: bool = False
+    commanded: ClassVar[bool] = False
+
+    def prepare(self, world: World) -> None:
+        """Learn which robot is rated; called once, before anything is. By default nothing depends on the robot.
+
+        Raises:
+            InvalidSpec: the task cannot rate it.
+        """
 
     @abstractmethod
     def fitness(self, trajectory: Trajectory) -> FloatArray:
@@ -36,3 +53,122 @@ class Task(Plugin):
     def details(cls) -> dict[str, Any]:
         """Return the unit of fitness and the sensors, for the catalogue."""
         return {"unit": cls.unit, **cls().sensors.details()}
+
+
+JOINTS = MappingProxyType(
+    {
+        "angles": ("angle", ("rad", "m"), "angles_rad"),
+        "speeds": ("speed", ("rad/s", "m/s"), "speeds_rad_s"),
+        "torques": ("torque", ("N·m", "N"), "torques_nm"),
+    }
+)
+"""Groups of sensors of joints: their names, units of hinges and of slides, and what of a trajectory they tell."""
+
+GROUPS = ("base", *JOINTS)
+"""Groups of sensors, in the order of their readings."""
+
+NOISES = MappingProxyType({"tilt": 0.02, "place": 0.005, "angle": 0.002, "speed": 0.05, "torque": 0.05})
+"""Usual noises: gaplab's choice, of a cheap inertial sensor, a camera, encoders of 12 bits, and motor currents."""
+
+MOST_READINGS = 20_000
+"""Most readings of one rollout: twelve angles at 50 Hz for 33 s. A tuning holds those of a thousand rollouts."""
+
+
+def left_out(description: str) -> Any:  # noqa: ANN401 - as of `Field`
+    """Return the field of an option that specs do not have unless it is given: what they say stays as it was."""
+    return Field(default=None, exclude_if=lambda value: value is None, description=description)
+
+
+Groups = Annotated[
+    tuple[str, ...],
+    BeforeValidator(listed),
+    AfterValidator(lambda each: in_order(each, GROUPS, "sensors")),
+    Field(min_length=1),
+]
+Noise = Annotated[Real, Field(gt=0, le=1000)]
+
+
+class ReadOptions(Frozen):
+    """Options of a task that reads sensors; those left out are the task's own."""
+
+    sensors: Groups | None = left_out(
+        "what is read, separated by commas: `base`, and `angles`, `speeds` and `torques` of the joints with a motor"
+    )
+    every_s: Annotated[Real, Field(ge=0.001, le=600)] | None = left_out(
+        "interval between readings, s; left out: 0.25, of `track` 0.02"
+    )
+    noise_place: Noise | None = left_out("noise of the place, m; left out: 0.005, that of a camera")
+    noise_angle: Noise | None = left_out("noise of each angle, rad; left out: 0.002, that of an encoder of 12 bits")
+    noise_speed: Noise | None = left_out("noise of each speed, rad/s; left out: 0.05")
+    noise_torque: Noise | None = left_out("noise of each torque, N·m; left out: 0.05")
+
+
+Sensor: TypeAlias = tuple[str, str, float, float]
+"""Name, unit, noise and period of a sensor."""
+
+
+class ReadingTask(Task):
+    """A task whose options say what is read: the observed body, by default its place, and joints.
+
+    Attributes:
+        usual: groups that it reads by default.
+        usual_every_s: interval of readings by default.
+    """
+
+    Options: ClassVar[type[Frozen]] = ReadOptions
+    options: ReadOptions
+    usual: ClassVar[tuple[str, ...]] = ("base",)
+    usual_every_s: ClassVar[float] = 0.25
+
+    def read_during(self, from_s: float, span_s: float) -> None:
+        """Read the sensors in each interval after a time, for a span; called once, when the task is made."""
+        every_s = self.options.every_s or self.usual_every_s
+        self._times_s = frozen(from_s + np.arange(1, np.floor(span_s / every_s + 1e-9) + 1) * every_s)
+        ReadingTask.prepare(self, World())
+
+    def prepare(self, world: World) -> None:
+        """Set the sensors; they are those of the joints of this robot.
+
+        Raises:
+            InvalidSpec: there are too many readings.
+        """
+        self._groups = self.options.sensors or self.usual
+        self.joints = self._groups != ("base",)
+        self._places = [place for place, joint in enumerate(world.joints) if joint.motor is not None]
+        sensors = [each for group in self._groups for each in self._sensors(group, world)]
+        names, units, noises, periods = zip(*sensors, strict=True) if sensors else ((), (), (), ())
+        times_s = self._times_s if sensors else frozen([])
+        self.sensors = Sensors(names, units, frozen(noises), times_s, frozen(periods))
+        if self.sensors.size > MOST_READINGS:
+            count = f"{self.sensors.size:,} readings of a rollout, {len(times_s)} times {len(sensors)}, are too many"
+            message = f"{count}: take a longer `every_s`, or fewer `sensors`"
+            raise InvalidSpec([Violation("/task", self.sensors.size, message, f"at most {MOST_READINGS:,}")])
+
+    def base(self) -> Sequence[Sensor]:
+        """Return the sensors of the observed body."""
+        return [(axis, "m", self.noise("place"), 0.0) for axis in "xyz"]
+
+    def look(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(..., r, b)`: what the sensors of `base` say."""
+        return np.asarray(trajectory.positions_m)
+
+    def noise(self, of: str) -> float:
+        """Return the noise that an option states, or the usual one."""
+        return float(getattr(self.options, f"noise_{of}", None) or NOISES[of])
+
+    def sense(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(..., r, s)`: what the sensors say; nan of joints that a trajectory does not have."""
+        told = [self.look(trajectory) if group == "base" else self._told(trajectory, group) for group in self._groups]
+        return told[0] if len(told) == 1 else np.concatenate(told, axis=-1)
+
+    def _told(self, trajectory: Trajectory, group: str) -> FloatArray:
+        values: FloatArray | None = getattr(trajectory, JOINTS[group][2])
+        if values is None:
+            return np.full((*trajectory.positions_m.shape[:-1], len(self._places)), np.nan)
+        return np.asarray(values[..., self._places])
+
+    def _sensors(self, group: str, world: World) -> Sequence[Sensor]:
+        if group == "base":
+            return self.base()
+        name, units, _ = JOINTS[group]
+        return [(f"{name} {joint.name}", units[joint.slides], self.noise(name), 0.0) for joint in world.actuators]

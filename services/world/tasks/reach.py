@@ -8,22 +8,15 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.world.motions import Trajectory
-from gaplab.services.world.sensing import Sensors
-from gaplab.services.world.tasks.base import Task
+from gaplab.services.world.tasks.base import ReadingTask, ReadOptions
 
 RATED_EVERY_S = 0.05
 """Interval between the distances whose mean is the fitness."""
 
-SENSED_EVERY_S = 0.25
-"""Interval between readings of the sensors."""
-
-PLACE_NOISE_M = 0.005
-"""Noise of the sensors: that of a camera, gaplab's default."""
-
 Metres = Annotated[Real, Field(ge=-100, le=100)]
 
 
-class ReachOptions(Frozen):
+class ReachOptions(ReadOptions):
     """Options of the task `reach`."""
 
     x_m: Metres = Field(default=0.3, description="target, along x from the origin of the world")
@@ -41,11 +34,11 @@ class ReachOptions(Frozen):
     )
 
 
-class Reach(Task):
+class Reach(ReadingTask):
     """Minus the mean distance of the observed body from a target place, during `counted_s` after `settling_s`.
 
     Name the body in the robot, as its observed one, such as the last link of an arm. Distances are those of its frame.
-    The sensors are the place of the body.
+    By default the sensors are the place of the body.
     """
 
     name = "reach"
@@ -61,13 +54,7 @@ class Reach(Task):
         counted = given.settling_s + np.linspace(0.0, given.counted_s, intervals + 1)
         self.observe_s = frozen(np.unique([0.0, *counted]))
         self._first = len(self.observe_s) - len(counted)
-        end_s = given.settling_s + given.counted_s
-        self.sensors = Sensors(
-            names=("x", "y", "z"),
-            units=("m",) * 3,
-            noises=frozen([PLACE_NOISE_M] * 3),
-            times_s=frozen(np.arange(1, np.floor(end_s / SENSED_EVERY_S + 1e-9) + 1) * SENSED_EVERY_S),
-        )
+        self.read_during(0.0, given.settling_s + given.counted_s)
 
     def fitness(self, trajectory: Trajectory) -> FloatArray:
         """Return `(...)`: minus the mean distance; for `reduction`, plus the distance at the start."""
@@ -75,7 +62,3 @@ class Reach(Task):
         distances = np.sqrt((away * away).sum(axis=-1))
         mean = distances[..., self._first :].mean(axis=-1)
         return np.asarray(distances[..., 0] - mean if self.options.measure == "reduction" else -mean)
-
-    def sense(self, trajectory: Trajectory) -> FloatArray:
-        """Return `(..., r, 3)`: the place of the observed body."""
-        return np.asarray(trajectory.positions_m)

@@ -1,5 +1,6 @@
 """The paper's task: to walk as far as possible."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
@@ -8,17 +9,10 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.world.motions import Trajectory
-from gaplab.services.world.sensing import Sensors
-from gaplab.services.world.tasks.base import Task
-
-SENSED_EVERY_S = 0.25
-"""Interval between readings of the sensors."""
-
-TILT_NOISE_RAD, PLACE_NOISE_M = 0.02, 0.005
-"""Noise of the sensors: gaplab's defaults, of a cheap inertial sensor and a camera above the floor."""
+from gaplab.services.world.tasks.base import Noise, ReadingTask, ReadOptions, Sensor, left_out
 
 
-class WalkOptions(Frozen):
+class WalkOptions(ReadOptions):
     """Options of the task `walk`."""
 
     settling_s: Annotated[Real, Field(ge=0, le=600)] = Field(
@@ -30,9 +24,10 @@ class WalkOptions(Frozen):
     direction: Literal["any", "forward"] = Field(
         default="any", description="`any`: the distance over ground; `forward`: the distance along x"
     )
+    noise_tilt: Noise | None = left_out("noise of roll and pitch, rad; left out: 0.02, that of an inertial sensor")
 
 
-class Walk(Task):
+class Walk(ReadingTask):
     """The distance over ground during `counted_s`, after `settling_s`, divided by that time."""
 
     name = "walk"
@@ -45,14 +40,13 @@ class Walk(Task):
         super().__init__(options)
         settling_s, counted_s = self.options.settling_s, self.options.counted_s
         self.observe_s = frozen([settling_s, settling_s + counted_s])
-        times = np.arange(1, np.floor(counted_s / SENSED_EVERY_S) + 1) * SENSED_EVERY_S
-        self.sensors = Sensors(
-            names=("roll", "pitch", "height", "x", "y"),
-            units=("rad", "rad", "m", "m", "m"),
-            noises=frozen([TILT_NOISE_RAD] * 2 + [PLACE_NOISE_M] * 3),
-            times_s=frozen(settling_s + times),
-            periods=frozen([2 * np.pi, 0.0, 0.0, 0.0, 0.0]),
-        )
+        self.read_during(settling_s, counted_s)
+
+    def base(self) -> Sequence[Sensor]:
+        """Return roll and pitch of the trunk, its height, and its place on the ground from the start."""
+        tilt, place = self.noise("tilt"), self.noise("place")
+        places = [(name, "m", place, 0.0) for name in ("height", "x", "y")]
+        return [("roll", "rad", tilt, 2 * np.pi), ("pitch", "rad", tilt, 0.0), *places]
 
     def fitness(self, trajectory: Trajectory) -> FloatArray:
         """Return `(...)`: the distance between first and last observation, divided by the time between them."""
@@ -63,8 +57,8 @@ class Walk(Task):
         distances = np.sqrt(squares[..., 0] + squares[..., 1])
         return np.asarray(distances / (trajectory.times_s[-1] - trajectory.times_s[0]))
 
-    def sense(self, trajectory: Trajectory) -> FloatArray:
-        """Return `(..., r, 5)`: roll and pitch of the trunk, its height, and its place on the ground from the start."""
+    def look(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(..., r, 5)`: what the sensors of `base` say."""
         x, y, z, w = trajectory.orientations.reshape(-1, 4).T  # numpy is twice as fast with vectors
         values = np.empty((len(x), 5))
         values[:, 0] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))

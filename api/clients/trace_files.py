@@ -1,0 +1,143 @@
+"""Recordings as traces in CSV: mapped to the joints of a robot, and read from LeRobot data sets and MCAP.
+
+They are read here, so that the service parses CSV alone.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypedDict, Unpack
+
+from gaplab.api.clients.errors import library
+from gaplab.api.clients.mcap_traces import mcap_to_csv
+from gaplab.schemas.traces import TRACE_COLUMNS, heading_parts, how_parts, said_of
+from gaplab.services.csv_tables import csv_text, read_csv
+
+COLUMNS = {
+    "observation.state": "angle",
+    "observation.velocity": "speed",
+    "observation.effort": "torque",
+    "action": "command",
+}
+"""What the columns of a LeRobot data set say."""
+
+ALL = "*"
+"""In place of a joint in a mapping: all of which nothing else says how they count."""
+
+
+class Chosen(TypedDict, total=False):
+    """What of a recording is its trace."""
+
+    topic: str | None
+    body: str | None
+    episode: int | None
+
+
+def trace_csv(file: str | Path, columns: Mapping[str, str] | None = None, **chosen: Unpack[Chosen]) -> bytes:
+    """Return a recording as CSV; see `Bench.attach_trace`."""
+    path, suffix = Path(file), Path(file).suffix.lower()
+    if suffix == ".mcap":
+        text = mcap_to_csv(path, chosen.get("topic"), chosen.get("body"))
+    elif path.is_dir() or suffix == ".parquet":
+        text = lerobot_to_csv(path, chosen.get("episode"))
+    elif not columns:
+        return path.read_bytes()
+    else:
+        text = path.read_text("utf-8", "replace")
+    return (mapped(text, columns) if columns else text).encode()
+
+
+def mapped(text: str, columns: Mapping[str, str]) -> str:
+    """Return a table in CSV whose headings name the joints of a robot.
+
+    Args:
+        text: the table.
+        columns: by joint, its name in the table, and in brackets how its columns count; by `*`, how all others count:
+            `{"elbow": "Elbow [-deg @ 90]", "command elbow": "goal", "*": "[deg]"}`.
+
+    Raises:
+        ValueError: the table has no such column.
+    """
+    table, met = read_csv(text), set[str]()
+    said = {joint: heading_parts(column) for joint, column in columns.items()}
+    _, usual = said.pop(ALL, ("", ""))
+    named = {name: (joint, how) for joint, (name, how) in said.items()}
+    headings = list[str]()
+    for heading in table.header.cells:
+        name, how = heading_parts(heading)
+        quantity, rest = said_of(name)
+        key = name if name in named else rest
+        met.add(key)
+        if name not in TRACE_COLUMNS and (key in named or usual):
+            joint, wanted = named.get(key, (rest, ""))
+            what, joint = said_of(joint)
+            counted = _counted(wanted or how or usual, what or quantity)
+            heading = f"{what or quantity or 'angle'} {joint}{f' [{counted}]' if counted else ''}"
+        headings.append(heading)
+    for name in named.keys() - met:
+        found = ", ".join(table.header.cells)[:500]
+        raise ValueError(f"the recording has no column of {name!r} for {named[name][0]}; it has {found}")
+    return csv_text(headings, (row.cells for row in table.rows))
+
+
+def _counted(how: str, quantity: str) -> str:
+    """Return how a quantity counts, given how the angle of its joint does."""
+    sign, unit, _ = how_parts(how)
+    if quantity == "torque":
+        return sign
+    return f"{sign}{unit}{'/s' if unit and not unit.endswith('/s') else ''}" if quantity == "speed" else how
+
+
+def lerobot_to_csv(path: Path, episode: int | None = None) -> str:
+    """Return an episode of a LeRobot data set as CSV, of version 2.1 or 3.
+
+    Args:
+        path: its folder, which has `meta/info.json`, or one of the Parquet files in it.
+        episode: number of the episode; None: the only one.
+
+    Raises:
+        ExtraMissing: pyarrow is not installed.
+        ValueError: it is not such a data set, or does not have this episode.
+    """
+    root = next((each for each in (path, *path.parents) if (each / "meta" / "info.json").is_file()), None)
+    if root is None:
+        raise ValueError(f"{path.name} is not of a LeRobot data set: there is no meta/info.json at or above it")
+    info = json.loads((root / "meta" / "info.json").read_text("utf-8"))
+    rows = _rows([path] if path.is_file() else sorted((root / "data").rglob("*.parquet")), episode)
+    if (count := len({row["episode_index"] for row in rows})) != 1:
+        found = f"{count} episodes" if episode is None else f"no episode {episode}"
+        raise ValueError(f"{path.name} has {found}; permitted: 0 to {info['total_episodes'] - 1}")
+    rows.sort(key=lambda row: row["frame_index"])
+    try:
+        names = {column: _names(info["features"][column]) for column in COLUMNS if column in rows[0]}
+        times_s = [row["timestamp"] if "timestamp" in row else row["frame_index"] / info["fps"] for row in rows]
+    except KeyError as error:
+        raise ValueError(f"meta/info.json of {path.name} lacks {error}") from error
+    for column, joints in names.items():
+        if len(rows[0][column]) != len(joints):
+            raise ValueError(f"{column} has {len(rows[0][column])} numbers, and its names are {', '.join(joints)}")
+    headings = [f"{COLUMNS[column]} {joint}" for column, joints in names.items() for joint in joints]
+    values = ([number for column in names for number in row[column]] for row in rows)
+    return csv_text(["time_s", *headings], ([time_s, *row] for time_s, row in zip(times_s, values, strict=True)))
+
+
+def _rows(files: Sequence[Path], episode: int | None) -> list[dict[str, Any]]:
+    """Return the frames of an episode, or of all."""
+    parquet, arrow = library("pyarrow.parquet", "lerobot"), library("pyarrow", "lerobot")
+    rows = list[dict[str, Any]]()
+    for file in files:
+        try:
+            there = set(parquet.read_schema(file).names)
+            wanted = [each for each in ("episode_index", "frame_index", "timestamp", *COLUMNS) if each in there]
+            chosen = None if episode is None else [("episode_index", "=", episode)]
+            rows += parquet.read_table(file, columns=wanted, filters=chosen).to_pylist()
+        except (arrow.ArrowException, OSError) as error:
+            raise ValueError(f"{file.name} cannot be read: {error}") from error
+    return rows
+
+
+def _names(feature: Mapping[str, Any]) -> list[str]:
+    """Return the names of a feature's numbers: a list, or lists by kind; `shoulder_pan.pos` is `shoulder_pan`."""
+    names = feature["names"]
+    every = names if isinstance(names, list) else [name for group in names.values() for name in group]
+    return [name.removesuffix(".pos") for name in every]
