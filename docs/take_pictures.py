@@ -21,7 +21,7 @@ from gaplab.api.process.local_service import start_service
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import import_archive
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments.stored_robots import add_robot
+from gaplab.services.experiments.stored_files import add_robot
 from gaplab.services.experiments.submission import submit
 from gaplab.services.figures.words import spoken
 from gaplab.services.running.execution import claim, record_all

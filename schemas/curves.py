@@ -14,6 +14,10 @@ def from_before(*counts: int) -> str:
     return "" if span == "0" else f" (and {span} from before)"
 
 
+OF_UNTUNED = "× untuned"
+"""Unit of what is recorded of a recorded reality: minus the error on held-out recordings, over the untuned one's."""
+
+
 class Fitness(StrEnum):
     """Whose fitness in reality counts after each number of real-world evaluations.
 

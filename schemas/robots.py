@@ -1,5 +1,6 @@
 """Robots that come from a file: where they come from."""
 
+from enum import StrEnum
 from typing import Any
 
 from pydantic import Field
@@ -40,6 +41,13 @@ MOST_LOSSES = 2_000
 """Largest number of lines in which a robot file says what its import lost or changed."""
 
 
+class FileKind(StrEnum):
+    """What a stored file is."""
+
+    ROBOT = "robot"
+    POOL = "pool"
+
+
 class RobotSource(Frozen):
     """The file that a robot was imported from."""
 
@@ -60,4 +68,18 @@ class RobotRead(Read):
     actuators: int
     mass_kg: float = Field(examples=[12.5])
     lost: tuple[str, ...] = Field(description="what its import lost or changed", examples=[("transmission: hip",)])
+    created_at: Moment
+
+
+class PoolRead(Read):
+    """A stored pool: recordings of what a robot did."""
+
+    sha256: str = Field(description="hash of the file, which specs have", examples=["5f2c…"])
+    name: str = Field(description="a spec means the newest pool of this name", examples=["tosses"])
+    origin: str = Field(description="where the recordings come from, in words", examples=["tosses.parquet"])
+    recordings: int = Field(examples=[40])
+    sensors: tuple[str, ...] = Field(description="what was read", examples=[("angle elbow",)])
+    actuators: tuple[str, ...] = Field(description="what was commanded", examples=[("elbow",)])
+    seconds: float = Field(description="time of the last reading", examples=[20.0])
+    lost: tuple[str, ...] = Field(description="what its import left out or changed", examples=[("toss 3: no reading",)])
     created_at: Moment

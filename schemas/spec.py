@@ -11,7 +11,7 @@ from pydantic import BaseModel, Discriminator, Field, Tag, model_validator
 
 from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Read, Real, Repetitions, Seed, from_name
 from gaplab.schemas.measurements import Beyond, KnownSample, LimitsSpec
-from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.plugin import Named, PluginRef, TunableRef
 
 BudgetName = Literal["smoke", "desk", "paper", "lean", "as_published"]
 
@@ -48,23 +48,48 @@ class BudgetSpec(Frozen):
         return from_name(value, "preset")
 
 
-RealityKind = Literal["simulated", "physical"]
+RealityKind = Literal["simulated", "physical", "recorded"]
 Probes = Literal["each", "last", "never"]
 Repeats = Annotated[Count, Field(le=1_000)]
 KnownSamples = Annotated[tuple[KnownSample, ...], Field(max_length=10_000)]
 HeldOut = Annotated[float, Field(strict=True, ge=0, le=0.5)]
 
 
+HeldOutOfPool = Annotated[float, Field(strict=True, ge=0, le=0.9)] | Literal["each"]
+
+
+class PoolRef(Named):
+    """A pool of recordings by its name, which means the newest of this name; a stored spec has its hash."""
+
+    sha256: str | None = Field(None, max_length=64, description="hash of the pool")
+
+
+def _is_none(value: object) -> bool:
+    return value is None
+
+
 class RealitySpec(Frozen):
-    """Reality: an engine with hidden parameters, or a robot that people or a driver run and measure.
+    """Reality: an engine with hidden parameters, a robot that people or a driver run and measure, or recordings.
 
     The algorithm may evaluate reality but not read it. Of a simulated reality, a missing engine is that of the
     simulators, and a missing parameter is the robot's; for the quadruped, these are the paper's (static friction 1.0,
     dynamic friction 0.8, restitution 0.0). A physical reality has neither: its measurements are requested, and a
-    repetition waits for each without a core or a process.
+    repetition waits for each without a core or a process. A recorded one is a pool of motions that the robot did, of
+    which a strategy selects one after another. Nothing is transferred or probed; what counts is the error of the tuned
+    simulator on recordings that nothing saw.
     """
 
-    kind: RealityKind = Field("simulated", description="`physical`: a robot on a bench; measurements come in")
+    kind: RealityKind = Field(
+        "simulated",
+        description="`physical`: a robot on a bench; measurements come in. `recorded`: motions that it did before",
+    )
+    pool: PoolRef | None = Field(None, exclude_if=_is_none, description="of a recorded reality: its recordings")
+    held_out: HeldOutOfPool | None = Field(
+        None,
+        exclude_if=_is_none,
+        description="share of the pool that no tuning sees, chosen by the seed; default: 0.2. `each`: every repetition "
+        "holds out one recording, its own",
+    )
     engine: PluginRef | None = Field(None, description="of a simulated reality; default: the simulators'")
     parameters: dict[str, Real] = Field(default_factory=dict, description="hidden; of a simulated reality")
     bench: Label | None = Field(

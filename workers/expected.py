@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from hashlib import sha256
 from typing import Any, TextIO
 
-from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.provenance import Provenance
 from gaplab.services.plugins import folders
 from gaplab.services.plugins.external import unavailable
@@ -33,7 +32,7 @@ def with_plugins(shared: Versions, under: Provenance, spec: Mapping[str, Any]) -
 
     These are the shared versions of gaplab and its libraries, those of its plug-ins, and robot files.
     """
-    files = robot_library.needed_by(PluginRef.model_validate(spec["robot"]))
+    files = robot_library.needed_by(spec)
     plugins = {f"{PLUGIN}{plugin}": text for plugin, text in named_versions(under, spec).items()}
     return shared | plugins | {f"{ROBOT}{place}": text for place, text in enumerate(files)}
 

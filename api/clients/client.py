@@ -22,7 +22,7 @@ from gaplab.api.clients.figures import Figures
 from gaplab.api.clients.files import Files
 from gaplab.api.clients.watcher import Watcher
 from gaplab.schemas.plugin import Catalogue
-from gaplab.schemas.robots import RobotRead
+from gaplab.schemas.robots import PoolRead, RobotRead
 
 
 class Client(Watcher, Requests, Figures, Files, EventLog):
@@ -93,6 +93,14 @@ class Client(Watcher, Requests, Figures, Files, EventLog):
     def robots(self) -> tuple[RobotRead, ...]:
         """Return the robots from files, by name, the newest of a name first."""
         return self._connection.get(tuple[RobotRead, ...], "/robots")
+
+    def add_pool(self, file: str | Path) -> PoolRead:
+        """Store a pool, which `gaplab pool import` writes; specs name it by its name from then on."""
+        return self._connection.upload(PoolRead, "/pools", [Path(file).read_bytes()], "application/json")
+
+    def pools(self) -> tuple[PoolRead, ...]:
+        """Return the pools, by name, the newest of a name first."""
+        return self._connection.get(tuple[PoolRead, ...], "/pools")
 
     def catalogue(self) -> Catalogue:
         """Return the plug-ins of the service."""

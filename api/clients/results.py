@@ -203,7 +203,8 @@ class Results(Connected):
 
         `squared_error` is a sum over samples and grows with them; `error` is per sample, in the unit of the
         discrepancy; by default the root mean square. A tuner that gives 95 % intervals has the columns `NAME_lower` and
-        `NAME_upper` of each tunable, and one that gives shares of the posterior probability the column `weight`.
+        `NAME_upper` of each tunable, and one that gives shares of the posterior probability the column `weight`. With
+        held-out samples, `held_out_error` is the sum over these, of rank 0.
         Without simulators there are no columns of tunables. With a `repetition` or an `iteration`, 0 for the untuned
         start, the table has only those.
         """
@@ -278,7 +279,8 @@ def _tuned(simulator: SimulatorRead) -> dict[str, float]:
     found = dict(simulator.parameters)
     for name, (lower, upper) in (simulator.intervals or {}).items():
         found |= {f"{name}_lower": lower, f"{name}_upper": upper}
-    return found if simulator.weight is None else found | {"weight": simulator.weight}
+    others = {"weight": simulator.weight, "held_out_error": simulator.held_out_error}
+    return found | {name: value for name, value in others.items() if value is not None}
 
 
 def _values(readings: Sequence[float | None], sensors: SensorsRead) -> Iterator[tuple[float | None, ...]]:

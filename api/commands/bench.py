@@ -123,7 +123,7 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
     """Compute fitness and readings from recordings of a motion, and answer its request with --answer."""
     if operator and not answer:
         raise typer.BadParameter("it names who answers; add --answer", param_hint="--operator")
-    joints = dict(_pair(each) for each in columns or ())
+    joints = dict(pair(each) for each in columns or ())
     attach = partial(client.bench.attach_trace, columns=joints, topic=topic, body=body, episode=episode)
     stored = [attach(file).id for file in files]
     said = client.bench.traces(id, stored, lag_s)
@@ -183,7 +183,8 @@ def reopen(
     return Answer(found, f"Request {found.id} is {found.state.value}.")
 
 
-def _pair(text: str) -> tuple[str, str]:
+def pair(text: str) -> tuple[str, str]:
+    """Return name and value of `NAME=VALUE`; a BadParameter if it is not that."""
     joint, equals, column = text.partition("=")
     if not (joint and equals):
         raise typer.BadParameter(f"{text!r} is not JOINT=COLUMN, like 'elbow=Elbow [deg]'", param_hint="--map")

@@ -19,7 +19,7 @@ from gaplab.api.clients.errors import (
 # the order of the commands in `gaplab --help`, and of its groups
 # isort: off
 from gaplab.api.commands import service, submission, studies, tune, results, tuned  # noqa: F401
-from gaplab.api.commands import bench, archives, plugins, robots, tokens  # noqa: F401
+from gaplab.api.commands import bench, archives, plugins, robots, pools, tokens  # noqa: F401
 
 # isort: on
 from gaplab.api.commands.app import OTHERS, Answer, AsJson, command

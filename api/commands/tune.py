@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,7 +14,10 @@ from gaplab.api.commands.tuned import Original, Partial, refusals
 @command(SPECS)
 def tune(  # noqa: PLR0913, PLR0917 - each is an option of the command
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="name, robot file, URDF or MJCF")],
-    runs: Annotated[list[str], typer.Argument(metavar="RUNS", help="tables of measurements, as of read_samples")],
+    runs: Annotated[
+        list[str] | None, typer.Argument(metavar="RUNS", help="tables of measurements, as of read_samples")
+    ] = None,
+    pool: Annotated[Path | None, typer.Option(help="recordings in place of measurements")] = None,
     tunables: Annotated[str | None, typer.Option(help="separated by commas; left out: the robot's usual ones")] = None,
     engine: Annotated[str | None, typer.Option(help="engine; left out: the robot's")] = None,
     tuner: Annotated[str, typer.Option(help="how simulators are found")] = "gauss_newton",
@@ -33,8 +36,11 @@ def tune(  # noqa: PLR0913, PLR0917 - each is an option of the command
     from gaplab.api.library.tuning import Tuning
 
     labels = None if tunables is None else re.split(r",\s*(?![^()]*\))", tunables)
-    tuning = Tuning(robot, labels, engine=engine, tuner=tuner, discrepancy=discrepancy, held_out=held_out)
-    for table in runs:
+    if not runs and pool is None:
+        raise typer.BadParameter("tables of measurements, or --pool", param_hint="RUNS")
+    share: dict[str, Any] = {"held_out": held_out} if pool is None else {"reality": {"held_out": held_out}}
+    tuning = Tuning(robot, labels, engine=engine, tuner=tuner, discrepancy=discrepancy, pool=pool, **share)
+    for table in runs or ():
         tuning.tell(Path(table))
     found = tuning.simulator
     if save:

@@ -27,7 +27,12 @@ SPARE = 16
 
 ALIVE = "/livez"
 
-MOST_BYTES_OF = {"/import": MOST_BYTES_OF_IMPORT, "/attachments": 20_000_000, "/robots": 2_000_000}
+MOST_BYTES_OF = {
+    "/import": MOST_BYTES_OF_IMPORT,
+    "/attachments": 20_000_000,
+    "/robots": 2_000_000,
+    "/pools": 8_000_000,
+}
 """Limits of the addresses that take more than a spec."""
 
 

@@ -32,6 +32,7 @@ STATUSES: dict[str, int] = {
     "invalid-spec": 422,
     "cost-unconfirmed": 422,
     "invalid-robot-file": 422,
+    "invalid-pool": 422,
     "not-found": 404,
     "conflict": 409,
     "changed": 412,

@@ -8,16 +8,19 @@ from pydantic import ValidationError
 
 from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
 from gaplab.schemas.plugin import PluginRef
-from gaplab.schemas.spec import SharedSettings
+from gaplab.schemas.spec import ExperimentSpec, PoolRef, SharedSettings, StudySpec
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec, Violation, unknown_name
+from gaplab.services.experiments import stored_files
 from gaplab.services.plugins import folders
 from gaplab.services.specs.robots import Driven, ref_of_file, robot_of, robot_of_file
+from gaplab.services.store.session import Store
 from gaplab.services.world.robot_files import read_robot_file
-from gaplab.services.world.robot_library import IMPORTED
+from gaplab.services.world.robot_library import IMPORTED, robot_file
 from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
 
 S = TypeVar("S", bound=SharedSettings)
+T = TypeVar("T", ExperimentSpec, StudySpec)
 
 AnyRobot: TypeAlias = str | Path | Mapping[str, Any] | SharedSettings
 """A robot's name; its robot file, URDF or MJCF, which is imported as by `gaplab robot import`; or a spec."""
@@ -87,3 +90,21 @@ def _of_file(path: Path) -> PluginRef:
         raise InvalidSpec(Violation("/robot", str(path), reason) for reason in error.reasons) from error
     robot_of_file(file)
     return ref_of_file(file.sha256, file.name)
+
+
+def with_files(store: Store, spec: T) -> T:
+    """Return a spec whose robot and pool may be files: the store then has them, and the spec their hashes.
+
+    Raises:
+        InvalidSpec: a file cannot be used.
+        OSError: it cannot be read.
+    """
+    found: dict[str, Any] = {}
+    if Path(spec.robot.name).suffix:
+        found["robot"] = _of_file(Path(spec.robot.name))
+    if (file := robot_file(str((found.get("robot") or spec.robot).options.get("sha256", "")))) is not None:
+        stored_files.add_robot(store, file.text)
+    if spec.reality.pool is not None and Path(spec.reality.pool.name).suffix:
+        read = stored_files.add_pool(store, Path(spec.reality.pool.name).read_bytes())
+        found["reality"] = spec.reality.model_copy(update={"pool": PoolRef(name=read.name, sha256=read.sha256)})
+    return spec.model_copy(update=found)

@@ -18,6 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from gaplab.api.clients.progress import RecordProgress, Snapshot, in_notebook, show
 from gaplab.api.clients.screen import console
+from gaplab.api.library.robots import with_files
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.records import StudyRead
 from gaplab.schemas.spec import AnySpec, ExperimentSpec, StudySpec
@@ -239,14 +240,15 @@ def study_of(store: Store, file: Path, given: Any) -> str:  # noqa: ANN401 - a s
 
 def _submitted(store: Store, file: Path, given: Any) -> str:  # noqa: ANN401 - a spec in any form
     """Submit a spec, and return the id of its study; one that is refused is refused in the words of the service."""
-    with suppress(ValidationError, GaplabError):
-        spec = given if isinstance(given, ExperimentSpec | StudySpec) else _SPEC.validate_python(given)
-        if spec.reality.kind == "simulated":
-            return submit(store, spec).id
-        given = spec
-    if isinstance(given, ExperimentSpec | StudySpec):
+    with suppress(ValidationError):
+        given = given if isinstance(given, ExperimentSpec | StudySpec) else _SPEC.validate_python(given)
+        given = with_files(store, given)
+    if isinstance(given, ExperimentSpec | StudySpec) and given.reality.kind != "physical":
+        with suppress(GaplabError):
+            return submit(store, given).id
+    elif isinstance(given, ExperimentSpec | StudySpec):
         msg = "nobody is asked for measurements here: gaplab.Tuning asks, and so does the bench of a service"
-        raise InvalidSpec([Violation("/reality/kind", "physical", msg, ["simulated"])])
+        raise InvalidSpec([Violation("/reality/kind", "physical", msg, ["simulated", "recorded"])])
     from gaplab.api.library.here import client_of
 
     with client_of(store, url_of(file)) as client:

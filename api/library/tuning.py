@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeAlias, TypeVar
 from weakref import finalize
 
 from gaplab.api.library.computing import compute
-from gaplab.api.library.robots import AnyRobot, settings
+from gaplab.api.library.robots import AnyRobot, settings, with_files
 from gaplab.api.library.running import SQLITE, Result, begins, study_of, temporary
 from gaplab.api.library.told import measured, sample_of, samples_in
 from gaplab.api.library.tuned import Genome, TunedSimulator
@@ -30,7 +30,7 @@ from gaplab.services.core.errors import Conflict
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Measured, Step, Transferred, Tuned, learnable
 from gaplab.services.experiments import lifecycle, reading
-from gaplab.services.experiments.stored_robots import add_robot, resolved_here
+from gaplab.services.experiments.stored_files import resolved_here
 from gaplab.services.experiments.submission import submit
 from gaplab.services.findings.wording import many, number
 from gaplab.services.measuring import taking, telling
@@ -72,6 +72,8 @@ class Tuning(Result):
     Args:
         robot: its name; its robot file, URDF or MJCF, which is imported as by `gaplab robot import`; or a spec.
         tunables: labels, or objects with bounds as in a spec; left out: the robot's usual ones.
+        pool: a file of recordings, as `gaplab pool import` writes; the simulator is tuned on all that are not held out
+            (`reality={"held_out": 0.2}`), and nothing is asked for or told.
         strategy: which controllers are asked for.
         tuner: how simulators are found; the default gives intervals.
         budget: evaluations of each search; the default is a tenth of the paper's rollouts.
@@ -90,21 +92,22 @@ class Tuning(Result):
         robot: AnyRobot,
         tunables: Sequence[Any] | None = None,
         *,
+        pool: str | Path | None = None,
         path: str | Path | None = None,
         progress: bool | None = None,
         **fields: Any,  # noqa: ANN401 - as in a spec
     ) -> None:
         usual = {
-            "strategy": "simulated_fit_and_informative",
+            "strategy": "simulated_fit_and_informative" if pool is None else "direct",
             "tuner": "gauss_newton",
             "budget": "lean",
             "repetitions": 1,
         }
-        reality = {"probes": "never", **fields.pop("reality", {}), "kind": "physical"}
+        given = {"kind": "physical", "probes": "never"} if pool is None else {"kind": "recorded", "pool": str(pool)}
+        reality = {"probes": "never", **fields.pop("reality", {}), **given}
         spec = settings(ExperimentSpec, robot, tunables=tunables, reality=reality, **usual | fields)
         self._open_at(path, Path(robot).parent if isinstance(robot, str | Path) else Path(), progress)
-        if (file := robot_file(spec.robot.options.get("sha256", ""))) is not None:
-            add_robot(self._store, file.text)
+        spec = with_files(self._store, spec)
         resolved = resolved_here(self._store, spec, resolve_experiment)
         try:
             self.id = study_of(self._store, self.path, self.path)
@@ -149,8 +152,11 @@ class Tuning(Result):
     def _check(self) -> None:
         spec = self.spec
         selects = spec.strategy.name not in strategies or strategies[spec.strategy.name].takes_samples
-        if spec.reality.kind != "physical" or spec.repetitions != 1 or not selects:
-            raise Conflict("a tuning has one repetition, a physical reality, and a strategy that selects samples")
+        whole = spec.reality.kind == "recorded" and not selects
+        if spec.repetitions != 1 or not (whole or (spec.reality.kind == "physical" and selects)):
+            raise Conflict(
+                "a tuning has one repetition, a physical reality with a strategy that selects samples, or a pool"
+            )
 
     def ask(self, *, timeout_s: float = math.inf) -> Genome:
         """Return the controller to try next in reality; the same one until it, or another one, is told.
@@ -158,6 +164,7 @@ class Tuning(Result):
         Raises:
             TimeoutError: it takes longer; what is computed is kept, and the next call goes on.
         """
+        self._refuse_a_pool()
         until = monotonic() + timeout_s
         while not (asked := self._asked()):
             if reading.read(self._store, self.id).state is State.COMPLETED:
@@ -195,6 +202,7 @@ class Tuning(Result):
             InvalidSamples: the table has errors; with all of them.
             Conflict: a trace is unlikely, and not `confirmed`.
         """
+        self._refuse_a_pool()
         spec, traces = self.spec, [trace] if isinstance(trace, str | Path) else trace
         told = samples_in(genome, spec, confirmed=confirmed)
         if told is None:
@@ -272,6 +280,10 @@ class Tuning(Result):
             (row,) = repetitions_of(session, self.id)
             return logs(session, [row.id])[row.id]
 
+    def _refuse_a_pool(self) -> None:
+        if self.spec.reality.kind == "recorded":
+            raise Conflict("the recordings of a pool are all that is known, so nothing is asked for or told")
+
     def _asked(self) -> Sequence[RequestRead]:
         """Return the request for the measurement that is waited for; empty without one."""
         return taking.list_requests(self._store, taking.RequestFilter(experiment=self.id)).items
@@ -283,7 +295,7 @@ class Tuning(Result):
             found = next((step for step in reversed(self._log()) if isinstance(step, kind | Measured)), None)
             if isinstance(found, kind):
                 return found
-            if found is None and not self.spec.reality.samples:
+            if found is None and not self.spec.reality.samples and self.spec.reality.kind == "physical":
                 raise Conflict("nothing was told yet, so there is nothing to tune on")
             compute(self._store, self.id, kind, until, progress=self._progress)
 

@@ -42,7 +42,7 @@ from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.traces import TracesRead, TracesSpec
 from gaplab.services import events
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import stored_robots
+from gaplab.services.experiments import stored_files
 from gaplab.services.measuring import answering, attachments, corrections, doubts, motion_files, rewriting, taking
 from gaplab.services.measuring.taking import RequestFilter
 from gaplab.services.replay import traces
@@ -300,4 +300,4 @@ async def check_samples(query: Asked[SamplesQuery], request: Request, store: Sto
     """
     text = (await request.body()).decode("utf-8", "replace")
     robot = Driven(PluginRef(name=query.robot, options=query.options), query.controller, query.task)
-    return await run_in_threadpool(stored_robots.check_samples, store, text, robot)
+    return await run_in_threadpool(stored_files.check_samples, store, text, robot)

@@ -35,8 +35,9 @@ from gaplab.services.store.session import Session
 from gaplab.services.store.tables import Column
 from gaplab.services.store.texts import pack_tags, unpack_tags
 from gaplab.services.world import robot_library
-from gaplab.services.world.robot_files import read_robot_file
-from gaplab.services.world.robot_library import IMPORTED, label_of
+from gaplab.services.world.pools import read_pool
+from gaplab.services.world.robot_files import NamedFile, read_robot_file
+from gaplab.services.world.robot_library import label_of
 from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.tunables import tunables
@@ -175,6 +176,8 @@ def _refuse(place: str, what: str) -> NoReturn:
 
 MOST_EXPERIMENTS = 1_000
 
+_READERS: Mapping[str, Callable[[str], NamedFile]] = {"robot": read_robot_file, "pool": read_pool}
+
 Rows: TypeAlias = Callable[[str], Iterator[Row]]
 """Yields the checked rows of a table."""
 
@@ -186,27 +189,27 @@ def checked_experiments(rows: Rows, study: str) -> dict[str, Row]:
         InvalidArchive: a spec is invalid, or an experiment belongs to another study.
     """
     experiments = dict[str, Row]()
-    robots_within = _learn_robots(rows)
+    files_within = _learn_files(rows)
     for row in rows("experiment"):
         if row["study_id"] != study:
             raise InvalidArchive(f"the experiment {row['id']!r} belongs to another study than {study!r}")
-        spec = _checked_spec(row, robots_within)
+        spec = _checked_spec(row, files_within)
         experiments[row["id"]] = row | {"spec": spec, "robot": _on_a_bench(row["id"], spec)}
     if study in experiments and len(experiments) > 1:
         raise InvalidArchive(f"one of several experiments has the id {study!r}, which is that of the study")
     return experiments
 
 
-def _learn_robots(rows: Rows) -> set[str]:
-    """Make the robot files of an archive known to this process, and return their hashes."""
+def _learn_files(rows: Rows) -> set[str]:
+    """Make the robot files and pools of an archive known to this process, and return their hashes."""
     found = set[str]()
-    for row in rows("robot"):
+    for row in rows("file"):
         try:
-            file = read_robot_file(row["text"])
+            file = _READERS[row["kind"]](row["text"])
         except InvalidSpec as error:
-            raise InvalidArchive(f"the robot {row['name']!r} is invalid: {error}"[:300]) from error
+            raise InvalidArchive(f"the {row['kind']} {row['name']!r} is invalid: {error}"[:300]) from error
         if (file.sha256, file.name, file.text) != (row["sha256"], row["name"], row["text"]):
-            raise InvalidArchive(f"the robot {row['name']!r} has another hash or name than its file")
+            raise InvalidArchive(f"the {row['kind']} {row['name']!r} has another hash or name than its file")
         robot_library.learn([file.text])
         found.add(file.sha256)
     return found
@@ -220,7 +223,7 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
     """
     if table == "study":
         _check_tags(row)
-    if table in {"study", "robot", "attachment"}:
+    if table in {"study", "file", "attachment"}:
         return
     if table == "provenance":
         if attempts.provenance_id(Provenance.model_validate(row["facts"])) != row["id"]:
@@ -278,7 +281,7 @@ def _check_tags(row: Row) -> None:
         raise InvalidArchive(f"the tags of study {row['id']!r} are not as this service stores them")
 
 
-def _checked_spec(row: Row, robots_within: Collection[str]) -> Row:
+def _checked_spec(row: Row, files_within: Collection[str]) -> Row:
     """Return the spec to store; unknown parameters of reality are null."""
     place, given = f"the spec of experiment {row['id']!r}", row["spec"]
     if row["spec_version"] > SPEC_VERSION:
@@ -294,8 +297,8 @@ def _checked_spec(row: Row, robots_within: Collection[str]) -> Row:
     names = [each.name for each in spec.tunables]
     wrong = [name for name in (*truth, *names) if plain_name(name) not in tunables]
     wrong += [] if spec.robot.name in robots else [spec.robot.name]
-    if spec.robot.name == IMPORTED and spec.robot.options.get("sha256") not in robots_within:
-        raise InvalidArchive(f"{place} names the robot {label_of(spec.robot)!r}, whose file is not in the archive")
+    if set(robot_library.named_in(given)) - {*files_within}:
+        raise InvalidArchive(f"{place} names a robot {label_of(spec.robot)!r} or a pool that is not in the archive")
     if wrong or len(set(names)) < len(names) or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names plug-ins that are not installed here: {', '.join(wrong)[:200]}"
         raise InvalidArchive(msg)

@@ -18,7 +18,7 @@ from gaplab.services.store.queries.archives import Row as Row
 from gaplab.services.store.tables import Column
 
 EXPORTED = (
-    "robot",
+    "file",
     "provenance",
     "study",
     "experiment",
@@ -49,7 +49,7 @@ LEFT_OUT: Mapping[str, str] = {
 """Tables that are left out, each with the reason."""
 
 COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
-    "robot": {"created_at": "says when one service got the file"},
+    "file": {"created_at": "says when one service got the file"},
     "study": {
         "archived_at": "hides it in the lists of one service",
         "webhook": "is an address of one person, and may be a secret",
@@ -111,7 +111,7 @@ def at_rest(table: str, row: Row) -> Row:
             return {"running": 0, "claimable": False, "turn_at": row["created_at"]}
         case "repetition":
             return {"checkpoints": 0}
-        case "robot" | "attachment":
+        case "file" | "attachment":
             return {"created_at": _EARLIEST}
     return {}
 

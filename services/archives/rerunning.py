@@ -42,7 +42,7 @@ class Recorded:
     """A repetition as an archive has it, with id, name and stored spec of its experiment.
 
     Attributes:
-        robots: texts of the robot files that the spec needs, for a process that does not know them.
+        files: texts of the robot file and the pool that the spec needs, for a process that does not know them.
         until: time in seconds since 1970 after which no further step is computed.
     """
 
@@ -51,7 +51,7 @@ class Recorded:
     number: int
     spec: Mapping[str, Any]
     log: tuple[Step, ...]
-    robots: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
     until: float = inf
 
 
@@ -93,7 +93,7 @@ def result_of(recorded: Recorded, outcome: Outcome, steps: int, reason: str | No
 
 
 def _computed(recorded: Recorded) -> Setting:
-    robot_library.learn(recorded.robots)
+    robot_library.learn(recorded.files)
     found = setting(spec_of(recorded.spec), recorded.number)
     if recorded.spec["reality"]["kind"] == "physical":
         found = replace(found, reality=_stored_answers(recorded.log))
@@ -293,7 +293,7 @@ def _recorded(session: Session, checked: CheckedArchive, part: Part) -> Iterator
         raise NotFound(f"the archive has no repetition {part.repetition} of {part.experiment or 'any'}; it has {names}")
     for row, repetitions in chosen:
         found = logs.logs(session, [each.id for each in repetitions])
-        files = robot_library.needed_by(spec_of(row.spec).robot)
+        files = robot_library.needed_by(row.spec)
         for each in repetitions:
             yield Recorded(row.id, row.name, each.number, row.spec, found[each.id], files, until)
 

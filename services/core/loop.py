@@ -14,7 +14,7 @@ from typing import Literal
 from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers
-from gaplab.services.core.arrays import FloatArray, Genome, no_readings
+from gaplab.services.core.arrays import FloatArray, Genome, Genomes, frozen, no_readings
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
@@ -45,6 +45,9 @@ from gaplab.services.core.types import (
     probe_of,
 )
 
+NOTHING: Genome = frozen([])
+"""What is transferred where reality was recorded."""
+
 
 @dataclass(frozen=True, eq=False)
 class Setting:
@@ -73,6 +76,11 @@ class Setting:
         known_samples: samples from before, on which the first simulators are tuned.
         forecast: safety forecast of a controller for a physical robot; None if there is none.
         controller_optimizer: searches for controllers.
+        candidates: `(n, g)`: the recordings of a recorded reality, each of which may be selected once; then nothing is
+            transferred or probed, and the error on `tests` is recorded. None: any genome may be selected.
+        tests: samples that no tuning sees, known beforehand.
+        untuned: discrepancy of the robot as it is from `tests`.
+        commands: `(n, c)`: what was commanded in each recording; None if nothing was.
     """
 
     simulate: Simulate
@@ -98,6 +106,15 @@ class Setting:
     known_samples: tuple[Sample, ...] = ()
     forecast: Forecast | None = None
     controller_optimizer: Optimizer | None = None
+    candidates: Genomes | None = None
+    tests: tuple[Sample, ...] = ()
+    untuned: Callable[[], float] = lambda: nan
+    commands: FloatArray | None = None
+
+    @property
+    def tunes_first(self) -> bool:
+        """Whether the first simulators are tuned, or at least tested, on samples that are known beforehand."""
+        return self.candidates is not None or bool(self.known_samples and self.strategy.takes_samples)
 
     def stream(self, iteration: int, phase: str) -> Generator:
         """Return the random stream of one phase of one iteration."""
@@ -135,7 +152,7 @@ def repetition(
 def next_step(setting: Setting, history: History, answers: Answers) -> Step | None:  # noqa: PLR0911 - one a kind of step
     """Return the next step, whose rollouts come from `answers`; None at the end."""
     match history.last:
-        case None if setting.known_samples and setting.strategy.takes_samples:
+        case None if setting.tunes_first:
             return _tune(setting, history, 0, answers)
         case None:
             return Tuned(0, _drawn(setting, 0))
@@ -178,7 +195,17 @@ def _belief(setting: Setting, history: History) -> Belief:
         names=setting.names,
         scale=history.scale or 1.0,
         discrepancy=setting.discrepancy,
+        candidates=_left(setting, history),
+        commands=setting.commands,
     )
+
+
+def _left(setting: Setting, history: History) -> Genomes | None:
+    """Return the candidates `(n, g)` that are not among the samples; None if any genome may be selected."""
+    if setting.candidates is None:
+        return None
+    used = {sample.genome.tobytes() for sample in history.samples}
+    return setting.candidates[[genome.tobytes() not in used for genome in setting.candidates]]
 
 
 def _search(setting: Setting, belief: Belief, answers: Answers, given: Allowance, rng: Generator) -> ControllerSearch:
@@ -189,13 +216,16 @@ def _search(setting: Setting, belief: Belief, answers: Answers, given: Allowance
 def _select(setting: Setting, history: History, iteration: int, answers: Answers) -> Selected:
     """Return the controller that the strategy selects, from a search if it has one."""
     budget, strategy, learned = setting.budget, setting.strategy, bool(learnable(history.samples))
-    allowance = Allowance.of_selection(strategy, budget.selection_evaluations, setting.parameters.size, learned=learned)
+    belief = _belief(setting, history)
+    evaluations = belief.at_most(budget.selection_evaluations)
+    allowance = Allowance.of_selection(strategy, evaluations, setting.parameters.size, learned=learned)
     if budget.reuse_transfer and strategy.selects_transferred and history.transferred is not None:
         return Selected(iteration, history.transferred.genome, Cost(saved=allowance.rollouts))
-    belief = _belief(setting, history)
     search = _search(setting, belief, answers, allowance, setting.stream(iteration, "search"))
     selected = strategy.select(belief, search, setting.stream(iteration, "select"))
     genome = setting.genomes.check(selected, f"strategy {strategy.name!r}")
+    if belief.candidates is not None and not (belief.candidates == genome).all(axis=1).any():
+        raise PluginBroken(f"strategy {strategy.name!r} selected {genome}; permitted: a candidate that is left")
     return Selected(iteration, genome, answers.cost)
 
 
@@ -208,12 +238,15 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     strategy = setting.strategy
     seen, unseen = split(history.samples, setting.held_out)
     evaluations = setting.budget.simulator_evaluations // setting.tuner.divisor(len(seen))
+    unseen = (*unseen, *setting.tests)
     ensemble, answers.budget = strategy.ensemble, evaluations * len(seen) + len(unseen)
     if _keeps(setting, history, Tuned):
         return Tuned(iteration, history.simulators, answers.cost)
     samples, tests = learnable(strategy.lessons(seen)), learnable(unseen)
+    untested = tests and Misfit(answers, tests, setting.discrepancy, setting.reading_times_s)
     if not samples:
-        return Tuned(iteration, _drawn(setting, iteration), answers.cost)
+        drawn = _drawn(setting, iteration)
+        return Tuned(iteration, tested(drawn, untested) if untested else drawn, answers.cost)
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
     misfit = Misfit(answers, samples, setting.discrepancy, setting.reading_times_s)
     task = TuningTask(misfit, setting.parameters, optimizer, ensemble, evaluations, history.simulators)
@@ -222,14 +255,16 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     if not 1 <= len(found) <= ensemble:
         raise PluginBroken(f"{source} returned {len(found)} simulators; permitted: {ensemble}")
     found = tuple(sound(simulator, setting.parameters, source) for simulator in found)
-    if tests:
-        found = tested(found, Misfit(answers, tests, setting.discrepancy, setting.reading_times_s))
+    if untested:
+        found = tested(found, untested)
     cost = answers.cost_within_budget(source)  # without those of the next line
     return Tuned(iteration, fitted(found, misfit, setting.parameters, setting.stream(iteration, "fit")), cost)
 
 
 def _transfer(setting: Setting, history: History, iteration: int, answers: Answers) -> Transferred:
-    """Return the controller that the strategy transfers, from a search if it has one."""
+    """Return the controller that the strategy transfers, from a search if it has one; nothing of recordings."""
+    if setting.candidates is not None:
+        return Transferred(iteration, NOTHING, nan)
     strategy, evaluations = setting.strategy, setting.budget.controller_evaluations
     allowance = Allowance.of_transfer(strategy, evaluations, setting.parameters.size)
     if (last := history.transferred) is not None and _keeps(setting, history, Transferred):
@@ -241,8 +276,23 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
     return Transferred(iteration, genome, search.score_of(genome), answers.cost)
 
 
+def _record(setting: Setting, history: History, iteration: int) -> Probed:
+    """Return the record of an iteration whose reality is recorded: minus the error on samples that nothing saw.
+
+    It is a share of the untuned simulator's; nan without such samples, or if the physics failed on one.
+    """
+    found, tests = history.simulators[0].held_out_error, len(setting.tests)
+    if found is None:
+        return Probed(iteration, nan, nan, left_out=True)
+    untuned = setting.discrepancy.error(setting.untuned() / tests)
+    share = setting.discrepancy.error(found / tests) / untuned if untuned else nan
+    return Probed(iteration, nan, -share, left_out=True)
+
+
 def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -> Probed:
     """Return the probe of the transferred controller; one that was kept is not measured again."""
+    if setting.candidates is not None:
+        return _record(setting, history, iteration)
     if setting.probes == "never" or (setting.probes == "last" and iteration < setting.iterations):
         return probe_of(history, iteration, nan, left_out=True)
     if (last := history.probed) is not None and not last.left_out and _keeps(setting, history, Probed):

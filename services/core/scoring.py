@@ -44,6 +44,16 @@ def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
     return np.sqrt(deviations**2 @ weights)
 
 
+def deviation_of_readings(readings: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return `(n,)`: the root of the summed weighted variances of readings `(n, m, q)` over simulators.
+
+    Weights are as of `weighted_mean`.
+    """
+    there = np.where(weights[:, None] > 0, readings, 0.0)
+    means = np.einsum("nmq,m->nq", there, weights)
+    return np.asarray(np.sqrt(np.einsum("nmq,m->n", (there - means[:, None]) ** 2, weights)))
+
+
 def uniqueness_penalty(genomes: Genomes, fitness: FloatArray, samples: Sequence[Sample]) -> FloatArray:
     """Return 1/(100 N) Σ 1/d(x, y) over the N samples y; 0 before the first sample.
 

@@ -206,6 +206,8 @@ class ControllerSearch:
             return score(genomes, self.answers(genomes, simulators, following))
 
         space, evaluations = self.belief.space, self.allowance.evaluations
+        if candidates is None and self.belief.candidates is not None:
+            candidates = self.belief.draw(evaluations, self.rng)
         if candidates is None:
             found = maximise(
                 self.optimizer, space, lambda asked: scored(asked.genomes, asked.following), evaluations, self.rng

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.random import Generator
 
-from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Parameters, Readings, no_readings
+from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Genomes, Parameters, Readings, no_readings
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.space import Space
@@ -106,6 +107,9 @@ class Belief:
         scale: about the fitness that evolution in reality would reach, above 0. It is the fitness in simulation of the
             first transferred controller.
         discrepancy: what `simulators` were tuned to minimise.
+        candidates: `(n, g)`: the recordings that are left to select from, which have readings and no fitness; None if
+            any genome of the space may be tried.
+        commands: `(n, c)`: what was commanded in recording 0 to n - 1, nan after its end; None if nothing was.
     """
 
     space: Space
@@ -116,6 +120,18 @@ class Belief:
     names: tuple[str, ...]
     scale: float = 1.0
     discrepancy: Discrepancy = field(default_factory=SquaredFitness)
+    candidates: Genomes | None = None
+    commands: FloatArray | None = None
+
+    def at_most(self, evaluations: int) -> int:
+        """Return how many of these evaluations a selection can use: as many as there are candidates."""
+        return evaluations if self.candidates is None else min(evaluations, len(self.candidates))
+
+    def draw(self, count: int, rng: Generator) -> Genomes:
+        """Return genomes that may be tried, drawn uniformly: `(count, g)`; of candidates no more than there are."""
+        if self.candidates is None:
+            return self.space.draw(count, rng)
+        return self.candidates[rng.permutation(len(self.candidates))[:count]]
 
     @property
     def parameters(self) -> Parameters:

@@ -17,7 +17,7 @@ from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, Se
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move
-from gaplab.services.experiments.stored_robots import resolved_here
+from gaplab.services.experiments.stored_files import resolved_here
 from gaplab.services.findings.sensitivity import VERSION, Effort, alike, warning
 from gaplab.services.plugins.external import external_plugins, named_in
 from gaplab.services.specs.resolution import resolve_sensitivity
@@ -62,8 +62,8 @@ def queue(session: Session, spec: Checked) -> SensitivityRow:
 
 
 def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
-    """Queue the check that these experiments share; an experiment without tunables has none."""
-    tuning = [row for row in experiments if row.tunes]
+    """Queue the check that these experiments share; one without tunables, or without fitness, has none."""
+    tuning = [row for row in experiments if row.tunes and not row.recorded]
     if not tuning:
         return
     check = queue(session, checked(tuning[0].spec))

@@ -10,7 +10,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.errors import Violation
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import Admission, CostUnconfirmed, check_extent
-from gaplab.services.experiments.stored_robots import resolved_here
+from gaplab.services.experiments.stored_files import resolved_here
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve, takes_samples
 from gaplab.services.specs.stored_specs import spec_of

@@ -9,7 +9,7 @@ from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.estimates import check_cost
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission, check_benches, check_extent, check_load
-from gaplab.services.experiments.stored_robots import resolved_here
+from gaplab.services.experiments.stored_files import resolved_here
 from gaplab.services.experiments.views import view
 from gaplab.services.specs.resolution import expected_rollouts, hardware_of, resolve, takes_samples
 from gaplab.services.specs.submitted import kept

@@ -163,7 +163,7 @@ def _view(
             row,
             study=row.study_id,
             direct=row.strategy in strategies and strategies[row.strategy].in_reality,
-            level=not row.tunes,
+            level=row.level,
             caveat=caveat_of(row.state, work[row.id]),
             spec=without_truth(row.spec) if row.id in secret else row.spec,
             priority=-row.precedence,

@@ -67,11 +67,11 @@ def overfitting(point: MisfitPoint, unit: str) -> str:
     return f"{found} {number(old, 2)}{worse}"
 
 
-def from_earlier(tuned_on: int, held_out: int) -> str:
-    """Return how many samples from before the experiment there are; "" without any."""
+def from_earlier(tuned_on: int, held_out: int, *, recorded: bool = False) -> str:
+    """Return how many samples from before the experiment, or recordings, there are; "" without any."""
     counts = ((tuned_on, "tuned on"), (held_out, "held out"))
     told = ", ".join(f"{count} {what}" for count, what in counts if count)
-    return f"samples from before the experiment: {told}" if told else ""
+    return f"{'recordings' if recorded else 'samples from before the experiment'}: {told}" if told else ""
 
 
 def unreproduced(id: str, tunings: Sequence[Tuning], sensors: Sensors | None, unit: str) -> str:

@@ -219,7 +219,7 @@ class SentSpec(NamedTuple):
 def sent(spec: ResolvedSpec) -> SentSpec:
     """Return a spec to be sent."""
     plugins = named_files(spec.model_dump(mode="json"))
-    return SentSpec(spec.model_dump_json(), robot_library.needed_by(spec.robot), plugins)
+    return SentSpec(spec.model_dump_json(), robot_library.needed_by(spec.model_dump(mode="json")), plugins)
 
 
 def received(spec: SentSpec) -> ResolvedSpec:

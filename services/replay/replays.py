@@ -16,7 +16,7 @@ from gaplab.schemas.replays import ControllerKind, Prediction, Predictions, Repl
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import known
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
-from gaplab.services.experiments import stored_robots
+from gaplab.services.experiments import stored_files
 from gaplab.services.experiments.views import hidden
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess, SentSpec, received, sent
 from gaplab.services.replay.rollout import LAST, ReplayChoice, ReplayRequest, compute_replay
@@ -77,7 +77,7 @@ def robot_shapes(store: Store, name: str) -> RobotShapes:
         NotFound: no usable robot has this name or hash, or it has no body.
     """
     own = robots[name].example().world if name in robots else None
-    world = own if own is not None else stored_robot_file(stored_robots.robot_text(store, name)).world
+    world = own if own is not None else stored_robot_file(stored_files.robot_text(store, name)).world
     if not world.bodies:
         raise NotFound(f"the robot {name!r} has no body, so it has no shapes")
     return at_start(world)
@@ -99,6 +99,8 @@ def _refuse_impossible(row: ExperimentRow, spec: ResolvedSpec, choice: ReplayCho
     if not robot_of(spec).world.bodies:
         message = f"the robot {label_of(spec.robot)!r} has no body, so it has no motion to replay"
         raise InvalidSpec([Violation("id", row.id, message, "an experiment with a robot that has a body")])
+    if row.recorded and choice.kind is not ControllerKind.SAMPLE:
+        raise NotFound("its reality is recorded, so nothing was transferred; permitted: kind=sample")
     first = _first(choice.kind)
     _refuse_outside("repetition", choice.repetition, 0, row.spec["repetitions"])
     _refuse_outside(f"iteration with a {choice.kind}", choice.iteration, first, row.iterations)

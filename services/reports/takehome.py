@@ -167,7 +167,7 @@ def _expected(home: _Home, process: RolloutProcess) -> Iterator[tuple[str, str]]
 
 def _files(home: _Home, readings: Readings) -> Iterator[tuple[str, str]]:
     """Yield name and text of each file beside the report."""
-    yield from (("robot.json", text) for text in robot_library.needed_by(home.spec.robot))
+    yield from (("robot.json", text) for text in robot_library.needed_by({"robot": home.spec.robot.model_dump()}))
     experiment, best = home.experiment, home.outcome.best
     yield "README.txt", README.format(id=experiment.id, name=experiment.name, version=version("gaplab"))
     yield "verdict.txt", "\n\n".join((home.facts.verdict.headline, *said(home.facts))) + "\n"

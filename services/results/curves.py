@@ -120,9 +120,9 @@ def _curve(row: ExperimentRow, values: FloatArray, fitness: Fitness, study: str)
         unit=unit(spec),
         fitness=fitness,
         direct=direct,
-        level=not row.tunes,
+        level=row.level,
         points=curve_points(values),
-        best_of=best_of_searches(values[:, 0]) if direct else (),
+        best_of=best_of_searches(values[:, 0]) if direct and not row.recorded else (),
     )
 
 

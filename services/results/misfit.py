@@ -19,10 +19,11 @@ from gaplab.services.csv_tables import csv_text
 from gaplab.services.findings import simulator_sentences as sentences
 from gaplab.services.findings.identification import Means, verdicts
 from gaplab.services.findings.misfit import Tuning, doubt, misfit_point
+from gaplab.services.findings.wording import number
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.specs.robots import installed_robot, unit
 from gaplab.services.specs.stored_specs import discrepancy_of, spec_of
+from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator, MeasuredIterations
 from gaplab.services.store.session import Store
@@ -53,19 +54,20 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, by_iteration[iteration], names, parameters_of(spec.tunables))
-        for iteration in sorted(by_iteration if takes_samples(spec) else ())
+        for iteration in sorted(by_iteration if row.tunes else ())
     )
     samples = [fmean(tuning.samples for tuning in by_iteration[point.iteration]) for point in points]
     error_unit = discrepancy.error_unit(unit(spec))
     latest = by_iteration[points[-1].iteration] if points else []
     wrong = sentences.unreproduced(row.id, latest, None if robot is None else robot.sensors, error_unit)
     doubted = doubt(latest, simulated=spec.reality.kind == "simulated")
+    said = [*_remarks(points, measured, (unit(spec), error_unit), row), *_noises(row, robot)]
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
         error_unit=error_unit,
         points=points,
-        remarks=tuple(filter(None, [wrong, *_remarks(points, measured, (unit(spec), error_unit), row.known)])),
+        remarks=tuple(filter(None, [wrong, *said])),
         unreproduced=wrong,
         held_out=spec.held_out,
         noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
@@ -75,11 +77,18 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
 
 
 def _remarks(
-    points: Sequence[MisfitPoint], measured: MeasuredIterations, units: tuple[str, str], known: int
+    points: Sequence[MisfitPoint], measured: MeasuredIterations, units: tuple[str, str], row: ExperimentRow
 ) -> Iterator[str]:
-    yield sentences.from_earlier(measured.known, measured.known_held_out)
-    yield from sentences.remarks(points, *units, known)
+    yield sentences.from_earlier(measured.known, measured.known_held_out, recorded=row.recorded)
+    yield from sentences.remarks(points, *units, row.known)
     yield sentences.overfitting(points[-1], units[1]) if points else ""
+
+
+def _noises(row: ExperimentRow, robot: Robot | None) -> Iterator[str]:
+    """Yield what `× noise` is in the unit of the sensors that were recorded, if all have the same."""
+    sensors = None if robot is None or not row.recorded else robot.sensors
+    same = {*zip(sensors.units, sensors.noises.tolist(), strict=True)} if sensors else set()
+    yield from (f"the noise of all sensors is {number(noise)} {unit}" for unit, noise in same if len(same) == 1)
 
 
 def misfit_csv(found: MisfitRead) -> str:

@@ -95,6 +95,7 @@ def import_robot(file: Path, options: ImportOptions) -> ImportedFile:
         if abs(row.after_kg - row.before_kg) > SAME_KG:
             notes.lose(f"{row.body}: {row.before_kg:.6g} kg in the file, {row.after_kg:.6g} kg imported")
     name = _name(options.name or source.name or file.stem)
+    usual = ("sine", "reach") if world.fixed else ("cpg", "walk") if world.joints else ("recorded", "recorded")
     try:
         robot = RobotFile(
             name=name,
@@ -103,8 +104,8 @@ def import_robot(file: Path, options: ImportOptions) -> ImportedFile:
                 sha256=sha256(content).hexdigest(),
                 options=options.model_dump(mode="json", exclude_defaults=True),
             ),
-            usual_controller=options.controller or PluginRef(name="sine" if world.fixed else "cpg"),
-            usual_task=options.task or PluginRef(name="reach" if world.fixed else "walk"),
+            usual_controller=options.controller or PluginRef(name=usual[0]),
+            usual_task=options.task or PluginRef(name=usual[1]),
             lost=tuple(notes.lost),
             world=world,
         )

@@ -38,7 +38,8 @@ def with_motors(joints: list[Joint], source: Source) -> list[Joint]:
     """Return the joints with their motors: the file's, unless the options say which."""
     options, notes = source.options, source.notes
     if not joints:
-        notes.refuse("no joint of the file moves, and a controller moves joints")
+        if options.fixed:
+            notes.refuse("no joint of the file moves, and neither does its base")
         return joints
     if options.motor is None and not source.is_urdf:
         return _of_the_file(joints, source)

@@ -33,7 +33,7 @@ from gaplab.services.store.lease import Failure as Failure
 from gaplab.services.store.lease import Requested as Requested
 from gaplab.services.store.lease import TimedStep as TimedStep
 from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
-from gaplab.services.store.queries import attempts, checkpoints, robots, steps
+from gaplab.services.store.queries import attempts, checkpoints, files, steps
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store, transaction
@@ -218,7 +218,7 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
         .where(row.id.in_(ids))
     ).all()
-    robots.learn(session, (spec for *_, spec, _ in rows))
+    files.learn(session, (spec for *_, spec, _ in rows))
     specs = {experiment: ResolvedSpec.model_validate(spec) for _, _, experiment, _, spec, _ in rows}
     past, parts = logs(session, ids), checkpoints.stored(session, ids)
     claims = {

@@ -19,7 +19,7 @@ from gaplab.services.experiments.views import view
 from gaplab.services.plugins.external import named_in, still_holds, tells_unavailable, text_of, unavailable
 from gaplab.services.store.lease import Claim
 from gaplab.services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow
-from gaplab.services.store.queries import robots
+from gaplab.services.store.queries import files
 from gaplab.services.store.queries.attempts import insert_provenances, provenance_id
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import get_experiment, lock, members
@@ -110,7 +110,7 @@ def refuse_unusable(session: Session, repetitions: Sequence[int], refused: Mappi
     experiments = session.execute(
         select(row.id, row.spec, row.computed_with, row.refused_by).where(row.id.in_(owners)).order_by(row.id)
     ).all()
-    robots.learn(session, (each.spec for each in experiments))
+    files.learn(session, (each.spec for each in experiments))
     reasons = ((each, unusable(each.spec, refused)) for each in experiments)
     waiting = [(each, storable(text_of(found))) for each, found in reasons if found]
     for experiment, text in waiting:
@@ -145,7 +145,7 @@ def refuse(session: Session, under: Provenance, refused: Mapping[str, str] = NON
     untold = row.refused_by.is_(None) | row.refused_by.in_(outdated)
     waiting = row.claimable.is_(True) & untold & row.computed_with.is_not(None) & ~permitted(session, under, refused)
     experiments = session.execute(select(row.id, row.spec, row.computed_with).where(waiting).order_by(row.id)).all()
-    robots.learn(session, (spec for _, spec, _ in experiments))
+    files.learn(session, (spec for _, spec, _ in experiments))
     for experiment, spec, before in experiments:
         theirs = storable(text_of(unusable(spec, refused)) or decisive(under, spec))
         new = update(row).where(row.id == experiment, untold).values(refused_by=theirs)

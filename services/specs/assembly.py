@@ -1,13 +1,15 @@
 """Assembly: from a resolved spec to the simulation and the reality of its repetitions."""
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache, partial
+from dataclasses import replace
+from functools import cache, lru_cache, partial
 
 import numpy as np
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
+from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters, frozen
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.errors import GaplabError, gather
@@ -17,11 +19,13 @@ from gaplab.services.core.ports import Reality, Sense, Simulate, physical_realit
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners import tuners
+from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Budget, Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.findings.sensitivity import Subject
 from gaplab.services.specs.measured import samples_of
+from gaplab.services.specs.recorded import RecordedReality, is_recorded
 from gaplab.services.specs.resolution import hardware_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation, forecast_of
@@ -79,7 +83,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
     strategy = strategies.create(spec.strategy)
     engine, simulation = engine_of(spec.engine), simulation_of(spec, robot)
     simulate, reality = _realities(spec, robot, simulation, in_reality=strategy.in_reality)
-    return Setting(
+    found = Setting(
         simulate=simulate,
         sense=simulation.sense,
         reality=reality,
@@ -104,6 +108,29 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         known_samples=samples_of(spec),
         forecast=forecast_of(spec, robot, simulation),
     )
+    return _recorded(found, spec, robot) if is_recorded(spec) else found
+
+
+def _recorded(found: Setting, spec: ResolvedSpec, robot: Robot) -> Setting:
+    """Return a setting whose reality is recorded; a strategy that takes no samples is given all recordings at once."""
+    reality = RecordedReality(spec, robot.sensors, found.repetition)
+    as_it_is = Simulation(robot, engine_of(spec.engine), [])
+
+    @cache
+    def untuned() -> float:
+        answers = Answers(as_it_is, sense=as_it_is.sense, periods=found.reading_periods)
+        misfit = Misfit(answers, reality.tests, found.discrepancy, found.reading_times_s)
+        return float(misfit.of(np.empty((1, 0)))[0])
+
+    return replace(
+        found,
+        reality=reality,
+        candidates=reality.candidates,
+        tests=reality.tests,
+        untuned=untuned,
+        commands=reality.commands,
+        known_samples=() if found.strategy.takes_samples else reality.all_samples,
+    )
 
 
 def simulated(spec: ResolvedSpec) -> tuple[Simulate, Sense]:
@@ -113,7 +140,7 @@ def simulated(spec: ResolvedSpec) -> tuple[Simulate, Sense]:
     """
     robot = robot_of(spec)
     simulation = simulation_of(spec, robot)
-    if not strategies[spec.strategy.name].in_reality:
+    if not strategies[spec.strategy.name].in_reality or is_recorded(spec):
         return simulation, simulation.sense
     assert hardware_of(spec) is None, "a strategy that evolves in reality is refused for hardware"
     return _realities(spec, robot, simulation, in_reality=True)[0], simulation.sense
@@ -128,8 +155,8 @@ def _realities(
     spec: ResolvedSpec, robot: Robot, simulation: Simulation, *, in_reality: bool
 ) -> tuple[Simulate, Reality]:
     """Return the ways to evaluate a controller in simulation and in reality."""
-    if spec.reality.kind == "physical":
-        return simulation, physical_reality
+    if spec.reality.kind != "simulated":
+        return simulation, physical_reality  # recordings take its place
     truth, real = reality_of(spec, robot)
     return EvolutionInReality(real, truth) if in_reality else simulation, MeasuredReality(real, truth)
 

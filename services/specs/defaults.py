@@ -16,6 +16,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.specs.recorded import is_recorded, recorded_reality
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.tunables.base import Tunable
 from gaplab.services.world.tunables.labels import label_of, proper, tunable_of
@@ -115,9 +116,8 @@ def with_usual_tunables(spec: ExperimentSpec, robot: Robot) -> ExperimentSpec:
 
 
 def shared_fields(spec: SharedSettings, names: Iterable[str]) -> dict[str, Any]:
-    """Return fields of a study's spec, or of a check's, for an experiment; tunables that it leaves out stay so."""
-    left_out = set() if "tunables" in spec.model_fields_set else {"tunables"}
-    return {name: getattr(spec, name) for name in names if name not in left_out}
+    """Return fields of a study's spec, or of a check's, for an experiment; those that it leaves out stay so."""
+    return {name: getattr(spec, name) for name in names if name in spec.model_fields_set}
 
 
 def with_bounds(ref: TunableRef, robot: Robot) -> ResolvedTunable:
@@ -158,8 +158,12 @@ def with_proper_labels(ref: PluginRef, named: Iterable[str]) -> PluginRef:
     return PluginRef(name=ref.name, options=options)
 
 
-def simulated_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine: type[Engine]) -> ResolvedReality:
-    """Return a simulated reality with every field."""
+def resolved_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine: type[Engine]) -> ResolvedReality:
+    """Return the reality of a spec with every field; the engine is that of a simulated one."""
+    if is_recorded(spec):
+        return recorded_reality(spec)
+    if spec.reality.kind == "physical":
+        return _physical_reality(spec, robot)
     return ResolvedReality(
         kind="simulated",
         engine=completed(engines, ref),
@@ -173,7 +177,7 @@ def simulated_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine
     )
 
 
-def physical_reality(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
+def _physical_reality(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
     """Return a physical reality with every field."""
     return ResolvedReality.filled_from(
         spec.reality,

@@ -32,17 +32,17 @@ from gaplab.services.specs.defaults import (
     Preset,
     completed,
     default_engine,
-    physical_reality,
     preset_options,
+    resolved_reality,
     runs,
     shared_fields,
-    simulated_reality,
     with_bounds,
     with_preset,
     with_proper_labels,
     with_usual_tunables,
 )
 from gaplab.services.specs.measured import bench_violations
+from gaplab.services.specs.recorded import is_recorded, pool_of, selectable, with_recordings
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.violations import (
     budget_violations,
@@ -76,15 +76,14 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     Raises:
         InvalidSpec: with every violation, each with its pointer into the spec; or an external plug-in raised an error.
     """
-    spec, preset = with_preset(spec), PRESETS[spec.budget.preset]
+    spec, preset = with_recordings(with_preset(spec)), PRESETS[spec.budget.preset]
     robot, strategy, controllers, simulators, discrepancy, tuner = _created(spec)
     spec = with_usual_tunables(spec, robot)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
-    physical = spec.reality.kind == "physical"
-    real = simulated if physical else spec.reality.engine or simulated
-    place = "/reality/engine" if spec.reality.engine and not physical else "/engine"
+    own = spec.reality.engine if spec.reality.kind == "simulated" else None
+    real, place = own or simulated, "/reality/engine" if own else "/engine"
     engine, reality_engine = gather(lambda: usable(simulated, robot, "/engine"), lambda: usable(real, robot, place))
-    budget, iterations = _budget(spec, preset), preset.iterations if spec.iterations is None else spec.iterations
+    budget, iterations = _budget(spec, preset), _iterations(spec, strategy, preset)
     divisor = tuner.divisor(seen_of(iterations + len(spec.reality.samples), spec.held_out))
     if violations := [
         *engine_violations(robot, {reality_engine: "/reality/engine", engine: "/engine"}),
@@ -107,9 +106,16 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         controller_optimizer=completed(optimizers, spec.controller_optimizer or spec.optimizer),
         engine=completed(engines, simulated),
         tunables=tuple(with_bounds(ref, robot) for ref in spec.tunables),
-        reality=physical_reality(spec, robot) if physical else simulated_reality(spec, robot, real, reality_engine),
+        reality=resolved_reality(spec, robot, real, reality_engine),
         budget=budget,
     )
+
+
+def _iterations(spec: ExperimentSpec, strategy: Strategy, preset: Preset) -> int:
+    """Return the iterations of a spec; of a recorded reality, all recordings unless it says otherwise."""
+    if is_recorded(spec) and (spec.iterations is None or not strategy.takes_samples):
+        return selectable(spec)
+    return preset.iterations if spec.iterations is None else spec.iterations
 
 
 def _created(spec: ExperimentSpec) -> tuple[Robot, Strategy, Optimizer, Optimizer, Discrepancy, Tuner]:
@@ -229,11 +235,18 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
     """
     strategy, tunables = strategies.create(spec.strategy), len(spec.tunables)
     budget, iterations = spec.budget, spec.iterations if strategy.takes_samples else 0
-    known = bool(spec.reality.samples)
+    known, most = bool(spec.reality.samples), budget.selection_evaluations
+    recordings = selectable(spec) if is_recorded(spec) else most + iterations
     selections = sum(
-        Allowance.of_selection(strategy, budget.selection_evaluations, tunables, learned=number > 1 or known).rollouts
+        Allowance.of_selection(
+            strategy, min(most, recordings - number + 1), tunables, learned=number > 1 or known
+        ).rollouts
         for number in range(1, iterations + 1)
     )
+    if is_recorded(spec):
+        tests = len(pool_of(spec).recordings) - recordings
+        counts = range(iterations + 1) if strategy.takes_samples else [recordings]
+        return selections + sum(_of_tuning(spec, samples) + tests for samples in counts)
     transfer = Allowance.of_transfer(strategy, budget.controller_evaluations, tunables)
     tuned = sum(_of_tuning(spec, number) for number in range(iterations + 1)) if strategy.takes_samples else 0
     return transfer.rollouts * (iterations + 1) + selections + tuned

@@ -66,6 +66,9 @@ class Simulation:
             raise PluginBroken(f"{found}; permitted: {expected}")
         outcomes = np.empty((len(genomes), len(parameters), 1 + sensors.size))
         outcomes[..., 0], outcomes[..., 1:] = fitnesses, sensors.standardised(values)
+        for row, motion in zip(outcomes, motions, strict=True):
+            if isinstance(motion, Motion) and motion.until_s < sensors.times_s[-1]:
+                row[:, 1:][:, sensors.reading_times_s > motion.until_s] = 0.0
         failed = np.isnan(fitnesses)
         if np.count_nonzero(failed):
             outcomes[failed] = np.nan

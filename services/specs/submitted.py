@@ -32,6 +32,8 @@ def kept(spec: ExperimentSpec | StudySpec, resolved: ResolvedSpec) -> Spec:
         sent["strategies"] = [each.model_dump(mode="json", exclude_unset=True) for each in spec.strategies]
     if resolved.robot.name == IMPORTED:
         sent["robot"] = resolved.robot.model_dump(mode="json")
+    if resolved.reality.pool is not None:
+        sent["reality"] = sent["reality"] | {"pool": resolved.reality.pool.model_dump(mode="json")}
     short: Spec = _bare(sent | {"engine": sent.get("engine") or resolved.engine.name})
     return short
 

@@ -16,6 +16,7 @@ from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.defaults import bounds_of, honoured, runs
+from gaplab.services.specs.recorded import is_recorded, recorded_violations
 from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.tunables.base import Tunable
@@ -135,6 +136,9 @@ def reality_violations(
 
     `simulated` is the engine of the simulators, `engine` that of reality.
     """
+    if is_recorded(spec):
+        yield from recorded_violations(spec, strategy, robot)
+        return
     if spec.reality.kind == "physical":
         yield from _physical_violations(spec, strategy)
         return

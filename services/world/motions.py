@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import TypeAlias
 
 import numpy as np
@@ -53,6 +54,7 @@ class Motion:
         every_s: interval at which a smooth curve was sampled; 0 if targets step.
         start: how the robot is at time 0; None if it is as the world has it.
         joints: true if the trajectory has what encoders tell, too.
+        until_s: time after which sensors say nothing: all readings are 0 then, in every simulator.
     """
 
     times_s: FloatArray
@@ -62,6 +64,7 @@ class Motion:
     every_s: float = 0.0
     start: Start | None = None
     joints: bool = False
+    until_s: float = inf
 
     def observed_at(self, times_s: FloatArray, joints: bool | None = None) -> "Motion":
         """Return the same motion, observed at other times `(t,)`; None tells joints if the motion itself does."""

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cached_property
 from hashlib import sha256
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, ClassVar, Self, TypeAlias, TypeVar
 
 from pydantic import ConfigDict, Field, StringConstraints, ValidationError
 
@@ -46,43 +46,42 @@ _UNWRITTEN = {"origin", "edits"}
 """Fields of a world that say how it was edited; a file has only what it is."""
 
 
-class RobotFile(Frozen):
-    """A robot as its file has it.
+F = TypeVar("F", bound="NamedFile")
+
+
+class NamedFile(Frozen):
+    """A file that specs name: JSON, which is stored once under the hash of its canonical text.
 
     Attributes:
         format_version: version of the format.
-        name: name of the robot.
-        source: file that it was imported from; None if it was written by hand.
-        usual_controller: controller of a spec that names none.
-        usual_task: task of a spec that names none.
-        lost: what its import lost or changed, line by line.
-        comments: notes for people, like the intervals of tuned values.
-        world: the robot in reality.
+        name: a spec means the newest file of this name.
+        what: what it is, for sentences.
+        most_bytes: its largest size.
     """
 
     model_config = ConfigDict(strict=True)
+    what: ClassVar[str]
+    most_bytes: ClassVar[int] = MOST_BYTES
 
     format_version: Annotated[int, Field(ge=1, le=1)] = 1
     name: Annotated[str, StringConstraints(pattern=rf"^[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}$")]
-    source: RobotSource | None = None
-    usual_controller: PluginRef
-    usual_task: PluginRef
-    lost: Lines = ()
-    comments: Lines = ()
-    world: World
 
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> "RobotFile":
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return the file with other fields; what was computed of the old ones is computed again."""
         found = super().model_copy(update=update, deep=deep)
         for name in ("content", "text", "sha256"):
             found.__dict__.pop(name, None)
         return found
 
+    @classmethod
+    def quick_violations(cls, content: Any) -> Iterator[Violation]:  # noqa: ANN401, ARG003 - any JSON
+        """Yield violations that are found before every value is checked; by default none."""
+        yield from ()
+
     @cached_property
     def content(self) -> dict[str, Any]:
         """The file as JSON values, without what has its default value."""
-        left_out = {"world"} | {name for name in ("source", "comments") if not getattr(self, name)}
-        return {**self.model_dump(mode="json", exclude=left_out), "world": _plain(self.world)}
+        return {"format_version": self.format_version} | self.model_dump(mode="json", exclude_defaults=True)
 
     @cached_property
     def text(self) -> str:
@@ -91,8 +90,41 @@ class RobotFile(Frozen):
 
     @cached_property
     def sha256(self) -> str:
-        """The identity of the robot: the hash of the canonical text, whatever the spaces and the order in the file."""
+        """The identity of the file: the hash of the canonical text, whatever the spaces and the order in it."""
         return sha256(self.text.encode()).hexdigest()
+
+
+class RobotFile(NamedFile):
+    """A robot as its file has it.
+
+    Attributes:
+        source: file that it was imported from; None if it was written by hand.
+        usual_controller: controller of a spec that names none.
+        usual_task: task of a spec that names none.
+        lost: what its import lost or changed, line by line.
+        comments: notes for people, like the intervals of tuned values.
+        world: the robot in reality.
+    """
+
+    what: ClassVar[str] = "robot file"
+
+    source: RobotSource | None = None
+    usual_controller: PluginRef
+    usual_task: PluginRef
+    lost: Lines = ()
+    comments: Lines = ()
+    world: World
+
+    @classmethod
+    def quick_violations(cls, content: Any) -> Iterator[Violation]:  # noqa: ANN401 - any JSON
+        """Yield fields that a world has and a file has not, and parts that are too many."""
+        yield from _world_violations(content)
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """The file as JSON values, without what has its default value."""
+        left_out = {"world"} | {name for name in ("source", "comments") if not getattr(self, name)}
+        return {**self.model_dump(mode="json", exclude=left_out), "world": _plain(self.world)}
 
 
 def read_robot_file(text: str | bytes) -> RobotFile:
@@ -115,17 +147,26 @@ def stored_robot_file(text: str | bytes) -> RobotFile:
     Raises:
         InvalidSpec: it is not a robot file.
     """
-    if len(text) > MOST_BYTES:
-        message = f"the robot file has {len(text):,} bytes, but at most {MOST_BYTES:,} are permitted"
-        raise InvalidSpec([Violation("", None, message, f"at most {MOST_BYTES:,} bytes")])
+    return parsed(RobotFile, text)
+
+
+def parsed(kind: type[F], text: str | bytes) -> F:
+    """Return the file of a text.
+
+    Raises:
+        InvalidSpec: it is not a file of this kind; with every violation, whose pointers are places in it.
+    """
+    if len(text) > kind.most_bytes:
+        message = f"the {kind.what} has {len(text):,} bytes, but at most {kind.most_bytes:,} are permitted"
+        raise InvalidSpec([Violation("", None, message, f"at most {kind.most_bytes:,} bytes")])
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InvalidSpec([Violation("", None, f"the robot file is not JSON: {error}", "JSON in UTF-8")]) from error
-    if violations := list(_world_violations(content)):
+        raise InvalidSpec([Violation("", None, f"the {kind.what} is not JSON: {error}", "JSON in UTF-8")]) from error
+    if violations := list(kind.quick_violations(content)):
         raise InvalidSpec(violations)
     try:
-        return RobotFile.model_validate_json(text)
+        return kind.model_validate_json(text)
     except ValidationError as error:
         raise InvalidSpec(_violations(error, content)) from error
 

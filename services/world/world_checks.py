@@ -167,7 +167,8 @@ def _world_checks(world: World) -> Iterator[_Check]:
     yield "/noise/start_tilt_rad", tilted, not (world.fixed and tilted), "0 where the base never moves"
     names = ["", *(body.name for body in world.bodies)]
     yield "/observed", world.observed, world.observed in names, "empty, or the name of a body"
-    yield "/joints", "no motor", bool(world.actuators), "joints of which at least one has a motor"
+    thrown = not (world.joints or world.fixed)
+    yield "/joints", "no motor", thrown or bool(world.actuators), "joints of which at least one has a motor"
 
 
 def _material_checks(material: Material, place: str) -> Iterator[_Check]:

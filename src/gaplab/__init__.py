@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from gaplab.api.clients.objects import Experiment as Experiment
     from gaplab.api.clients.objects import Study as Study
     from gaplab.api.clients.results import Comparisons as Comparisons
+    from gaplab.api.library.pools import PoolOptions as PoolOptions
+    from gaplab.api.library.pools import import_pool as import_pool
     from gaplab.api.library.robots import read_robot as read_robot
     from gaplab.api.library.running import Interrupted as Interrupted
     from gaplab.api.library.running import Result as Result
@@ -59,11 +61,13 @@ _MODULES = {
     "InvalidSpec": "gaplab.services.core.errors",
     "MeasurementFailed": "gaplab.api.clients.drivers",
     "NotSubmitted": "gaplab.api.clients.confirmation",
+    "PoolOptions": "gaplab.api.library.pools",
     "Result": "gaplab.api.library.running",
     "ServiceError": "gaplab.api.clients.errors",
     "ServiceUnreachable": "gaplab.api.clients.errors",
     "Study": "gaplab.api.clients.objects",
     "Tuning": "gaplab.api.library.tuning",
+    "import_pool": "gaplab.api.library.pools",
     "local_service": "gaplab.api.process.local_service",
     "read_robot": "gaplab.api.library.robots",
     "read_samples": "gaplab.samples",

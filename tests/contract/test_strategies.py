@@ -123,6 +123,7 @@ def test_truth_is_not_among_what_a_strategy_is_given() -> None:
     believed = belief(strategies["informative"]())
 
     known = {"space", "known", "samples", "simulators", "tunables", "names", "scale", "discrepancy"}
+    known |= {"candidates", "commands"}  # of recordings
     assert set(vars(believed)) == known
     assert not any(np.array_equal(each.parameters, TRUTH) for each in believed.simulators)
 

@@ -130,6 +130,11 @@ def bring_a_robot(ask: Callable[..., Any], folder: Path) -> None:
     imported = ask("robot import", str(folder / "m.xml"), "-o", str(folder / "m.json"))
     assert ask("robot add", imported["file"])["sha256"] == imported["sha256"]
     assert [each["name"] for each in ask("robot list")] == ["m"]
+    table = folder / "log.csv"
+    table.write_text("recording,time_s,position_ja,position_jb\none,0,0,0\none,1,0,0\ntwo,0,0,0\ntwo,1,0,0\n")
+    found = ask("pool import", str(table), "--robot", imported["file"], "--name", "log", "-o", str(folder / "log.json"))
+    assert ask("pool add", found["file"])["sha256"] == found["sha256"]
+    assert [each["recordings"] for each in ask("pool list")] == [2]
 
 
 def measure_on_a_bench(ask: Callable[..., Any], store: Store, folder: Path) -> None:

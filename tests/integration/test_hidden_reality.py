@@ -21,7 +21,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.access import create_token
 from gaplab.services.archives.opening import DATABASE
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import listing, stored_robots, submission
+from gaplab.services.experiments import listing, stored_files, submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Limits
 from gaplab.services.specs.assembly import setting
@@ -74,7 +74,7 @@ def running(store: Store, log: pytest.LogCaptureFixture) -> dict[str, str]:
     study = submission.submit(store, StudySpec.model_validate(STUDY))
     run_halfway(store)
     listing.save_view(store, "mine", ViewSpec(query="strategy = random"))
-    stored_robots.add_robot(store, json.dumps(EXAMPLE))
+    stored_files.add_robot(store, json.dumps(EXAMPLE))
     first, second, _ = study.experiments
     return {"studies": study.id, "experiments": first.id, "other": second.id, "sensitivity": first.sensitivity or ""}
 

@@ -72,6 +72,7 @@ def test_the_schema_goes_up_to_what_the_models_say_and_down_to_nothing(database_
         "ck_answer_state",
         "ck_attempt_ending",
         "ck_experiment_state",
+        "ck_file_kind",
         "ck_repetition_state",
         "ck_request_kind",
         "ck_request_state",

@@ -72,6 +72,12 @@ test("a physical reality goes through the form unchanged, and one that becomes s
   assert.deepEqual(specOf(draft).reality, { kind: "physical", repeats: "three" });
 });
 
+test("a recorded reality goes through the form unchanged, and compares readings", () => {
+  const reality = { kind: "recorded", pool: "tosses", held_out: 0.3 };
+  const spec = specOf(draftOf({ reality: { ...reality, pool: { name: "tosses", sha256: "5f" } }, discrepancy: "squared_fitness" }, CATALOGUE));
+  assert.deepEqual([spec.reality, spec.discrepancy], [reality, undefined]);
+});
+
 test("a resolved reality without a bench is simulated", () => {
   const resolved = { kind: "simulated", engine: { name: "slow", options: {} }, parameters: {}, bench: null, repeats: 1, samples: [], probes: "each", limits: null, beyond: "warn" };
   assert.deepEqual(specOf(draftOf({ reality: resolved }, CATALOGUE)).reality, { engine: "slow", probes: "each" });

@@ -142,7 +142,7 @@ test("an experiment says in a sentence what it waits for", () => {
 
 test("worlds are the engines, or the bench", () => {
   const spec = (reality) => ({ engine: { name: "fast" }, reality });
-  assert.deepEqual([{ engine: { name: "fast" } }, { engine: { name: "slow" } }, { kind: "physical", engine: null, bench: "leg" }].map((reality) => worldsText(spec(reality))),
-    ["Fast", "Fast, reality in Slow", "Fast, reality on the bench “leg”"]);
+  assert.deepEqual([{ engine: { name: "fast" } }, { engine: { name: "slow" } }, { kind: "physical", engine: null, bench: "leg" }, { kind: "recorded", engine: null, pool: { name: "tosses" } }].map((reality) => worldsText(spec(reality))),
+    ["Fast", "Fast, reality in Slow", "Fast, reality on the bench “leg”", "Fast, reality is the pool “tosses”"]);
   assert.deepEqual([isPhysical({ spec: { reality: { kind: "simulated" } } }), isPhysical({ spec: { reality: { kind: "physical" } } })], [false, true]);
 });

@@ -47,7 +47,7 @@ def test_every_exported_table_belongs_to_an_experiment_or_is_its_study() -> None
         "study",
         "experiment",
         "provenance",
-        "robot",
+        "file",
         "attachment",
     }:  # the last three are shared
         assert {"experiment_id", "repetition_id"} & set(TABLES[name].columns.keys()), name

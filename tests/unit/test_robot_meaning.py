@@ -129,14 +129,15 @@ def test_an_error_of_mujoco_has_the_line_of_the_file(tmp_path: Path) -> None:
         imported(tmp_path, edits={BASE: BASE.replace("</link>", seen), LEG: LEG.replace("box size", "tube size")})
 
 
-def test_a_robot_whose_joints_are_all_fixed_is_refused_by_that(tmp_path: Path) -> None:
+def test_a_robot_without_joints_is_thrown_and_refused_if_it_is_fixed(tmp_path: Path) -> None:
     file = tmp_path / "still.xml"
     file.write_text('<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>')
 
+    found = import_robot(file, ImportOptions()).robot
+
+    assert (found.usual_controller.name, found.usual_task.name) == ("recorded", "recorded")
     with pytest.raises(InvalidRobot, match="no joint of the file moves"):
-        imported(tmp_path, edits={"revolute": "fixed"})
-    with pytest.raises(InvalidRobot, match="no joint of the file moves"):
-        import_robot(file, ImportOptions())
+        import_robot(file, ImportOptions(fixed=True))
 
 
 def test_numbers_that_no_robot_has_are_told_and_taken(tmp_path: Path) -> None:

@@ -33,5 +33,6 @@ export const isPhysical = ({ spec }) => spec.reality.kind === "physical";
 /** Return the engine of the simulators, and what reality is if it is something else. @param {Record<string, any>} spec resolved */
 export function worldsText({ engine, reality }) {
   if (reality.kind === "physical") return `${readableName(engine.name)}, reality on the bench “${reality.bench}”`;
+  if (reality.kind === "recorded") return `${readableName(engine.name)}, reality is the pool “${reality.pool.name}”`;
   return `${readableName(engine.name)}${reality.engine.name === engine.name ? "" : `, reality in ${readableName(reality.engine.name)}`}`;
 }

@@ -440,6 +440,18 @@ declare namespace Api {
     details: Record<string, any>;
   }
   type PluginRef = string | Record<string, any>;
+  interface PoolRead {
+    sha256: string;
+    name: string;
+    origin: string;
+    recordings: number;
+    sensors: Array<string>;
+    actuators: Array<string>;
+    seconds: number;
+    lost: Array<string>;
+    created_at: string;
+  }
+  type PoolRef = string | Record<string, any>;
   interface Pooled {
     n_first: number;
     n_second: number;
@@ -518,7 +530,9 @@ declare namespace Api {
     provenance: Provenance;
   }
   interface RealitySpec {
-    kind: "simulated" | "physical";
+    kind: "simulated" | "physical" | "recorded";
+    pool: PoolRef | null;
+    held_out: number | string | null;
     engine: PluginRef | null;
     parameters: Record<string, number>;
     bench: string | null;

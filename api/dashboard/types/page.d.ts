@@ -132,6 +132,9 @@ declare namespace Page {
   /** A physical reality in the form; what a simulated one has not is kept while the reader changes the kind. */
   interface BenchDraft {
     isPhysical: boolean;
+    isRecorded: boolean;
+    pool: string;
+    heldOut: string | number;
     bench: string;
     repeats: string | number;
     probes: string;

@@ -54,9 +54,10 @@ class Readings(Discrepancy):
         compared = there | np.isnan(simulated[..., :1])  # where the physics failed, all differences are nan
         return np.asarray(np.where(compared, simulated[..., 1 + early] - real, 0.0) / np.sqrt(count))
 
-    def noise(self, measured: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG002 - as many in each sample
-        """Return the variance of one reading, 1 in units of its noise, divided by the number of readings that count."""
-        return 1.0 / len(self._early(times_s))
+    def noise(self, measured: FloatArray, times_s: FloatArray) -> float:
+        """Return the variance of one reading, 1 in units of its noise, divided by the number that count in a sample."""
+        there = ~np.isnan(measured[:, 1 + self._early(times_s)])
+        return 1.0 / float(np.maximum(there.sum(axis=1), 1).mean())
 
     def _early(self, times_s: FloatArray) -> NDArray[np.intp]:
         return np.flatnonzero(times_s <= times_s.min() + self.options.seconds + 1e-9)

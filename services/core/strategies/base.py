@@ -76,6 +76,11 @@ class Strategy(Plugin):
         return False
 
     @property
+    def needs_fitness(self) -> bool:
+        """Return whether it selects by fitness, so that a recorded reality, which has none, is refused."""
+        return self.takes_samples
+
+    @property
     def equal_rollouts(self) -> bool:
         """Return whether a search costs as many rollouts as one in a single simulator, by fewer evaluations."""
         return False

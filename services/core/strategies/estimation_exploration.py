@@ -65,6 +65,11 @@ class EstimationExploration(Strategy):
         """Return whether it selects by readings."""
         return self.options.select == "disagreement"
 
+    @property
+    def needs_fitness(self) -> bool:
+        """Return whether it selects by fitness."""
+        return not self.senses
+
     def selection_simulators(self, tunables: int, *, learned: bool) -> int:  # noqa: ARG002 - the port's signature
         """Return one, or the compared models, with as many beside them if reliability counts."""
         compared = min(self.options.compared, self.options.models)
@@ -90,7 +95,7 @@ class EstimationExploration(Strategy):
             score,
             parameters=np.vstack([models, nearby]) if weight else models,
             senses=True,
-            candidates=belief.space.draw(self.options.candidates, rng) if self.options.candidates else None,
+            candidates=belief.draw(self.options.candidates, rng) if self.options.candidates else None,
         )
 
 

@@ -12,6 +12,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
 from gaplab.services.core.scoring import (
+    deviation_of_readings,
     scaled_uniqueness_penalty,
     uniqueness_penalty,
     weighted_deviation,
@@ -32,10 +33,11 @@ class Random(Strategy):
     name = "random"
     source = "Paper, section 2, Random"
     searches = False
+    needs_fitness = False
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
-        """Return a genome, uniform over its space."""
-        genome: Genome = belief.space.draw(1, rng)[0]
+        """Return a genome, uniform over its space, or over the recordings that are left."""
+        genome: Genome = belief.draw(1, rng)[0]
         return genome
 
 
@@ -69,17 +71,25 @@ class KnownFit(Strategy):
 class Informative(Diverse):
     """The controller on whose fitness a diverse ensemble of simulators disagrees most.
 
-    Disagreement is the standard deviation, weighted by the accuracy of simulators.
+    Disagreement is the standard deviation, weighted by the accuracy of simulators. Of recordings, which have no
+    fitness, it is that of all readings.
     """
 
     name = "informative"
     source = "Paper, section 2, Informative; Estimation-Exploration"
     published: ClassVar[Mapping[str, Any]] = {"least_error": 0.0}
+    needs_fitness = False
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
-        """Return the controller with the highest weighted deviation of simulated fitness found."""
+        """Return the controller with the highest weighted deviation of simulated fitness, or of readings, found."""
         belief = self.options.weighed(belief)
         weights = weights_of(belief.simulators, self.options.floor(belief))
+        if belief.candidates is not None:
+            return search(
+                lambda _, outcomes: deviation_of_readings(outcomes[..., 1:], weights),
+                parameters=belief.parameters,
+                senses=True,
+            )
         return search(lambda _, fitnesses: weighted_deviation(fitnesses, weights), parameters=belief.parameters)
 
 

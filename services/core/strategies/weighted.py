@@ -74,6 +74,11 @@ class Weighted(Diverse):
     Options = WeightedOptions
     options: WeightedOptions
 
+    @property
+    def needs_fitness(self) -> bool:
+        """Return whether a term besides Fisher information counts, since the others are of fitness."""
+        return self._compared(2) > 1 or self.options.uniqueness_weight > 0
+
     def selection_simulators(self, tunables: int, *, learned: bool) -> int:
         """Return the simulators that count, and those beside them that reliability and information need."""
         compared = self._compared(super().selection_simulators(tunables, learned=learned))

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from gaplab.schemas.curves import Curve, CurvePoint, Fitness, from_before
+from gaplab.schemas.curves import OF_UNTUNED, Curve, CurvePoint, Fitness, from_before
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Line, Mark, Panel, Table, faint_lines
 from gaplab.services.figures.style import INK, Dash, Style, strategy_styles
 from gaplab.services.figures.words import distinct_names, drawable, heading, limits, number, number_of, with_unit
@@ -14,6 +14,9 @@ Band = Literal["interval", "sd"]
 BANDS: dict[Band, str] = {"interval": "95\N{NO-BREAK SPACE}% interval of the mean", "sd": "one standard deviation"}
 
 EVALUATIONS = "Number of real-world evaluations"
+
+RECORDINGS, ERROR = "Number of recordings used", "Error on held-out recordings (× untuned)"
+"""Labels of the axes, if reality is recorded."""
 
 BASELINES: tuple[Dash, ...] = ("dashed", "dashdot", "long", "longdot", "solid")
 """Dashes of direct baselines; the best of several direct searches is dotted."""
@@ -60,7 +63,8 @@ def curves_figure(
     the SD if few repetitions would make the interval fill the figure; it needs two repetitions. `each` adds a faint
     line for every repetition, `beside` thin lines: the same experiments' curves of transferred controllers alone.
     """
-    curves = [_drawable(one) for one in curves]
+    errors = bool(curves) and all(one.unit == OF_UNTUNED for one in curves)
+    curves = [_drawable(_as_error(one) if errors else one) for one in curves]
     band = band or _default_band(curves)
     names = distinct_names([(one.name, one.strategy, one.study_name, one.experiment) for one in curves])
     placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
@@ -75,9 +79,10 @@ def curves_figure(
     found = [best_of_line(one.name, one.curve, span) for one in levels] if lines and not against else []
     best_of = [line for line in found if line]
     marks += best_of
-    evaluations = EVALUATIONS + from_before(*(one.curve.known for one in lines))
+    evaluations = RECORDINGS if errors else EVALUATIONS + from_before(*(one.curve.known for one in lines))
     x = Axis(against.label if against else evaluations, (-0.02 * span, 1.02 * span), whole=against is None)
-    y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
+    fitness = with_unit("Fitness in reality", {one.unit for one in curves})
+    y = Axis(ERROR if errors else fitness, _limits(marks))
     caption = _caption(lines, levels, BANDS[band], against, each=each, thin=bool(thin))
     return FigureDefinition(
         name="curves",
@@ -87,6 +92,19 @@ def curves_figure(
         alt=_alt(lines, levels, best_of, x, y),
         table=_table(placed, best_of),
     )
+
+
+def _as_error(curve: Curve) -> Curve:
+    """Return the curve of an error, of what is recorded as minus that error."""
+
+    def minus(value: float | None) -> float | None:
+        return None if value is None else -value
+
+    def turned(point: CurvePoint) -> CurvePoint:
+        ends = {"mean": minus(point.mean), "lower": minus(point.upper), "upper": minus(point.lower)}
+        return point.model_copy(update={**ends, "values": tuple(map(minus, point.values))})
+
+    return curve.model_copy(update={"points": tuple(map(turned, curve.points))})
 
 
 def _drawable(curve: Curve) -> Curve:
@@ -192,9 +210,14 @@ def _caption(
     known = [one.curve.known for one in lines]
     parts += [f"{number_of('sample', *known)} from before are not counted."] if any(known) else []
     parts += [against.note] if against else []
-    origins = {True: "evolved in reality itself", False: "without samples"}
-    parts += [f"{one.name}: {origins[one.curve.direct]}, {_level_in_words(one)}." for one in levels]
+    parts += [f"{one.name}: {_origin(one.curve)}, {_level_in_words(one)}." for one in levels]
     return " ".join(parts)
+
+
+def _origin(level: Curve) -> str:
+    if level.unit == OF_UNTUNED:
+        return "tuned on all recordings that are not held out"
+    return "evolved in reality itself" if level.direct else "without samples"
 
 
 def _level_in_words(one: _Placed) -> str:

@@ -43,11 +43,11 @@ from gaplab.services.store.models.results import StepRow as StepRow
 from gaplab.services.store.models.service import EventCounterRow as EventCounterRow
 from gaplab.services.store.models.service import EventRow as EventRow
 from gaplab.services.store.models.service import ExperimentProvenanceRow as ExperimentProvenanceRow
+from gaplab.services.store.models.service import FileRow as FileRow
 from gaplab.services.store.models.service import IdempotencyRow as IdempotencyRow
 from gaplab.services.store.models.service import NotificationRow as NotificationRow
 from gaplab.services.store.models.service import NotifierRow as NotifierRow
 from gaplab.services.store.models.service import ProvenanceRow as ProvenanceRow
-from gaplab.services.store.models.service import RobotRow as RobotRow
 from gaplab.services.store.models.service import SupervisorRow as SupervisorRow
 from gaplab.services.store.models.service import TokenRow as TokenRow
 from gaplab.services.store.models.service import ViewRow as ViewRow

@@ -14,7 +14,7 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.clock import UtcDateTime
 from gaplab.services.store.texts import brief, storable
 
-REVISION = "0006"
+REVISION = "0007"
 """The revision with these tables; a database at any other revision is refused."""
 
 

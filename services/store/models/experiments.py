@@ -179,8 +179,18 @@ class ExperimentRow(Base):
 
     @property
     def tunes(self) -> bool:
-        """Whether it has samples to tune on: it takes some, besides iteration 0, or has some from before."""
-        return self.iterations > 1 or self.known > 0
+        """Whether it has samples to tune on: it takes some, has some from before, or recordings."""
+        return not self.level or self.recorded
+
+    @property
+    def level(self) -> bool:
+        """Whether it has no samples of its own, so that its curve is a horizontal line."""
+        return self.iterations <= 1 and self.known == 0
+
+    @property
+    def recorded(self) -> bool:
+        """Whether its reality is recorded."""
+        return bool(self.spec["reality"]["kind"] == "recorded")
 
     @property
     def known(self) -> int:

@@ -8,9 +8,10 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind
+from gaplab.schemas.robots import FileKind
 from gaplab.services.store.clock import now
 from gaplab.services.store.models.base import Base, Reason, words
-from gaplab.services.world.robot_files import MOST_BYTES
+from gaplab.services.world.pools import MOST_BYTES
 
 
 class TokenRow(Base):
@@ -180,19 +181,21 @@ class SupervisorRow(Base):
     heartbeat_at: Mapped[datetime] = mapped_column(default=now())
 
 
-class RobotRow(Base):
-    """A robot file; it never changes, and specs name it by its hash.
+class FileRow(Base):
+    """A robot file or a pool; it never changes, and specs name it by its hash.
 
     Attributes:
         sha256: of the canonical text, in hexadecimal.
-        name: name of the robot; several files may have it, and the newest is meant by it.
+        kind: what it is.
+        name: of several files of a kind with one name, the newest is meant by it.
         text: canonical text of the file.
     """
 
-    __tablename__ = "robot"
-    __table_args__ = (Index(None, "name", "created_at"),)
+    __tablename__ = "file"
+    __table_args__ = (Index(None, "kind", "name", "created_at"),)
 
     sha256: Mapped[str] = mapped_column(String(64), primary_key=True)
+    kind: Mapped[FileKind] = mapped_column(words(FileKind, "kind"))
     name: Mapped[str] = mapped_column(String(60))
     text: Mapped[str] = mapped_column(String(MOST_BYTES))
     created_at: Mapped[datetime] = mapped_column(default=now())

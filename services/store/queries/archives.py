@@ -17,8 +17,9 @@ from gaplab.services.store.models import (
     RepetitionRow,
     StudyRow,
 )
-from gaplab.services.store.queries import attachments, attempts, robots
+from gaplab.services.store.queries import attachments, attempts, files
 from gaplab.services.store.statements import wait_for_others
+from gaplab.services.world.robot_library import named_in
 
 Row = dict[str, Any]
 
@@ -36,7 +37,7 @@ _LOCK = 0x67617069  # among the advisory locks of a Postgres database
 _REPETITIONS = Base.metadata.tables["repetition"]
 _SHARED: dict[str, Callable[[Session, Sequence[Row]], None]] = {
     "provenance": attempts.insert_provenances,
-    "robot": robots.insert_unless_there,
+    "file": files.insert_unless_there,
     "attachment": attachments.insert_unless_there,
 }
 _REPLACED = {EXPERIMENT: _REPETITIONS.c.experiment_id, REPETITION: _REPETITIONS.c.number}
@@ -101,10 +102,9 @@ def _queries(session: Session, name: str, columns: Sequence[str], owners: Sequen
             use = ExperimentProvenanceRow
             used = select(use.provenance_id).where(use.experiment_id.in_(owners))
             return [_shared(name, columns, used)]
-        case "robot":
-            hash_ = ExperimentRow.spec["robot"]["options"]["sha256"].as_string()
-            used = select(hash_).where(ExperimentRow.id.in_(owners), hash_.is_not(None))
-            return [_shared(name, columns, used)]
+        case "file":
+            specs = session.scalars(select(ExperimentRow.spec).where(ExperimentRow.id.in_(owners)))
+            return [_shared(name, columns, sorted({each for spec in specs for each in named_in(spec)}))]
         case "attachment":
             row = RepetitionRow
             repetitions = select(row.id).where(row.experiment_id.in_(owners)).scalar_subquery()

@@ -30,7 +30,7 @@ from gaplab.services.store.models import (
     StepRow,
     StudyRow,
 )
-from gaplab.services.store.queries import robots
+from gaplab.services.store.queries import files
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
 
@@ -263,7 +263,7 @@ def _admit(row: ExperimentRow, context: QueryContext) -> None:
         msg = f"the spec of experiment {row.id!r} is of version {row.spec_version}, and this gaplab reads up to "
         msg += f"{SPEC_VERSION}: use a later gaplab with this database"
         raise StoreUnavailable(msg)
-    robots.learn(context.session, [row.spec])
+    files.learn(context.session, [row.spec])
 
 
 _OfRepetition = AnswerRow | AttemptRow | CheckpointRow | RequestRow | StepRow

@@ -13,6 +13,8 @@ from gaplab.services.core.linear_models import widened
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuning import is_held_out, seen_of
 from gaplab.services.core.types import Simulator
+from gaplab.services.specs.recorded import pool_of, selectable
+from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.models import LOG, ExperimentRow, RepetitionRow, StepKind, StepRow
 from gaplab.services.store.queries.experiments import best, of_experiments, same_log, steps_of
 from gaplab.services.store.queries.logs import simulator_of
@@ -88,7 +90,12 @@ def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
     for repetition, iteration in session.execute(succeeded):
         (held_out if is_held_out(before + iteration, share) else tuned_on).setdefault(repetition, []).append(iteration)
     known = seen_of(before, share)
-    return MeasuredIterations(tuned_on, held_out, known, before - known)
+    if not experiment.recorded:
+        return MeasuredIterations(tuned_on, held_out, known, before - known)
+    spec = spec_of(experiment.spec)
+    recordings = selectable(spec)
+    tests = len(pool_of(spec).recordings) - recordings
+    return MeasuredIterations(tuned_on, held_out, recordings if experiment.level else 0, tests)
 
 
 def repeats(session: Session, experiment: str) -> list[list[float]]:

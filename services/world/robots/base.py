@@ -114,7 +114,7 @@ class Robot(Plugin):
         By default they are those of the task, which sees a base that begins turned as level at the start. A robot with
         a task of its own that has sensors overrides it.
         """
-        if observes_base(self.world):
+        if self._task.turned and observes_base(self.world):
             trajectory = replace(trajectory, orientations=from_start(self.world, trajectory.orientations))
         return self._task.sense(trajectory)
 

@@ -26,6 +26,7 @@ class Task(Plugin):
         sensors: what is read during a rollout; by default nothing.
         joints: true if it needs the joints of trajectories.
         commanded: true if it needs their commands, which only a controller without a loop has in advance.
+        turned: true if it sees a base that begins turned as level at the start.
     """
 
     unit: ClassVar[str]
@@ -33,6 +34,7 @@ class Task(Plugin):
     sensors: Sensors = Sensors()
     joints: bool = False
     commanded: ClassVar[bool] = False
+    turned: ClassVar[bool] = True
 
     def prepare(self, world: World) -> None:
         """Learn which robot is rated; called once, before anything is. By default nothing depends on the robot.

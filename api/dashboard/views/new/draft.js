@@ -49,11 +49,11 @@ export function draftOf(spec, catalogue) {
 export const LIMITS = ["joint_speed", "torque", "tilt", "height"];
 
 /** @param {Spec} reality */
-const realityDraft = ({ kind, engine, parameters, bench, repeats, probes, samples, limits, beyond }) => ({
+const realityDraft = ({ kind, pool, held_out: heldOut, engine, parameters, bench, repeats, probes, samples, limits, beyond }) => ({
   realityEngine: pluginDraft(engine ?? ""),
   realityParameters: { ...parameters },
   bench: {
-    isPhysical: kind === "physical", bench: bench ?? "", repeats: repeats ?? "", probes: probes ?? "", samples: samples ?? [],
+    isPhysical: kind === "physical", isRecorded: kind === "recorded", pool: pool?.name ?? pool ?? "", heldOut: heldOut ?? "", bench: bench ?? "", repeats: repeats ?? "", probes: probes ?? "", samples: samples ?? [],
     limits: Object.fromEntries(LIMITS.map((name) => [name, limits?.[name] ?? ""])), beyond: beyond === "refuse" ? beyond : "",
   },
 });
@@ -135,7 +135,7 @@ export function specOf(draft) {
     engine: engine.name ? pluginName(engine) : "",
     optimizer: pluginName(optimizer),
     controller_optimizer: controllerOptimizer.name ? pluginName(controllerOptimizer) : "",
-    discrepancy: pluginName(discrepancy),
+    discrepancy: draft.bench.isRecorded && discrepancy.name === "squared_fitness" ? "" : pluginName(discrepancy),
     tuner: pluginName(tuner),
     tunables: ticked(tunables).map(({ name, lower, upper }) => shortest({ name, ...withoutEmpty(typedValues({ lower, upper })) })),
     reality: realityOf(draft),
@@ -145,7 +145,8 @@ export function specOf(draft) {
 }
 
 /** Return reality without what its kind does not have; the form keeps that while the reader changes the kind. @param {Page.Draft} draft */
-function realityOf({ realityEngine, realityParameters, bench: { isPhysical, limits, samples, repeats, ...bench } }) {
+function realityOf({ realityEngine, realityParameters, bench: { isPhysical, isRecorded, pool, heldOut, limits, samples, repeats, ...bench } }) {
+  if (isRecorded) return withoutEmpty({ kind: "recorded", pool: pool.trim(), ...typedValues({ held_out: heldOut }) });
   if (!isPhysical) {
     const { probes } = bench;
     return withoutEmpty({ engine: realityEngine.name ? pluginName(realityEngine) : "", parameters: withoutEmpty(typedValues(realityParameters)), probes });

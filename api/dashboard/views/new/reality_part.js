@@ -14,7 +14,7 @@ import { errorRoom, field, folded, numberField, pluginField } from "./fields.js"
 const LINES_SHOWN = 50;
 
 /** @type {Page.Choices} */
-const KINDS = [["simulated", "Simulated, with hidden parameters"], ["physical", "Physical: a robot on a bench"]];
+const KINDS = [["simulated", "Simulated, with hidden parameters"], ["physical", "Physical: a robot on a bench"], ["recorded", "Recorded: a pool of motions"]];
 
 /** @type {[probes: string, words: string][]} */
 const PROBES = [["each", "after each iteration"], ["last", "after the last iteration"], ["never", "never: the curve has the best sample so far"]];
@@ -30,19 +30,26 @@ export function realityFields(form) {
   const { draft: { bench, strategies }, places, catalogue } = form;
   const set = (/** @type {string} */ kind) => {
     bench.isPhysical = kind === "physical";
+    bench.isRecorded = kind === "recorded";
     const baselines = catalogue.strategies.filter(({ details }) => details.baseline).map(({ name }) => name);
     const one = strategies.find(({ name, on }) => on && !baselines.includes(name));
     if (bench.isPhysical) for (const strategy of strategies) strategy.on = strategy === one;
     form.remake();
   };
   return [
-    field({ label: "Reality", value: bench.isPhysical ? "physical" : "simulated", set, pointer: "/reality/kind", places, choices: KINDS,
-      hint: bench.isPhysical ? "" : "its parameters are hidden from the strategies, and from everybody until the study has ended" }),
-    ...(bench.isPhysical ? physical(form) : [])];
+    field({ label: "Reality", value: bench.isRecorded ? "recorded" : bench.isPhysical ? "physical" : "simulated", set, pointer: "/reality/kind", places, choices: KINDS,
+      hint: bench.isPhysical || bench.isRecorded ? "" : "its parameters are hidden from the strategies, and from everybody until the study has ended" }),
+    ...(bench.isRecorded ? recorded(form) : bench.isPhysical ? physical(form) : [])];
 }
 
+/** Return which recordings there are, and how many are held out. @param {Form} form */
+const recorded = ({ draft: { bench }, places, setter }) => [
+  h("p", { class: "note" }, "Strategies select from the recordings of a pool, which “gaplab pool add” stores; each selects a recording once, and none selects by fitness."),
+  field({ label: "Pool", value: bench.pool, set: setter(bench, "pool"), pointer: "/reality/pool", places, maxlength: 100 }),
+  numberField({ label: "Held out", hint: "share of the pool that no tuning sees", value: bench.heldOut, set: setter(bench, "heldOut"), pointer: "/reality/held_out", places, placeholder: "0.2" })];
+
 /** Return the fields of reality that are rarely needed. @param {Form} form */
-export const rareReality = (form) => (form.draft.bench.isPhysical ? limits(form) : simulated(form));
+export const rareReality = (form) => (form.draft.bench.isRecorded ? [] : form.draft.bench.isPhysical ? limits(form) : simulated(form));
 
 /** Return the engine and the hidden parameters of a simulated reality. @param {Form} form */
 function simulated(form) {

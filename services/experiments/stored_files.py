@@ -1,22 +1,23 @@
-"""Robot files in the store: added once each, listed, and found by the names that specs give them."""
+"""Robot files and pools in the store: added once each, listed, and found by the names that specs give them."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from gaplab.schemas.plugin import PluginRead, PluginRef
-from gaplab.schemas.robots import RobotRead
+from gaplab.schemas.robots import FileKind, PoolRead, RobotRead
 from gaplab.schemas.samples import SamplesRead
-from gaplab.schemas.spec import SharedSettings
+from gaplab.schemas.spec import PoolRef, SharedSettings
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, unknown_name
 from gaplab.services.specs.defaults import default_engine
 from gaplab.services.specs.robots import Driven, ref_of_file, robot_of, robot_of_file
 from gaplab.services.specs.sample_tables import read_samples
-from gaplab.services.store.models import RobotRow
-from gaplab.services.store.queries import robots as rows
+from gaplab.services.store.models import FileRow
+from gaplab.services.store.queries import files
 from gaplab.services.store.session import Session, Store, snapshot
 from gaplab.services.store.texts import storable
+from gaplab.services.world.pools import Pool, read_pool, stored_pool
 from gaplab.services.world.robot_files import RobotFile, read_robot_file, stored_robot_file
 from gaplab.services.world.robot_library import IMPORTED
 from gaplab.services.world.robots import robots
@@ -46,13 +47,52 @@ def add_robot(store: Store, text: str | bytes) -> RobotRead:
         robot_of_file(file)
     except InvalidSpec as error:
         raise InvalidRobotFile(error.violations) from error
-    return store.write(lambda session: _view(rows.put(session, file.sha256, file.name, file.text), file))
+    return store.write(lambda session: _view(files.put(session, FileKind.ROBOT, file), file))
 
 
 @snapshot
 def list_robots(session: Session) -> tuple[RobotRead, ...]:
     """Return all stored robots, by name, the newest of a name first."""
-    return tuple(_view(row, stored_robot_file(row.text)) for row in rows.all_(session))
+    return tuple(_view(row, stored_robot_file(row.text)) for row in files.all_(session, FileKind.ROBOT))
+
+
+class InvalidPool(InvalidSpec):
+    """A pool that cannot be stored, with all its violations."""
+
+    kind, title = "invalid-pool", "The pool is invalid"
+
+
+def add_pool(store: Store, text: str | bytes) -> PoolRead:
+    """Store a pool, unless it is stored already, and return what it is; its name now means this pool.
+
+    Raises:
+        InvalidPool: it is not a pool; with every violation.
+    """
+    try:
+        pool = read_pool(text)
+    except InvalidSpec as error:
+        raise InvalidPool(error.violations) from error
+    return store.write(lambda session: _pool_view(files.put(session, FileKind.POOL, pool), pool))
+
+
+@snapshot
+def list_pools(session: Session) -> tuple[PoolRead, ...]:
+    """Return all stored pools, by name, the newest of a name first."""
+    return tuple(_pool_view(row, stored_pool(row.text)) for row in files.all_(session, FileKind.POOL))
+
+
+def _pool_view(row: FileRow, pool: Pool) -> PoolRead:
+    return PoolRead(
+        sha256=row.sha256,
+        name=row.name,
+        origin=pool.source,
+        recordings=len(pool.recordings),
+        sensors=tuple(each.name for each in pool.sensors),
+        actuators=pool.actuators,
+        seconds=pool.times_s[-1],
+        lost=pool.lost,
+        created_at=row.created_at,
+    )
 
 
 @snapshot
@@ -62,7 +102,7 @@ def robot_text(session: Session, named: str) -> str:
     Raises:
         NotFound: there is no such robot.
     """
-    row = session.get(RobotRow, storable(named)) or rows.newest(session, storable(named))
+    row = files.named(session, FileKind.ROBOT, storable(named))
     if row is None:
         raise NotFound(
             f"there is no robot {named[:64]!r}; permitted: {', '.join(robots)}, and what `gaplab robot list` lists"
@@ -71,13 +111,29 @@ def robot_text(session: Session, named: str) -> str:
 
 
 def resolved_here(store: Store, spec: S, resolve: Callable[[S], R]) -> R:
-    """Return what a spec resolves to, where its robot's name may be that of a stored robot.
+    """Return what a spec resolves to, where the names of its robot and its pool may be those of stored files.
 
     Raises:
         InvalidSpec: with every violation; that of an unknown robot has the names of the stored ones too.
     """
+    found: dict[str, Any] = {"robot": stored_ref(store, spec.robot)}
+    if spec.reality.pool is not None:
+        found["reality"] = spec.reality.model_copy(update={"pool": _stored_pool(store, spec.reality.pool)})
     with _naming_stored(store):
-        return resolve(spec.model_copy(update={"robot": stored_ref(store, spec.robot)}))
+        return resolve(spec.model_copy(update=found))
+
+
+@snapshot
+def _stored_pool(session: Session, pool: PoolRef) -> PoolRef:
+    """Return the hash of the stored pool that a name means.
+
+    Raises:
+        InvalidSpec: no such pool is stored.
+    """
+    row = files.named(session, FileKind.POOL, storable(pool.sha256 or pool.name))
+    if row is None:
+        raise InvalidSpec([unknown_name("/reality/pool", "pool", pool.name, files.names(session, FileKind.POOL))])
+    return PoolRef(name=row.name, sha256=row.sha256)
 
 
 def stored_ref(store: Store, robot: PluginRef) -> PluginRef:
@@ -111,7 +167,7 @@ def check_samples(store: Store, text: str, driven: Driven) -> SamplesRead:
 @snapshot
 def _check_stored(session: Session, sha256: str) -> None:
     """Refuse a hash that is not stored; the process may know its robot, but forgets it when it ends."""
-    if session.get(RobotRow, storable(sha256)) is None:
+    if session.get(FileRow, storable(sha256)) is None:
         message = f"no robot with the hash {sha256!r} is stored here; add its file: gaplab robot add"
         raise InvalidSpec([Violation("/robot/options/sha256", sha256, message, "the hash of a stored robot")])
 
@@ -129,13 +185,13 @@ def _with_stored_names(store: Store, violation: Violation) -> Violation:
     plugins = violation.permitted
     if violation.pointer != "/robot" or isinstance(plugins, str) or IMPORTED not in (plugins or ()):
         return violation
-    names = {*robots, *snapshot(rows.names)(store)} - {IMPORTED}
+    names = {*robots, *snapshot(files.names)(store, FileKind.ROBOT)} - {IMPORTED}
     return unknown_name("/robot", "robot", str(violation.value), sorted(names))
 
 
 @snapshot
 def _newest(session: Session, name: str) -> PluginRef | None:
-    row = rows.newest(session, storable(name))
+    row = files.newest(session, FileKind.ROBOT, storable(name))
     return None if row is None else ref_of_file(row.sha256, row.name)
 
 
@@ -157,7 +213,7 @@ def _entry(found: RobotRead) -> PluginRead:
     return entry.model_copy(update={"details": details})
 
 
-def _view(row: RobotRow, file: RobotFile) -> RobotRead:
+def _view(row: FileRow, file: RobotFile) -> RobotRead:
     world = file.world
     return RobotRead.filled_from(
         row,

@@ -1,0 +1,271 @@
+"""Import of pools: tables and files that a robot's sensors filled are checked line by line, and become recordings."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gaplab.api.clients.errors import library
+from gaplab.api.clients.trace_files import lerobot_to_csv, mapped, trace_csv
+from gaplab.api.library.robots import AnyRobot, read_robot
+from gaplab.schemas.traces import TRACE_COLUMNS
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.csv_tables import CsvRow, csv_text, finite, read_csv
+from gaplab.services.world.logs import Trace, read_trace
+from gaplab.services.world.motions import Start
+from gaplab.services.world.pools import DIRECTIONS, JOINTS, PLACES, Channel, Pool, Recorded, said
+from gaplab.services.world.traces import unlikely_joints
+from gaplab.services.world.world import World
+
+NOISES = {"place": 0.002, "direction": 0.02, "angle": 0.002, "speed": 0.05, "torque": 0.05}
+"""Standard deviations of sensors by default: m, no unit, rad, rad/s and N·m."""
+
+DECIMALS = 6
+"""Decimals that a pool keeps."""
+
+GAP = 4.0
+"""How many usual intervals without a line are a gap, in which nothing is read."""
+
+_VELOCITIES = "vx", "vy", "vz"
+_TURNING = "wx", "wy", "wz"
+_BASE = re.compile(rf"({'|'.join((*TRACE_COLUMNS, *_VELOCITIES, *_TURNING))})(?:_(?:m|rad))?(?:_s)?")
+"""A column of the base, whose name may end in its unit."""
+
+
+@dataclass(frozen=True)
+class PoolOptions:
+    """What becomes of a table or a folder.
+
+    Attributes:
+        columns: by joint, or `*` for all others, its name in the tables, and how it counts; see `Bench.attach_trace`.
+        recording: the column that names the recording of a line.
+        sensors: groups to read: `base` and `angle`, `speed`, `torque`; empty: the base if it moves, and angles.
+        noises: standard deviations in place of `NOISES`.
+        seconds: longest part of a recording, from its beginning; None: all.
+        every_s: interval of the readings; None: that of the lines.
+        confirmed: take unlikely recordings.
+        skip: leave recordings with errors out, and say so, instead of refusing all.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    recording: str = "recording"
+    sensors: Sequence[str] = ()
+    noises: Mapping[str, float] = field(default_factory=dict)
+    seconds: float | None = None
+    every_s: float | None = None
+    confirmed: bool = False
+    skip: bool = False
+
+
+class _Part(NamedTuple):
+    """The lines of one recording: its name, its table, and how many lines of the file are before them."""
+
+    name: str
+    text: str
+    before: int
+
+
+class _Read(NamedTuple):
+    """A recording that was read, and its first row by heading."""
+
+    name: str
+    trace: Trace
+    first: Mapping[str, str]
+
+
+def import_pool(source: str | Path, robot: AnyRobot, name: str, options: PoolOptions | None = None) -> Pool:
+    """Return the pool of a table with a line for each time and a column that names the recording, or of a folder.
+
+    A table is CSV or Parquet. A folder has a file for each recording, in CSV or MCAP, or is a LeRobot data set.
+
+    Raises:
+        InvalidSpec: with every error, at the recording that has it; messages have the line and what is permitted.
+        ExtraMissing: what reads Parquet or MCAP is not installed.
+        ValueError: a file cannot be read.
+    """
+    chosen, world, path = options or PoolOptions(), read_robot(robot).world, Path(source)
+    found, errors, lost = list[_Read](), list[Violation](), list[str]()
+    names = set[str]()
+    for part in _parts(path, chosen):
+        try:
+            read = _read(part, chosen, world)
+            told = [] if chosen.confirmed else list(unlikely_joints(read.trace, world))
+            told += [f"two motions are named {part.name}"] * (part.name in names)
+            told += _unlike(read.trace, found[0] if found else read, chosen)
+            wrong = [Violation(f"/{part.name}", None, each) for each in told]
+            found += [] if wrong else [read]
+        except InvalidSpec as error:
+            wrong = list(error.violations)
+        names.add(part.name)
+        errors += [_moved(each, part.before) for each in wrong]
+    if errors and not (chosen.skip and found):
+        raise InvalidSpec({each.message: each for each in reversed(errors)}.values())
+    lost += sorted({f"{each.pointer[1:]} is left out: {each.message}"[:900] for each in errors})
+    return _pool(found, world, chosen, name, path.name, lost)
+
+
+def _unlike(trace: Trace, first: _Read, options: PoolOptions) -> Iterator[str]:
+    """Yield that a recording has other columns than the first, or ends before anything is read."""
+    if differ := {*(trace.headings or ())} ^ {*(first.trace.headings or ())}:
+        yield f"its columns are not those of {first.name}: {', '.join(sorted(differ))}"
+    if options.every_s and (lasts := trace.times_s[-1] - trace.times_s[0]) < options.every_s:
+        yield f"it lasts {lasts:g} s, and the interval of readings, {options.every_s:g} s, is longer"
+
+
+def _parts(path: Path, options: PoolOptions) -> Iterator[_Part]:
+    if path.is_dir() and (path / "meta" / "info.json").is_file():
+        for episode in range(json.loads((path / "meta" / "info.json").read_text("utf-8"))["total_episodes"]):
+            yield _Part(f"episode {episode}", lerobot_to_csv(path, episode), 0)
+    elif path.is_dir():
+        for file in sorted(each for each in path.iterdir() if each.suffix.lower() in {".csv", ".mcap"}):
+            yield _Part(file.stem, trace_csv(file).decode(), 0)
+    else:
+        yield from _of_table(path, options.recording)
+
+
+def _of_table(path: Path, column: str) -> Iterator[_Part]:
+    header, rows, _ = read_csv(_parquet_csv(path) if path.suffix.lower() == ".parquet" else path.read_text("utf-8"))
+    if column not in header.cells:
+        columns = ", ".join(header.cells)[:500]
+        raise InvalidSpec([Violation("/", column, f"line 1: no column {column!r} names the recordings", columns)])
+    place = header.cells.index(column)
+
+    def named(row: CsvRow) -> str:
+        return row.cells[place] if place < len(row.cells) else ""
+
+    for name, lines in groupby(rows, key=named):
+        some = list(lines)
+        cells = ([*row.cells[:place], *row.cells[place + 1 :]] for row in some)
+        yield _Part(name, csv_text([*header.cells[:place], *header.cells[place + 1 :]], cells), some[0].line - 2)
+
+
+def _parquet_csv(path: Path) -> str:
+    table = library("pyarrow.parquet", "lerobot").read_table(path)
+    return csv_text(table.column_names, zip(*(each.to_pylist() for each in table.columns), strict=True))
+
+
+def _read(part: _Part, options: PoolOptions, world: World) -> _Read:
+    """Return a recording; its base is read only if it moves."""
+    header, rows, _ = read_csv(part.text)
+    bare = [match[1] if (match := _BASE.fullmatch(each)) else each for each in header.cells]
+    kept = [place for place, each in enumerate(bare) if not world.fixed or each not in TRACE_COLUMNS[1:]]
+    cells = [[row.cells[place] if place < len(row.cells) else "" for place in kept] for row in rows]
+    if options.seconds is not None and "time_s" in bare:
+        cells = list(_until(cells, kept.index(bare.index("time_s")), options.seconds))
+    text = csv_text([bare[place] for place in kept], cells)
+    columns = {joint: each for joint, each in options.columns.items() if joint}
+    first = dict(zip((bare[place] for place in kept), cells[0] if cells else (), strict=False))
+    return _Read(part.name, read_trace(mapped(text, columns) if columns else text, f"/{part.name}", world), first)
+
+
+def _until(cells: Sequence[list[str]], column: int, seconds: float) -> Iterator[list[str]]:
+    """Yield the rows up to the first one after so many seconds, which readings are interpolated to."""
+    begun = finite(cells[0][column]) if cells else None
+    for row in cells:
+        yield row
+        at = finite(row[column])
+        if begun is not None and at is not None and at - begun > seconds:
+            return
+
+
+def _moved(violation: Violation, lines: int) -> Violation:
+    """Return a violation whose lines are those of the whole file, of which the first is the header."""
+    shifted = re.sub(r"\bline (?!1\b)(\d+)", lambda found: f"line {int(found[1]) + lines}", violation.message)
+    return Violation(violation.pointer, violation.value, shifted, violation.permitted)
+
+
+def _pool(found: Sequence[_Read], world: World, options: PoolOptions, name: str, source: str, lost: list[str]) -> Pool:
+    spans = [each.trace.times_s[-1] - each.trace.times_s[0] for each in found]
+    every_s = options.every_s or float(np.median(np.diff(found[0].trace.times_s)))
+    longest_s = min(max(spans), options.seconds or np.inf)
+    times_s = np.round(every_s * np.arange(1, np.floor(longest_s / every_s + 1e-6) + 1), DECIMALS)
+    first = found[0].trace
+    driven, joints = _whole(first.commands), _whole(first.angles_rad)
+    channels = tuple(_channels(options, world, joints, moving=first.positions_m is not None))
+    recordings = tuple(_recorded(each, world, channels, (driven, joints), times_s, lost) for each in found)
+    if not len(times_s) or not channels:
+        message = f"nothing is read: {len(channels)} sensors, every {every_s:g} s for {longest_s:g} s"
+        raise InvalidSpec([Violation("/", None, message, "a sensor, and an interval below the longest recording")])
+    return Pool(
+        name=name,
+        source=source,
+        lost=tuple(lost),
+        sensors=channels,
+        times_s=tuple(times_s.tolist()),
+        joints=tuple(world.joints[place].name for place in joints),
+        actuators=tuple(world.actuators[place].name for place in driven),
+        recordings=recordings,
+    )
+
+
+def _channels(options: PoolOptions, world: World, joints: Sequence[int], *, moving: bool) -> Iterator[Channel]:
+    noises, groups = {**NOISES, **options.noises}, options.sensors or ("base", "angle")
+    if moving and "base" in groups:
+        yield from (Channel(name=each, unit="m", noise=noises["place"]) for each in PLACES)
+        yield from (Channel(name=each, noise=noises["direction"]) for each in DIRECTIONS)
+    units = {"angle": ("rad", "m"), "speed": ("rad/s", "m/s"), "torque": ("N·m", "N")}
+    for group in (each for each in JOINTS if each in groups):
+        for joint in (world.joints[place] for place in joints):
+            yield Channel(name=f"{group} {joint.name}", unit=units[group][joint.slides], noise=noises[group])
+
+
+def _recorded(
+    read: _Read,
+    world: World,
+    channels: Sequence[Channel],
+    places: tuple[Sequence[int], Sequence[int]],
+    times_s: FloatArray,
+    lost: list[str],
+) -> Recorded:
+    trace, (driven, joints) = read.trace, places
+    own_s = trace.times_s - trace.times_s[0]
+    at_s = times_s[times_s <= own_s[-1] + 1e-9]
+    seen = said([each.name for each in channels], trace.at(trace.times_s[0] + np.minimum(at_s, own_s[-1])), world)
+    steps = np.diff(own_s)
+    gaps = steps > GAP * np.median(steps)
+    within = np.minimum(np.searchsorted(own_s, at_s), len(own_s) - 1)
+    seen[gaps[np.maximum(within - 1, 0)] & (own_s[within] != at_s)] = np.nan
+    lost += [f"{read.name}: nothing for {steps[each]:.3g} s after {own_s[each]:.3g} s" for each in np.flatnonzero(gaps)]
+    start = Start(
+        position_m=_row(trace.positions_m),
+        turn=_row(trace.orientations),
+        velocity_m_s=_first(read.first, _VELOCITIES),
+        turning_rad_s=_first(read.first, _TURNING),
+        angles_rad=_row(trace.angles_rad, joints),
+        speeds_rad_s=_row(trace.speeds_rad_s, joints),
+    )
+    commands = trace.commands[:, driven] if trace.commands is not None and len(driven) else np.empty((len(own_s), 0))
+    changed = np.concatenate([[len(driven) > 0], (commands[1:] != commands[:-1]).any(axis=1)]) & (own_s <= times_s[-1])
+    return Recorded(
+        name=read.name,
+        start=start,
+        times_s=tuple(_rounded(own_s[changed])),
+        commands=tuple(map(tuple, _rounded(commands[changed]))),
+        readings=tuple(tuple(None if np.isnan(x) else x for x in row) for row in _rounded(seen)),
+    )
+
+
+def _whole(values: FloatArray | None) -> list[int]:
+    """Return the columns of values in which none is missing; nothing without values."""
+    there = [] if values is None else np.flatnonzero(np.isfinite(values).all(axis=0)).tolist()
+    return [int(each) for each in there]
+
+
+def _rounded(values: FloatArray) -> list[Any]:
+    return list((np.round(values, DECIMALS) + 0.0).tolist())  # without negative zero
+
+
+def _row(values: FloatArray | None, places: Any = slice(None)) -> Any:  # noqa: ANN401 - a tuple of some length
+    """Return the first row of values, some places of it; None without values."""
+    return None if values is None else tuple(_rounded(np.nan_to_num(values[0, places])))
+
+
+def _first(row: Mapping[str, str], names: Sequence[str]) -> Any:  # noqa: ANN401 - a tuple of three numbers, or None
+    found = [finite(row.get(name, "")) for name in names]
+    return None if None in found else tuple(found)

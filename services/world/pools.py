@@ -1,0 +1,231 @@
+"""Pools: recordings of what a robot did, as a file without code, like its robot file.
+
+Sensors of a free base are `x`, `y`, `z`, and the directions of the body's x and y axes, `x axis x` to `y axis z`, which
+have no jumps as angles have. Those of joints are `angle NAME`, `speed NAME` and `torque NAME`.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar, TypeAlias
+
+import numpy as np
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.world.controllers.parts import follows_angle
+from gaplab.services.world.kinematics import rotated
+from gaplab.services.world.motions import Motion, Start, Trajectory
+from gaplab.services.world.robot_files import Lines, NamedFile, parsed
+from gaplab.services.world.sensing import AXES
+from gaplab.services.world.world import World
+
+PLACES = AXES
+DIRECTIONS = tuple(f"{body} axis {axis}" for body in AXES[:2] for axis in AXES)
+"""Sensors of a free base, in metres and without unit."""
+
+JOINTS = ("angle", "speed", "torque")
+"""What encoders say of a joint: the first word of a sensor."""
+
+MOST_BYTES = 8_000_000
+"""Largest size of a pool: an archive has it as one row. Fewer readings, or fewer decimals, make it smaller."""
+
+MOST_RECORDINGS = 10_000
+
+_Text: TypeAlias = Annotated[str, Field(min_length=1, max_length=200)]
+_Row: TypeAlias = tuple[float, ...]
+
+
+class Channel(Frozen):
+    """A sensor: its name, its unit, and the standard deviation of its noise in that unit."""
+
+    name: _Text
+    unit: Annotated[str, Field(max_length=20)] = ""
+    noise: Annotated[float, Field(gt=0)]
+
+
+class Recorded(Frozen):
+    """A recording: one motion.
+
+    Attributes:
+        name: unlike that of all others of the pool.
+        start: how it began; its joints are those of the pool, and what is left out is as the world has it.
+        times_s: `(k,)`, ascending from 0: when commands changed.
+        commands: `(k, a)`: the commands of the pool's actuators from each time on.
+        readings: `(r, s)`: a row for each of the pool's times up to its end; null where a sensor failed.
+    """
+
+    name: _Text
+    start: Start = Start()
+    times_s: _Row = ()
+    commands: tuple[_Row, ...] = ()
+    readings: Annotated[tuple[tuple[float | None, ...], ...], Field(min_length=1)]
+
+
+class Pool(NamedFile):
+    """Recordings of one robot.
+
+    Attributes:
+        source: where they come from, in words.
+        lost: what the import left out or changed, line by line.
+        sensors: what was read.
+        times_s: `(r,)`, ascending: seconds from the beginning of a recording at which all sensors were read.
+        joints: those whose angles and speeds recordings begin with.
+        actuators: those that were commanded.
+        recordings: at least one.
+    """
+
+    what: ClassVar[str] = "pool"
+    most_bytes: ClassVar[int] = MOST_BYTES
+
+    source: Annotated[str, Field(max_length=1_000)] = ""
+    lost: Lines = ()
+    sensors: Annotated[tuple[Channel, ...], Field(min_length=1, max_length=1_000)]
+    times_s: Annotated[_Row, Field(min_length=1)]
+    joints: tuple[_Text, ...] = ()
+    actuators: tuple[_Text, ...] = ()
+    recordings: Annotated[tuple[Recorded, ...], Field(min_length=1, max_length=MOST_RECORDINGS)]
+
+    def readings(self, number: int) -> FloatArray:
+        """Return `(r, s)`: what the sensors said in a recording, in their units; nan after its end."""
+        given = np.array(self.recordings[number].readings, dtype=np.float64)  # None becomes nan
+        table = np.full((len(self.times_s), len(self.sensors)), np.nan)
+        table[: len(given)] = given
+        return table
+
+    def motion(self, number: int, world: World) -> Motion:
+        """Return the motion of a recording: its commands, from its start; other actuators rest."""
+        recorded, start = self.recordings[number], self.recordings[number].start
+        angles = self._of_joints(start.angles_rad, world, [joint.start for joint in world.joints])
+        speeds = self._of_joints(start.speeds_rad_s, world, [0.0] * len(world.joints))
+        begun = dict(zip((joint.name for joint in world.joints), angles or (), strict=False))
+        rest = [begun.get(each.name, each.start) if follows_angle(each) else 0.0 for each in world.actuators]
+        times_s = frozen(recorded.times_s or [0.0])
+        targets = np.tile(rest, (len(times_s), 1))
+        places = {joint.name: place for place, joint in enumerate(world.actuators)}
+        for column, name in enumerate(self.actuators if recorded.times_s else ()):
+            targets[:, places[name]] = [row[column] for row in recorded.commands]
+        start = replace(start, angles_rad=angles, speeds_rad_s=speeds)
+        until_s = float(self.times_s[len(recorded.readings) - 1])
+        return Motion(times_s, frozen(targets), frozen(self.times_s), start=start, until_s=until_s)
+
+    def _of_joints(self, given: _Row | None, world: World, others: Sequence[float]) -> _Row | None:
+        known = dict(zip(self.joints, given or (), strict=False))
+        found = (known.get(joint.name, other) for joint, other in zip(world.joints, others, strict=True))
+        return None if given is None else tuple(found)
+
+    @property
+    def commands(self) -> FloatArray | None:
+        """Return `(n, r · a)`: the commands at the pool's times, over their deviation; None without any."""
+        if not self.actuators:
+            return None
+        table = np.full((len(self.recordings), len(self.times_s), len(self.actuators)), np.nan)
+        for row, each in zip(table, self.recordings, strict=True):
+            at = np.searchsorted(each.times_s, self.times_s[: len(each.readings)], side="right") - 1
+            row[: len(each.readings)] = np.array(each.commands)[np.maximum(at, 0)]
+        deviation = np.nanstd(table, axis=(0, 1))
+        return frozen((table / np.where(deviation > 0, deviation, 1.0)).reshape(len(table), -1))
+
+
+EXAMPLE = Pool(
+    name="example",
+    sensors=tuple(Channel(name=axis, unit="m", noise=0.005) for axis in PLACES),
+    times_s=(0.25, 0.5),
+    recordings=tuple(Recorded(name=name, readings=((0.0, 0.0, 0.1),)) for name in ("first", "second")),
+)
+"""A pool for any robot: it rests, twice."""
+
+
+def read_pool(text: str | bytes) -> Pool:
+    """Return the pool of a file's text, checked.
+
+    Raises:
+        InvalidSpec: with every violation; pointers are places in the file.
+    """
+    pool = parsed(Pool, text)
+    if violations := list(pool_violations(pool)):
+        raise InvalidSpec(violations)
+    return pool
+
+
+def stored_pool(text: str) -> Pool:
+    """Return the pool of a text that was checked when it was stored."""
+    return parsed(Pool, text)
+
+
+def pool_violations(pool: Pool) -> Iterator[Violation]:
+    """Yield what is inconsistent in a pool: names that occur twice, times that do not ascend, rows of wrong length."""
+    lists = {"sensors": [each.name for each in pool.sensors], "joints": pool.joints, "actuators": pool.actuators}
+    for place, names in {**lists, "recordings": [each.name for each in pool.recordings]}.items():
+        for name, count in Counter(names).items():
+            if count > 1:
+                yield Violation(f"/{place}", name, f"{count} {place} are named {name}; each name is permitted once")
+    yield from _time_violations("/times_s", pool.times_s)
+    for number, each in enumerate(pool.recordings):
+        for violation in _recording_violations(pool, each):
+            yield violation.moved("", f"/recordings/{number}")
+
+
+def _recording_violations(pool: Pool, each: Recorded) -> Iterator[Violation]:
+    yield from _time_violations("/times_s", each.times_s)
+    began = [each.start.angles_rad or pool.joints, each.start.speeds_rad_s or pool.joints]
+    tables: tuple[tuple[str, Sequence[Sequence[Any]], int], ...] = (
+        ("readings", each.readings, len(pool.sensors)),
+        ("commands", each.commands, len(pool.actuators)),
+        ("start", began, len(pool.joints)),
+    )
+    for name, rows, width in tables:
+        if wrong := {len(row) for row in rows} - {width}:
+            message = f"a row of the {name} of recording {each.name} has {min(wrong)} numbers, not {width}"
+            yield Violation(f"/{name}", min(wrong), message, f"exactly {width}")
+    if len(each.commands) != len(each.times_s) or (bool(pool.actuators) != bool(each.times_s)):
+        message = f"recording {each.name} has {len(each.commands)} commands at {len(each.times_s)} times"
+        yield Violation("/commands", len(each.commands), message, "one of each actuator at each time")
+    if len(each.readings) > len(pool.times_s):
+        message = f"recording {each.name} has {len(each.readings)} readings, and the pool {len(pool.times_s)} times"
+        yield Violation("/readings", len(each.readings), message, f"at most {len(pool.times_s)}")
+
+
+def _time_violations(pointer: str, times_s: Sequence[float]) -> Iterator[Violation]:
+    for place, (before, after) in enumerate(zip((-1e-9, *times_s), times_s, strict=False)):
+        if after <= before:
+            yield Violation(
+                f"{pointer}/{place}", after, f"times ascend from 0, and {after} follows {before}", "ascending"
+            )
+            return
+
+
+def fit_violations(pool: Pool, world: World, robot: str, pointer: str) -> Iterator[Violation]:
+    """Yield sensors, joints and actuators of a pool that a robot lacks."""
+    joints, actuators = ([each.name for each in some] for some in (world.joints, world.actuators))
+    sensors = {*PLACES, *DIRECTIONS, *(f"{what} {joint}" for what in JOINTS for joint in joints)}
+    named = (
+        ("sensor", [each.name for each in pool.sensors], sorted(sensors)),
+        ("joint", pool.joints, joints),
+        ("actuator", pool.actuators, actuators),
+    )
+    for what, names, there in named:
+        for name in names:
+            if name not in there:
+                message = f"the pool {pool.name} has the {what} {name!r}, which the {robot} lacks"
+                yield Violation(pointer, name, message, there)
+
+
+def said(names: Sequence[str], seen: Trajectory, world: World) -> FloatArray:
+    """Return `(..., t, s)`: what sensors of these names say of a trajectory; nan of joints that it does not have."""
+    told = dict(zip(JOINTS, (seen.angles_rad, seen.speeds_rad_s, seen.torques_nm), strict=True))
+    places = {joint.name: place for place, joint in enumerate(world.joints)}
+
+    def one(name: str) -> FloatArray:
+        if name in PLACES:
+            return seen.positions_m[..., PLACES.index(name)]
+        if name in DIRECTIONS:
+            axis, along = divmod(DIRECTIONS.index(name), 3)
+            return rotated(seen.orientations, np.eye(3)[axis])[..., along]
+        what, _, joint = name.partition(" ")
+        values = told[what]
+        return np.full(seen.positions_m.shape[:-1], np.nan) if values is None else values[..., places[joint]]
+
+    return np.stack([one(name) for name in names], axis=-1)

@@ -1,0 +1,212 @@
+"""Recorded reality: a pool that an engine made in place of a robot, and what strategies and users do with it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+import gaplab
+from gaplab.api.app import create_app
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.archives.rerunning import verify
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.experiments import stored_files
+from gaplab.services.specs.resolution import resolve, resolve_experiment
+from gaplab.services.store.session import Store
+from gaplab.services.world import robot_library
+from gaplab.services.world.pools import read_pool
+from tests.recordings import TRUTH, arm_and_pool
+
+pytest.importorskip("mujoco")
+
+TELLS_APART = [
+    "random",
+    "informative",
+    "farthest",
+    {"name": "estimation_exploration", "options": {"select": "disagreement"}},
+    {
+        "name": "weighted",
+        "options": {"fit_weight": 0.0, "disagreement_weight": 0.0, "information_weight": 1.0},
+    },
+]
+SPEC: dict[str, Any] = {
+    "engine": "mujoco",
+    "tunables": list(TRUTH),
+    "budget": {"preset": "smoke", "simulator_evaluations": 40},
+    "tuner": "gauss_newton",
+}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    return arm_and_pool(tmp_path_factory.mktemp("pool"))
+
+
+def spec_of(files: tuple[Path, Path], **fields: Any) -> dict[str, Any]:
+    arm, pool = files
+    reality = {"kind": "recorded", "pool": str(pool), **fields.pop("reality", {})}
+    return {**SPEC, "robot": str(arm), "reality": reality, **fields}
+
+
+@pytest.fixture(scope="module")
+def result(files: tuple[Path, Path]) -> Any:
+    strategies = [*TELLS_APART, "direct"]
+    return gaplab.run(spec_of(files, strategies=strategies, repetitions=1, iterations=2), workers=2, progress=False)
+
+
+def test_strategies_without_fitness_select_each_recording_once_and_never_one_that_is_held_out(result: Any) -> None:
+    samples = result.samples
+    held_out = {0, 1, 2, 3, 4, 5, 6, 7} - set(samples.gene_0.astype(int))
+
+    assert len(samples) == 2 * len(TELLS_APART)
+    assert not samples.duplicated(["experiment", "repetition", "gene_0"]).any()
+    assert len(held_out) >= 2  # a fifth of eight, rounded
+
+
+def test_the_error_on_held_out_recordings_falls_and_the_fit_on_the_whole_pool_is_the_baseline(result: Any) -> None:
+    curve = result.curve.set_index(["strategy", "evaluations"])["mean"]
+
+    assert set(curve.index.get_level_values("strategy")) == {
+        "random",
+        "informative",
+        "farthest",
+        "estimation_exploration",
+        "weighted",
+        "direct",
+    }
+    assert -0.5 < curve["direct", 0] < 0.0  # it errs by less than half of the untuned simulator
+    assert curve["random", 2] > curve["random", 0]
+
+
+def test_the_figure_has_the_error_and_the_number_of_recordings(result: Any) -> None:
+    svg = result.figure().content("svg").decode()
+
+    assert "Error on held-out recordings" in svg
+    assert "Number of recordings used" in svg
+
+
+def test_a_tuning_on_a_pool_identifies_what_made_it(files: tuple[Path, Path]) -> None:
+    arm, pool = files
+    tuning = gaplab.Tuning(arm, list(TRUTH), pool=pool, engine="mujoco", progress=False)
+
+    found = tuning.simulator
+
+    assert found.values == pytest.approx(TRUTH, rel=0.05)
+    assert found.held_out_error is not None
+    assert found.held_out_error < 1.5  # times the noise of the sensors
+
+
+def test_a_repetition_gives_the_same_bits_again(result: Any, tmp_path: Path) -> None:
+    archive = result.save(tmp_path / "study.zip")
+    robot_library._known.clear()
+
+    with archive.open("rb") as file:
+        found = verify(file)
+
+    assert [each.outcome for each in found.repetitions] == ["same"] * (len(TELLS_APART) + 1)
+
+
+def test_each_repetition_may_hold_out_one_recording_which_tells_what_the_others_say_of_it(
+    files: tuple[Path, Path],
+) -> None:
+    spec = spec_of(files, strategies=["direct"], repetitions=8, reality={"held_out": "each"})
+    found = gaplab.run(spec, workers=2, progress=False)
+
+    errors = found.simulators.held_out_error
+
+    assert len(errors) == 8
+    assert errors.nunique() == 8
+    assert len(found.samples) == 0
+
+
+REFUSED: dict[str, tuple[dict[str, Any], str, str]] = {
+    "a strategy of fitness": ({"strategy": "simulated_fit"}, "/strategy", "recordings have none"),
+    "estimation_exploration as in robotics": ({"strategy": "estimation_exploration"}, "/strategy", "have none"),
+    "weighted with fitness": ({"strategy": "weighted"}, "/strategy", "random"),
+    "fitness to compare": ({"discrepancy": "huber"}, "/discrepancy", '"permitted": ["readings"]'),
+    "a controller": ({"controller": "sine"}, "/controller", "left out"),
+    "more recordings than there are": ({"iterations": 7}, "/iterations", "at most 6"),
+    "held-out samples": ({"held_out": 0.2}, "/held_out", "0, or left out"),
+    "a bench": ({"reality": {"bench": "desk"}}, "/reality/bench", "left out"),
+    "hidden parameters": ({"reality": {"parameters": {"joint_damping": 1.0}}}, "/reality/parameters", "left out"),
+    "no pool": ({"reality": {"pool": None}}, "/reality/pool", "a pool that is stored"),
+    "another robot": ({"robot": "quadruped"}, "/reality/pool", "which the quadruped lacks"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_a_recorded_reality_does_not_have_is_refused_with_place_and_what_is_permitted(
+    case: str, files: tuple[Path, Path], sqlite_store: Store
+) -> None:
+    fields, pointer, words = REFUSED[case]
+    store = sqlite_store
+    stored_files.add_robot(store, files[0].read_bytes())
+    stored_files.add_pool(store, files[1].read_bytes())
+    reality = {"kind": "recorded", "pool": "swings", **fields.pop("reality", {})}
+    spec = {**SPEC, "robot": "arm", "strategy": "random", "reality": reality, **fields}
+    http = TestClient(create_app(store))
+
+    answer = http.post("/experiments", json=spec)
+
+    assert answer.status_code == 422
+    assert pointer in answer.text
+    assert words in json.dumps(answer.json(), ensure_ascii=False)
+    assert http.get("/studies").json()["items"] == []
+
+
+def test_a_pool_is_stored_once_listed_and_travels_in_archives(
+    result: Any, files: tuple[Path, Path], tmp_path: Path, sqlite_store: Store
+) -> None:
+    http, pool = TestClient(create_app(sqlite_store)), read_pool(files[1].read_bytes())
+    archive = result.save(tmp_path / "study.zip")
+
+    imported = http.post("/import", content=archive.read_bytes(), headers={"Content-Type": "application/zip"})
+    again = http.post("/pools", json=pool.content)
+
+    assert imported.status_code == 201, imported.text
+    assert again.status_code == 201
+    (listed,) = http.get("/pools").json()
+    assert listed["sha256"] == pool.sha256 == again.json()["sha256"]
+    assert listed["recordings"] == 8
+
+
+def test_a_stored_spec_has_the_hash_of_its_pool_and_resolves_to_itself(files: tuple[Path, Path], store: Store) -> None:
+    pool = read_pool(files[1].read_bytes())
+    stored_files.add_robot(store, files[0].read_bytes())
+    stored_files.add_pool(store, pool.text)
+    reality = {"kind": "recorded", "pool": "swings"}
+    spec = ExperimentSpec.model_validate({**SPEC, "robot": "arm", "strategy": "random", "reality": reality})
+
+    found = stored_files.resolved_here(store, spec, resolve_experiment)
+
+    assert found.reality.pool is not None
+    assert found.reality.pool.sha256 == pool.sha256
+    assert found.iterations == 6  # all that are not held out
+    assert resolve(found)[0] == found
+
+
+BROKEN: dict[str, tuple[dict[str, Any], str, str]] = {
+    "two of one name": ({"name": "swing 1"}, "/recordings", "each name is permitted once"),
+    "a column too few": ({"readings": [[0.1, 0.2]]}, "/recordings/0/readings", "exactly 3"),
+    "a clock that runs backwards": ({"times_s": [0.4, 0.0]}, "/recordings/0/times_s/1", "0.0 follows 0.4"),
+    "commands without times": ({"times_s": [0.0]}, "/recordings/0/commands", "2 commands at 1 times"),
+    "too many readings": ({"readings": [[0, 0, 0]] * 11}, "/recordings/0/readings", "at most 10"),
+    "nan": ({"readings": [[0, float("nan"), 0]]}, "/recordings/0/readings/0/1", "finite"),
+    "a start of other joints": ({"start": {"angles_rad": [0.1]}}, "/recordings/0/start", "exactly 0"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_pool_is_refused_with_every_place(case: str, files: tuple[Path, Path]) -> None:
+    change, pointer, words = BROKEN[case]
+    content = json.loads(files[1].read_bytes())
+    content["recordings"][0] |= change
+
+    with pytest.raises(InvalidSpec) as refused:
+        read_pool(json.dumps(content))
+
+    found = [each for each in refused.value.violations if each.pointer == pointer]
+    assert found
+    assert words in str(refused.value) or words in str(found[0].permitted)
