@@ -27,7 +27,7 @@ EACH = {
     "joint_damping({})": (0.0, 1.0),
     "bias({})": (-0.1, 0.1),
 }
-SHARED = {"joint_armature": (0.0, 0.1), "motor_delay": (0.0, 0.05)}
+SHARED = {"armature": (0.0, 0.1), "delay": (0.0, 0.1)}
 
 
 def tunables() -> list[dict[str, Any]]:

@@ -7,21 +7,25 @@ A process is a new Python that imports gaplab alone: not the program that starte
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from time import monotonic
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
+from gaplab.services.core.errors import PluginBroken
 from gaplab.services.plugins.folders import PluginDiffers
+from gaplab.services.specs.blame import describe
 from gaplab.services.specs.resolution import hardware_of
 from gaplab.services.store.lease import Claim
 from gaplab.workers.errors import ClusterUnusable, TaskLost
 from gaplab.workers.expected import Versions, check_here, plugins_of, versions
 from gaplab.workers.permits import Key
 from gaplab.workers.task import Batch, delivered, give_back_memory, prepared
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -156,6 +160,49 @@ class NoChecks:
         """None was taken."""
 
 
+def computed(calls: Sequence[Callable[[], T]], processes: int) -> Iterator[tuple[int, T]]:
+    """Yield number and result of each call as it ends, in so many processes, or in this one; all can be pickled.
+
+    Raises:
+        PluginBroken: a call in another process raised an error.
+        TaskLost: a process has ended.
+    """
+    left, running = enumerate(calls), dict[Any, tuple[Process, int]]()
+    if processes == 1:
+        yield from ((number, call()) for number, call in left)
+        return
+    with ExitStack() as ends:
+        idle = [Process("") for _ in range(min(processes, len(calls)))]
+        for process in idle:
+            ends.callback(process.end)
+        while True:
+            for process, (number, call) in zip(idle, left, strict=False):
+                process.connection.send(call)
+                running[process.connection] = process, number
+            if not running:
+                return
+            pairs = [running.pop(connection) for connection in wait([*running])]
+            idle = [process for process, _ in pairs]
+            yield from ((number, _received(process)) for process, number in pairs)
+
+
+def _received(process: Process) -> Any:  # noqa: ANN401 - what the call returns
+    try:
+        result = process.connection.recv()
+    except (EOFError, OSError) as error:
+        raise TaskLost(f"the worker was lost: it ended with code {process.end()}") from error
+    if isinstance(result, PluginBroken):
+        raise result
+    return result
+
+
+def _answered(call: Callable[[], Any]) -> Any:  # noqa: ANN401 - what it returns
+    try:
+        return call()
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
+        return PluginBroken(describe(error))
+
+
 def main(descriptor: int) -> None:
     """Compute what arrives over the connection, until it closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -165,6 +212,8 @@ def main(descriptor: int) -> None:
             work = connection.recv()
             if isinstance(work, Work):
                 _compute(connection, work)
+            elif callable(work):
+                connection.send(_answered(work))
 
 
 def _compute(connection: "Connection[Any, Any]", work: Work) -> None:

@@ -51,7 +51,7 @@ def compute(store: Store, id_: str, last: type[Step] | None, until: float, *, pr
         raise Conflict(others if found.refused_by else "another process goes on with it")
     (claim,) = claims
     try:
-        with _shown(progress) as show:
+        with shown(progress) as show:
             emit = partial(_deliver, store, claim, last, until, show)
             StepRecorder(emit, EVERY_S, claim.log, claim.checkpoints).run(setting(claim.spec, claim.number))
         execution.complete(store, claim)
@@ -67,7 +67,7 @@ def _deliver(
     claim: Claim,
     last: type[Step] | None,
     until: float,
-    show: Callable[[Checkpoint], object],
+    show: Callable[[str], object],
     item: Delivered | Pulse,
 ) -> None:
     """Keep what was computed, and end the computation if nothing else is to be computed now."""
@@ -76,7 +76,7 @@ def _deliver(
     if isinstance(item, TimedStep | Checkpoint) and not held:
         raise Conflict("another process goes on with it, so this one has ended its part")
     if isinstance(item, Checkpoint):
-        show(item)
+        show(f"{kind_at(item.step)[1]}: {item.rollouts:,} of {item.budget:,} rollouts")
     if isinstance(item, TimedStep) and last is not None and isinstance(item.step, last):
         raise _Ended
     if held and monotonic() > until:
@@ -84,8 +84,8 @@ def _deliver(
 
 
 @contextmanager
-def _shown(progress: bool | None) -> Iterator[Callable[[Checkpoint], object]]:
-    """Yield a function that shows how far a long step is; what takes no checkpoint is not shown."""
+def shown(progress: bool | None) -> Iterator[Callable[[str], object]]:
+    """Yield a function that shows how far a computation is, in a line of text."""
     screen, notebook = console(stderr=True), in_notebook()
     if not (notebook or screen.is_terminal if progress is None else progress):
         yield lambda _: None
@@ -94,4 +94,4 @@ def _shown(progress: bool | None) -> Iterator[Callable[[Checkpoint], object]]:
         live = None if notebook else ends.enter_context(Live(console=screen, auto_refresh=False, transient=True))
         place = cell() if live is None else partial(live.update, refresh=True)
         ends.callback(place, "")
-        yield lambda part: place(f"{kind_at(part.step)[1]}: {part.rollouts:,} of {part.budget:,} rollouts")
+        yield place

@@ -64,6 +64,7 @@ class _Simulator(_Checked):
     weight: float = 0.0
     held_out_error: float = 0.0
     fit: list[float | None] = []
+    noise: list[float] = []
 
 
 class _Body(_Checked):
@@ -235,7 +236,11 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
         owner is None
         or number >= owner["spec"]["repetitions"]
         or row.get("iteration", 0) >= owner["iterations"]
-        or any(len(each["parameters"]) != len(owner["spec"]["tunables"]) for each in simulators)
+        or any(
+            len(each["parameters"]) != len(owner["spec"]["tunables"])
+            or len(each.get("noise", each["parameters"])) != len(each["parameters"])
+            for each in simulators
+        )
     ):
         raise InvalidArchive(f"a row of {table} does not fit its experiment: {str(row)[:200]}")
     if owner["robot"] is not None and (wrong := [*_moves_it_wrongly(table, row, owner["robot"])]):

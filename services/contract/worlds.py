@@ -165,8 +165,8 @@ def edits_its_field_alone(plugin: type[Tunable]) -> None:
     world = subject(tunable)
     before = flattened(asdict(world))
     after = flattened(asdict(tunable.edit(world, _another(tunable, tunable.read(world)))))
-    places = [place for place in before if place.split(".")[0] not in OF_NO_FIELD]
-    changed = sorted({_field(place) for place in places if before[place] != after.get(place)})
+    places = [place for place in before | after if place.split(".")[0] not in OF_NO_FIELD]
+    changed = sorted({_field(place) for place in places if before.get(place) != after.get(place)})
     permitted = {tunable.field.rpartition(".")[2], *tunable.also}
     same = bool(changed) and all(permitted & set(field.split(".")) for field in changed)
     assert same, f"it declares the field {tunable.field!r}, and changes {', '.join(changed) or 'nothing'}"

@@ -62,12 +62,15 @@ class Fit:
         interval_scale: factor of the half widths of intervals, at least 1.
         reading_errors: `(q,)`: root mean square difference of each reading over samples, in units of its noise; empty
             unless readings were compared.
+        noise: `(p,)`: standard deviation of each tunable by the noise of the measurements alone; empty if it was not
+            computed.
     """
 
     expected_error: float
     surprise: float
     interval_scale: float
     reading_errors: FloatArray = field(default_factory=no_readings)
+    noise: FloatArray = field(default_factory=no_readings)
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,6 +53,7 @@ USES: Mapping[str, Uses] = MappingProxyType(
         "ground_m": lambda world: bool(world.ground_m),
         "joint.start": _joints(lambda joint: joint.start),
         "joint.static_friction": _joints(lambda joint: joint.static_friction),
+        "joint.stribeck_speed": _joints(lambda joint: joint.static_friction),
         "joint.turn": _joints(lambda joint: joint.turn != UNTURNED),
         "motor.delay_s": _motors(lambda motor: motor.delay_s),
         "motor.follows": _motors(lambda motor: motor.follows != "position"),

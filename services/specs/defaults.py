@@ -18,7 +18,7 @@ from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.recorded import is_recorded, recorded_reality
 from gaplab.services.world.robots.base import Robot
-from gaplab.services.world.tunables.base import Tunable
+from gaplab.services.world.tunables.base import BETWEEN, Tunable
 from gaplab.services.world.tunables.labels import label_of, proper, tunable_of
 from gaplab.services.world.world import World
 
@@ -134,8 +134,8 @@ def bounds_of(ref: TunableRef, tunable: Tunable, robot: Robot) -> tuple[float, f
 
 
 def honoured(tunable: Tunable, engine: type[Engine]) -> bool:
-    """Return whether a tunable changes what an engine simulates; noise is put into motions, so each engine has it."""
-    return tunable.field == "noise" or tunable.field in engine.honours
+    """Return whether a tunable changes what an engine simulates, or what lies between it and the sensors."""
+    return tunable.field in BETWEEN or tunable.field in engine.honours
 
 
 SIMULATED_PROBES, PHYSICAL_PROBES = "each", "last"

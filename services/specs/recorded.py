@@ -70,10 +70,15 @@ def with_recordings(spec: ExperimentSpec) -> ExperimentSpec:
     return spec.model_copy(update=changes)
 
 
-def recorded_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) -> Iterator[Violation]:
-    """Yield what a recorded reality does not have: other robots, fitness, fields of other realities, iterations."""
+def check_recordings(spec: ExperimentSpec, robot: Robot) -> None:
+    """Raise InvalidSpec, with every violation, if a spec's recordings are of another robot."""
+    if is_recorded(spec) and (found := list(fit_violations(pool_of(spec), robot.world, robot.label, "/reality/pool"))):
+        raise InvalidSpec(found)
+
+
+def recorded_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Violation]:
+    """Yield what a recorded reality does not have: fitness, fields of other realities, iterations."""
     pool, reality = pool_of(spec), spec.reality
-    yield from fit_violations(pool, robot.world, robot.label, "/reality/pool")
     usual = RealitySpec()
     for name in OF_OTHERS:
         if (given := getattr(reality, name)) != getattr(usual, name):

@@ -42,7 +42,7 @@ from gaplab.services.specs.defaults import (
     with_usual_tunables,
 )
 from gaplab.services.specs.measured import bench_violations
-from gaplab.services.specs.recorded import is_recorded, pool_of, selectable, with_recordings
+from gaplab.services.specs.recorded import check_recordings, is_recorded, pool_of, selectable, with_recordings
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.violations import (
     budget_violations,
@@ -78,6 +78,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     """
     spec, preset = with_recordings(with_preset(spec)), PRESETS[spec.budget.preset]
     robot, strategy, controllers, simulators, discrepancy, tuner = _created(spec)
+    check_recordings(spec, robot)  # a motion of another robot says nothing
     spec = with_usual_tunables(spec, robot)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
     own = spec.reality.engine if spec.reality.kind == "simulated" else None

@@ -1,6 +1,6 @@
 """The simulation of a robot on an engine, in worlds that tunables edit; and what it forecasts for a physical robot."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from operator import itemgetter
@@ -14,10 +14,12 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.engines.base import Engine
+from gaplab.services.world.controllers.parts import middles
+from gaplab.services.world.kinematics import started
 from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory, commands_at
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.safety import MOST_SIMULATORS, Extremes, extremes, recording_times, safety
-from gaplab.services.world.sensing import QUIET, disturbed
+from gaplab.services.world.sensing import QUIET, biases, disturbed
 from gaplab.services.world.tunables.base import Tunable
 from gaplab.services.world.world import World
 
@@ -64,6 +66,8 @@ class Simulation:
         if np.shape(values) != expected:
             found = f"robot {self._robot.label!r} returned readings of shape {np.shape(values)}"
             raise PluginBroken(f"{found}; permitted: {expected}")
+        if any(world.biases for world in worlds):
+            values = values + np.array([biases(world, sensors.names) for world in worlds])[:, None]
         outcomes = np.empty((len(genomes), len(parameters), 1 + sensors.size))
         outcomes[..., 0], outcomes[..., 1:] = fitnesses, sensors.standardised(values)
         for row, motion in zip(outcomes, motions, strict=True):
@@ -85,7 +89,8 @@ class Simulation:
         """Return the world of a simulator `(p,)`, and the rollout of a genome in it, recorded at times `(k,)` too."""
         world = self.world(parameters)
         motion = self._motion(genome)
-        found = self._engine.record(world, disturbed(world, motion, genome), times_s)
+        (sent,) = _disturbed(world, [motion], genome[None])
+        found = self._engine.record(world, sent, times_s)
         return world, replace(found, trajectory=self._with_commands(found.trajectory, [motion], 0))
 
     def _motion(self, genome: Genome) -> Motion | Loop:
@@ -111,13 +116,14 @@ class Simulation:
         return self._with_commands(self._simulated(genomes, worlds, motions), motions, np.s_[:, None])
 
     def _simulated(self, genomes: Genomes, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
-        """Return the trajectories without commands; the worlds of one noise are simulated together."""
-        noises = {world.noise: None for world in worlds}
-        if len(noises) == 1:
+        """Return the trajectories without commands; the worlds whose motions are alike are simulated together."""
+        groups: dict[Hashable, list[int]] = {}
+        for column, world in enumerate(worlds):
+            groups.setdefault((world.noise, _late_steps(world)), []).append(column)
+        if len(groups) == 1:
             return self._engine.rollouts(worlds, _disturbed(worlds[0], motions, genomes))
         found: dict[int, Trajectory] = {}
-        for noise in noises:
-            alike = [column for column, world in enumerate(worlds) if world.noise == noise]
+        for alike in groups.values():
             chosen = [worlds[column] for column in alike]
             seen = self._engine.rollouts(chosen, _disturbed(chosen[0], motions, genomes))
             for place, column in enumerate(alike):
@@ -132,9 +138,30 @@ def _edited(world: World, edits: Sequence[tuple[int, Tunable]], values: tuple[fl
 
 
 def _disturbed(world: World, motions: Sequence[Motion | Loop], genomes: Genomes) -> Sequence[Motion | Loop]:
-    if world.noise == QUIET:
-        return motions
-    return [disturbed(world, motion, genome) for motion, genome in zip(motions, genomes, strict=True)]
+    """Return what an engine is to run of motions: with the noise of a world, and its offset of time."""
+    if world.noise != QUIET:
+        motions = [disturbed(world, motion, genome) for motion, genome in zip(motions, genomes, strict=True)]
+    return [_late(world, motion) for motion in motions] if _late_steps(world) else motions
+
+
+def _late_steps(world: World) -> int:
+    return round(world.time_offset_s / world.time_step_s)
+
+
+def _late(world: World, motion: Motion | Loop) -> Motion | Loop:
+    """Return a motion whose commands begin as many time steps later as the world says; a loop has its own clock.
+
+    Before the first, motors hold the robot at its start. Of commands that would come before time 0, the last one holds
+    then.
+    """
+    if isinstance(motion, Loop):
+        return motion
+    times_s = motion.times_s + _late_steps(world) * world.time_step_s
+    if times_s[0] > 0:
+        targets = np.vstack([middles(started(world, motion)), motion.targets])
+        return replace(motion, times_s=frozen([0.0, *times_s]), targets=frozen(targets))
+    first = int(np.searchsorted(times_s, 0.0, side="right")) - 1
+    return replace(motion, times_s=frozen([0.0, *times_s[first + 1 :]]), targets=motion.targets[first:])
 
 
 class _Times(NamedTuple):

@@ -123,10 +123,23 @@ def _place_violations(tunable: Tunable, robot: Robot, engine: type[Engine], poin
     if (lack := tunable.lack(robot.world)) is not None:
         why, permitted = lack
         yield Violation(pointer, name, f"{name}: {why}", permitted)
+    yield from _reading_violations(tunable, robot, pointer)
     if not honoured(tunable, engine):
         able = [each.name for each in engines.values() if honoured(tunable, each)]
         message = f"{engine.name} does not honour {name}; {able_to(able)}"
         yield Violation(pointer, name, message, able)
+
+
+def _reading_violations(tunable: Tunable, robot: Robot, pointer: str) -> Iterator[Violation]:
+    """Yield a tunable of commands that are known in advance or of sensors, if the robot has none of these."""
+    name = label_of(tunable)
+    if robot.loops and tunable.needs_motion:
+        message = f"{name} is of commands that are known in advance, and the controller of the {robot.label} is a loop"
+        yield Violation(pointer, name, message, "left out, or a controller whose motions are known in advance")
+    sensors, read = tunable.sensors(robot.world), robot.sensors.names
+    if sensors and not robot.loops and not {*sensors} & {*read}:
+        message = f"{name} is of {' and '.join(sensors)}, and the {robot.label} reads {' and '.join(read) or 'nothing'}"
+        yield Violation(pointer, name, f"{message}; a task may read more", "a task that reads it")
 
 
 def reality_violations(
@@ -137,7 +150,7 @@ def reality_violations(
     `simulated` is the engine of the simulators, `engine` that of reality.
     """
     if is_recorded(spec):
-        yield from recorded_violations(spec, strategy, robot)
+        yield from recorded_violations(spec, strategy)
         return
     if spec.reality.kind == "physical":
         yield from _physical_violations(spec, strategy)

@@ -106,12 +106,19 @@ class Bearing:
 
 
 def observations(world: World, senses: Sequence[str], bearing: Bearing) -> FloatArray:
-    """Return `(n, s)`: the groups that a controller observes, in its order, without noise.
+    """Return `(n, s)`: the groups that a controller observes, in its order, with biases, but without noise.
 
     A row depends on the same row of the bearing alone, to the last bit. Senses are names of `GROUPS`.
     """
     groups = [_GROUPS[name].look(world, bearing) for name in senses]
-    return np.hstack([np.empty((len(bearing.poses), 0)), *groups])
+    seen = np.hstack([np.empty((len(bearing.poses), 0)), *groups])
+    return seen + biases(world, names(world, senses)) if world.biases else seen
+
+
+def biases(world: World, sensors: Sequence[str]) -> FloatArray:
+    """Return `(s,)`: what is added to the readings of sensors, by their names."""
+    known = dict(world.biases)
+    return np.array([known.get(name, 0.0) for name in sensors])
 
 
 def names(world: World, senses: Sequence[str]) -> tuple[str, ...]:

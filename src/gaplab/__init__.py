@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from gaplab.api.clients.results import Comparisons as Comparisons
     from gaplab.api.library.pools import PoolOptions as PoolOptions
     from gaplab.api.library.pools import import_pool as import_pool
+    from gaplab.api.library.recovering import recover as recover
     from gaplab.api.library.robots import read_robot as read_robot
     from gaplab.api.library.running import Interrupted as Interrupted
     from gaplab.api.library.running import Result as Result
@@ -71,6 +72,7 @@ _MODULES = {
     "local_service": "gaplab.api.process.local_service",
     "read_robot": "gaplab.api.library.robots",
     "read_samples": "gaplab.samples",
+    "recover": "gaplab.api.library.recovering",
     "run": "gaplab.api.library.running",
     "simulate": "gaplab.api.library.simulating",
 }

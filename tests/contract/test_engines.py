@@ -133,6 +133,10 @@ WITH_OR_WITHOUT: dict[str, tuple[Callable[[World], World], Callable[[World], Wor
     "joint.slides": (lambda world: world, lambda world: each_joint(world, slides=True)),
     "joint.start": (lambda world: world, lambda world: each_joint(world, start=0.2)),
     "joint.static_friction": (lambda world: world, lambda world: each_joint(world, static_friction=1.0)),
+    "joint.stribeck_speed": (
+        lambda world: each_joint(world, static_friction=1.0),
+        lambda world: each_joint(world, static_friction=1.0, stribeck_speed=1.0),
+    ),
     "joint.turn": (lambda world: world, lambda world: each_joint(world, turn=TURN)),
     "motor.delay_s": (with_pd, lambda world: with_pd(world, delay_s=0.1)),
     "motor.follows": (

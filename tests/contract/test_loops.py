@@ -58,6 +58,17 @@ class Watching:
         return np.tile(self.targets, (len(genomes), 1)), memories
 
 
+class Both:
+    """Holds a joint, and keeps the angles that it observes in all worlds."""
+
+    def __init__(self) -> None:
+        self.angles: set[float] = set()
+
+    def __call__(self, genomes: Any, observations: Any, memories: Any, time_s: Any) -> Any:
+        self.angles |= {round(float(angle), 6) for angle in observations[:, 0]}
+        return np.full((len(genomes), 1), 0.1), memories
+
+
 def group(world: World, sense: str, seen: list[FloatArray]) -> FloatArray:
     """One group of observations `(ticks, …)`."""
     place = GROUPS.index(sense)
@@ -117,6 +128,20 @@ def test_a_falling_body_observes_tilt_and_turning(closing: Engine) -> None:
     assert tilt[1:] == pytest.approx(rotated(back, np.array([0, 0, -1.0])), abs=1e-5)
     assert np.ptp(tilt, axis=0).max() > 0.1
     assert np.linalg.norm(tilt, axis=1) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_loop_observes_the_biases_of_its_sensors_in_each_of_several_worlds(closing: Engine) -> None:
+    world = rig(axis=X, start=0.1, motor=PDMotor("position", 10.0, kp=9.0))
+    biased = world.edited("biases", biases=(("angle joint", 0.05), ("speed joint", -0.2)))
+    honoured(closing, world)
+    watching, both = Watching(0.1), Both()
+
+    closing.rollout(biased, loop(watching))
+    closing.rollouts([world, biased], [loop(both)])
+
+    assert group(world, "angles", watching.seen) == pytest.approx(0.15)
+    assert group(world, "speeds", watching.seen) == pytest.approx(-0.2)
+    assert both.angles == {0.1, 0.15}
 
 
 def test_on_a_slope_gravity_is_tilted(closing: Engine) -> None:

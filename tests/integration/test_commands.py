@@ -123,6 +123,8 @@ def compute_here(ask: Callable[..., Any], folder: Path) -> None:
     (folder / "runs.csv").write_text("gene_0,value\n0.3,0.4\n0.5,0.2\n0.7,0.6\n")
     found = ask("tune", "toy_function", str(folder / "runs.csv"), "--tunables", "static_friction", "--held-out", "0")
     assert "static_friction" in json.dumps(found)
+    once = ("--tunables", "motor_gain", "--draws", "1", "--samples", "1", "--engine", "mujoco")
+    assert [each["name"] for each in ask("recover", "quadruped", *once)["tunables"]] == ["motor_gain"]
 
 
 def bring_a_robot(ask: Callable[..., Any], folder: Path) -> None:

@@ -11,7 +11,7 @@ from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import NO_READINGS, frozen
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.discrepancies.readings import Readings
-from gaplab.services.core.linear_models import SURPRISING, fit_of, widened
+from gaplab.services.core.linear_models import DEVIATIONS, SURPRISING, fit_of, widened
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.base import TuningTask
@@ -104,11 +104,31 @@ def test_physics_that_fails_around_the_best_simulator_says_nothing() -> None:
 
 
 def test_intervals_are_widened_around_the_estimate_within_the_bounds() -> None:
-    wide = widened(frozen([[0.4, 0.55], [10.0, 12.0]]), frozen([0.5, 11.0]), 3.0, SPACE)
-    near = widened(frozen([[0.28, 0.72], [18.0, 26.0]]), frozen([0.5, 22.0]), 2.0, SPACE)
+    ends, place = frozen([[0.4, 0.55], [10.0, 12.0]]), frozen([0.5, 11.0])
+    noisy = Fit(1.0, 1.0, 3.0, noise=frozen([0.2, 4.0]) / DEVIATIONS)
+
+    wide = widened(ends, place, Fit(1.0, 1.0, 3.0), SPACE)
+    near = widened(frozen([[0.28, 0.72], [18.0, 26.0]]), frozen([0.5, 22.0]), Fit(1.0, 1.0, 2.0), SPACE)
 
     assert wide == pytest.approx(np.array([[0.2, 0.65], [10.0, 14.0]]))
     assert near == pytest.approx(np.array([[0.0, 1.0], [14.0, 30.0]]))
+    assert widened(ends, place, None, SPACE) == pytest.approx(ends)
+    more = np.array([[0.5 - np.hypot(0.3, 0.2), 0.75], [10.0, 16.0]])
+    assert widened(ends, place, noisy, SPACE) == pytest.approx(more)
+
+
+def test_where_answers_are_smooth_noise_is_most_of_the_error_and_the_intervals_have_it() -> None:
+    inside = {"with": 0, "without": 0}
+    for seed in range(30):
+        truth = SPACE.draw(1, np.random.default_rng(seed))[0]
+        best, fit = found(seed, 0.0)
+        assert best.interval is not None
+        for name, known in (("with", fit), ("without", replace(fit, noise=NO_READINGS))):
+            lower, upper = widened(best.interval, best.parameters, known, SPACE).T
+            inside[name] += int(((lower <= truth) & (truth <= upper)).sum())
+
+    assert inside["with"] >= 0.85 * 60
+    assert inside["without"] < 0.5 * 60
 
 
 def tuning(surprise: float) -> Tuning:

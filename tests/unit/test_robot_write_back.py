@@ -15,7 +15,7 @@ from gaplab.services.engines.base import Engine
 from gaplab.services.robots.comparing import changes, check_rollouts
 from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
-from gaplab.services.robots.writing import Tuning, WrittenFile, write_json, write_xml
+from gaplab.services.robots.writing import Tuning, WrittenFile, write_json, write_plain, write_xml
 from gaplab.services.world.motions import Trajectory
 from gaplab.services.world.robot_files import RobotFile, read_robot_file
 from gaplab.services.world.tunables.labels import tunable_of
@@ -204,6 +204,26 @@ def test_gains_of_an_mjcf_that_includes_files_keep_their_gears(tmp_path: Path) -
     assert model.actuator("pa").forcerange.tolist() == [-2, 2]
     assert model.actuator("vb").gainprm[0] == 4
     assert not changes(tuned, written.world)
+
+
+def test_a_file_has_no_place_for_clocks_encoders_the_frame_of_the_sensors_and_joints_that_stick(tmp_path: Path) -> None:
+    original = path_of("a1/a1.urdf")
+    robot = import_robot(original, ImportOptions()).robot
+    sticking = with_joint(robot.world, "FR_hip_joint", static_friction=0.2, stribeck_speed=0.3)
+    clocks = replace(sticking, time_offset_s=0.02, biases=(("angle FR_hip_joint", 0.03),))
+    tuning = Tuning(robot, replace(clocks, ground_m=0.005, gravity_tilt_rad=(0.0, 0.01)), ())
+    of_mujoco = {"gravity_tilt_rad", "ground_m"}
+
+    for form, kept, suffix in (("URDF", set[str](), ".urdf"), ("MJCF of MuJoCo alone", of_mujoco, ".xml")):
+        output = tmp_path / f"tuned{suffix}"
+        with pytest.raises(InvalidRobot) as refused:
+            write_xml(tuning, original, output, fine) if suffix == ".urdf" else write_plain(tuning, output)
+        lost = [each for each in refused.value.reasons if f"the {form} has no place for it" in each]
+        names = {"time_offset_s", "biases", "static_friction", "stribeck_speed"} | (of_mujoco - kept)
+        assert {name for name in names if any(name in each for each in lost)} == names
+        assert len(lost) == len(names)
+    write_json(tuning, tmp_path / "tuned.json", fine)
+    assert not changes(tuning.world, read_robot_file((tmp_path / "tuned.json").read_bytes()).world)
 
 
 def test_an_inertia_that_does_not_grow_with_the_mass_is_possible_for_a_single_body(tmp_path: Path) -> None:

@@ -16,9 +16,12 @@ from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.specs.assembly import WARM_ENGINES, MeasuredReality, edits_of, engine_of, setting, simulated
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.specs.simulation import Simulation
+from gaplab.services.specs.simulation import Simulation, _disturbed
+from gaplab.services.world.motions import Motion, open_loop
 from gaplab.services.world.robots.base import Sensors
+from gaplab.services.world.robots.quadruped import Quadruped
 from gaplab.services.world.robots.toy_function import ToyFunction
+from gaplab.services.world.tunables.base import Tunable
 from tests.experiments import toy
 from tests.fakes import install
 
@@ -105,6 +108,55 @@ def test_times_may_be_whole_numbers_and_fitness_is_of_double_precision() -> None
     np.testing.assert_array_equal(whole(genomes, parameters), expected)
     np.testing.assert_array_equal(outcomes[..., 0], expected)
     np.testing.assert_allclose(outcomes[..., 1], 2.0 * expected, rtol=1e-6)
+
+
+class Encoded(ToyFunction):
+    """A robot with two encoders, of which one stays at 0.25 rad."""
+
+    name = "encoded"
+    sensors = Sensors(("speed a", "angle a"), ("rad/s", "rad"), frozen([0.5, 0.1]), frozen([0.5, 1.0]))
+
+    def sense(self, trajectory: Any) -> Any:
+        return np.broadcast_to([0.0, 0.25], (*trajectory.positions_m.shape[:-2], 2, 2))
+
+
+def test_biases_are_added_to_what_their_sensors_read_in_their_world_alone() -> None:
+    class Biased(Tunable):
+        name, field, unit, lower, upper, least, greatest = "biased", "biases", "rad", -1.0, 1.0, -1.0, 1.0
+
+        def read(self, world: Any) -> float:
+            return dict(world.biases).get("angle a", 0.0)
+
+        def edit(self, world: Any, value: float) -> Any:
+            return world.edited(self.field, biases=(("angle a", value), ("angle of nothing", 7.0)) if value else ())
+
+    simulation = Simulation(Encoded(), Analytic(), [Biased()])
+    outcomes = simulation.sense(np.array([[0.2], [0.4]]), np.array([[0.0], [0.05], [-0.1]]))
+
+    by_sensor = Encoded.sensors.values(outcomes[..., 1:])
+    np.testing.assert_array_equal(by_sensor[..., 0], 0.0)
+    np.testing.assert_allclose(by_sensor[..., 1], np.broadcast_to([[[0.25], [0.3], [0.15]]], (2, 3, 2)))
+    assert len({tuple(row) for row in outcomes[..., 0].T}) == 1
+
+
+def started(offset_s: float, *targets: float) -> Any:
+    """What an engine gets of a motion whose targets change each 0.1 s, on a world whose clock differs."""
+    world = replace(Quadruped().world, time_offset_s=offset_s)
+    motion = Motion(frozen(np.arange(len(targets)) / 10), frozen(np.tile(targets, (12, 1)).T), frozen([1.0]))
+    late = open_loop(*_disturbed(world, [motion], np.zeros((1, 1))))
+    return [round(time_s, 9) for time_s in late.times_s.tolist()], late.targets[:, 0].tolist()
+
+
+def test_commands_begin_as_much_later_as_the_world_says_in_whole_time_steps() -> None:
+    assert started(0.0, 0.3, 0.5, 0.7) == ([0.0, 0.1, 0.2], [0.3, 0.5, 0.7])
+    assert started(0.034, 0.3, 0.5, 0.7) == ([0.0, 0.03, 0.13, 0.23], [0.0, 0.3, 0.5, 0.7])
+    assert started(0.004, 0.3, 0.5) == started(-0.004, 0.3, 0.5) == started(0.0, 0.3, 0.5)
+
+
+def test_of_commands_from_before_the_sensors_clock_the_last_one_holds() -> None:
+    assert started(-0.1, 0.3, 0.5, 0.7) == ([0.0, 0.1], [0.5, 0.7])
+    assert started(-0.13, 0.3, 0.5, 0.7) == ([0.0, 0.07], [0.5, 0.7])
+    assert started(-5.0, 0.3, 0.5, 0.7) == ([0.0], [0.7])
 
 
 class Arm(Analytic):

@@ -336,6 +336,35 @@ def test_default_bounds_have_the_robots_own_value_inside() -> None:
     assert tunable_of("kp(*, as=value)").bounds(arm()) == pytest.approx((0.5 * 50.0, 1.5 * 50.0))
 
 
+def test_the_frame_of_the_sensors_and_their_biases_are_set_one_by_one() -> None:
+    world = edited("gravity_tilt(y)", 0.02, edited("gravity_tilt", -0.01, edited("ground_height", 0.005)))
+    knees = edited("bias(*_knee)", 0.03)
+    one = edited("bias(rear_left_knee)", 0.01, knees)
+
+    assert (world.gravity_tilt_rad, world.ground_m) == ((-0.01, 0.02), 0.005)
+    assert world.edits == {"gravity_tilt_rad", "ground_m"}
+    assert len(knees.biases) == 4
+    assert dict(one.biases)["angle rear_left_knee"] == 0.01
+    assert tunable_of("bias(*_knee)").read(one) == pytest.approx(0.025)
+    assert edited("bias(*_knee)", 0.0, one) == WORLD
+    assert edited("joint_static_friction(*_knee)", 0.2).joints[2].static_friction == 0.2
+    assert edited("joint_stribeck_speed", 0.3).joints[0].stribeck_speed == 0.3
+
+
+def test_what_lies_between_physics_and_sensors_is_refused_where_there_is_none() -> None:
+    unread = refusals(tunables=["bias(front_left_knee)", "bias(front_left_toe)"])
+    looping = refusals(tunables=["time_offset"], controller="mlp")
+    unmoved = refusals(robot="toy_function", engine="analytic", tunables=["time_offset", "ground_height"])
+
+    assert "is of angle front_left_knee, and the quadruped reads roll and pitch" in unread["/tunables/0"].message
+    assert unread["/tunables/0"].permitted == "a task that reads it"
+    assert "matches no joint" in unread["/tunables/1"].message
+    assert "the controller of the quadruped is a loop" in looping["/tunables/0"].message
+    assert "the robot has no motors" in unmoved["/tunables/0"].message
+    assert "analytic does not honour ground_height" in unmoved["/tunables/1"].message
+    assert resolved(tunables=["bias(front_left_knee)"], controller="mlp").tunables  # which observes it
+
+
 def test_an_engine_need_not_know_of_noise_but_of_all_else() -> None:
     assert resolved(robot="toy_function", engine="analytic", tunables=["noise"]).reality.parameters == {"noise": 0.0}
     found = refusals(robot="toy_function", engine="analytic", tunables=["slope"])

@@ -24,8 +24,8 @@ from gaplab.services.world.world import Motor, PDMotor, World
 LOST = (
     "material.static_friction",
     "material.restitution",
-    "joint.static_friction",
-    "joint.stribeck_speed",
+    "static_friction",
+    "stribeck_speed",
     "motor.delay_s",
     "noise.",
     "time_offset_s",

@@ -221,6 +221,6 @@ class _Run:
 
 
 def _looks(world: World) -> Hashable:
-    """Return what observations in worlds of one structure depend on: gravity, the ground, and the places of shapes."""
+    """Return what observations in worlds of one structure depend on: gravity, ground, biases, and places of shapes."""
     solids = [body.center_m for body in world.bodies if not isinstance(body.shape, tuple)]
-    return world.slope_rad, world.gravity_tilt_rad, world.ground_m, *solids
+    return world.slope_rad, world.gravity_tilt_rad, world.ground_m, world.biases, *solids

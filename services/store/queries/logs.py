@@ -128,10 +128,12 @@ def _packed(simulator: Simulator) -> dict[str, Any]:
         "weight": simulator.weight,
         "held_out_error": simulator.held_out_error,
         "fit": None,
+        "noise": None,
     }
     if fit is not None:
         errors = fit.expected_error, fit.surprise, fit.interval_scale, *fit.reading_errors.tolist()
         packed["fit"] = list(map(known, errors))
+        packed["noise"] = fit.noise.tolist() or None
     return {name: value for name, value in packed.items() if value is not None or name == "squared_error"}
 
 
@@ -162,15 +164,15 @@ def simulator_of(packed: Mapping[str, Any]) -> Simulator:
         interval=None if lower is None or upper is None else frozen(list(zip(lower, upper, strict=True))),
         weight=packed.get("weight"),
         held_out_error=packed.get("held_out_error"),
-        fit=_fit_of(packed.get("fit")),
+        fit=_fit_of(packed.get("fit"), packed.get("noise", ())),
     )
 
 
-def _fit_of(stored: Sequence[float | None] | None) -> Fit | None:
+def _fit_of(stored: Sequence[float | None] | None, noise: Sequence[float]) -> Fit | None:
     if stored is None or None in stored[:3]:
         return None
     expected, surprise, scale, *errors = [_or(nan, each) for each in stored]
-    return Fit(expected, surprise, scale, frozen(errors))
+    return Fit(expected, surprise, scale, frozen(errors), frozen(noise))
 
 
 def _vector(body: Mapping[str, Any], name: str) -> FloatArray:

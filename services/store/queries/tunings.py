@@ -51,8 +51,7 @@ def intervals(simulator: Simulator, tunables: Sequence[Mapping[str, Any]]) -> Fl
     if simulator.interval is None:
         return None
     space = Space.box([float(each["lower"]) for each in tunables], [float(each["upper"]) for each in tunables])
-    scale = 1.0 if simulator.fit is None else simulator.fit.interval_scale
-    return widened(simulator.interval, simulator.parameters, scale, space)
+    return widened(simulator.interval, simulator.parameters, simulator.fit, space)
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,10 @@ from gaplab.services.core.space import Space
 from gaplab.services.world.controllers import controllers
 from gaplab.services.world.controllers.base import Controller
 from gaplab.services.world.kinematics import from_start, observes_base
-from gaplab.services.world.logs import Trace
 from gaplab.services.world.motions import Loop, Motion, Trajectory
 from gaplab.services.world.sensing import Sensors as Sensors
 from gaplab.services.world.tasks import tasks
 from gaplab.services.world.tasks.base import Task
-from gaplab.services.world.traces import placed
 from gaplab.services.world.world import World
 
 
@@ -131,6 +129,9 @@ class Robot(Plugin):
         Raises:
             ValueError: the base moves, a joint is unknown, or the record ends before the last observation.
         """
+        from gaplab.services.world.logs import Trace  # with SciPy, which rollouts do not need
+        from gaplab.services.world.traces import placed
+
         motion, joints = None if genome is None else self.motion(genome), self.world.joints
         observe_s = self.motion(self.known).observe_s
         unknown = sorted(angles.keys() - {joint.name for joint in joints})

@@ -21,12 +21,15 @@ LONGEST_PATTERN = 80
 REBUILDS, SHARES, IN_PLACE = 0, 1, 2
 """Places in the order of edits."""
 
+BETWEEN = frozenset({"noise", "time_offset_s", "biases"})
+"""Fields of a World that lie between physics and sensors: they change motions and readings, whatever the engine."""
+
 
 class Tunable(Plugin):
     """One parameter of the simulator.
 
     Attributes:
-        field: World field that it edits, as named in the `honours` of engines; `noise` needs no engine.
+        field: World field that it edits, as named in the `honours` of engines; those of `BETWEEN` need no engine.
         unit: unit of its value.
         lower, upper: default bounds.
         least, greatest: limits of meaningful values in any engine.
@@ -36,6 +39,7 @@ class Tunable(Plugin):
         order: when it edits, among the tunables of a spec: `REBUILDS`, before all others, if it replaces what engines
             build; `SHARES` if what it replaces is the same for all its values; `IN_PLACE` if it replaces only what it
             names to `World.edited`.
+        needs_motion: true if it means nothing for a controller in a loop, which sends its commands when it observes.
     """
 
     field: str
@@ -47,6 +51,7 @@ class Tunable(Plugin):
     also: ClassVar[frozenset[str]] = frozenset()
     relative: bool = False
     order: ClassVar[int] = REBUILDS
+    needs_motion: ClassVar[bool] = False
 
     @abstractmethod
     def read(self, world: World) -> float:
@@ -64,12 +69,30 @@ class Tunable(Plugin):
         """Return what the robot lacks for the tunable, as a sentence, and the permitted names; None if nothing."""
         return None
 
+    def sensors(self, world: World) -> tuple[str, ...]:  # noqa: ARG002 - for those of sensors
+        """Return the names of the sensors that it is of, of which a robot must read one; empty if it is of none."""
+        return ()
+
     @classmethod
     def details(cls) -> dict[str, Any]:
         """Return the field of the World that it edits, its unit and bounds, with default options, for the catalogue."""
         tunable = cls()
         names = ("field", "unit", "lower", "upper", "least", "greatest")
         return {name: getattr(tunable, name) for name in names}
+
+
+class WorldTunable(Tunable):
+    """A number of the world: the attribute `field`."""
+
+    order = IN_PLACE
+
+    def read(self, world: World) -> float:
+        """Return the number."""
+        return float(getattr(world, self.field))
+
+    def edit(self, world: World, value: float) -> World:
+        """Return the world with another number."""
+        return world.edited(self.field, **{self.field: float(value)})
 
 
 def matching(pattern: str, names: Sequence[str]) -> tuple[str, ...]:

@@ -1,8 +1,12 @@
-"""Tunables of the ground, and of what touches it."""
+"""Tunables of the ground, of what touches it, and of the frame in which sensors see it."""
 
 from dataclasses import replace
+from typing import Literal
 
-from gaplab.services.world.tunables.base import IN_PLACE, MaterialTunable, Tunable
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen
+from gaplab.services.world.tunables.base import IN_PLACE, MaterialTunable, Tunable, WorldTunable
 from gaplab.services.world.world import Material, World
 
 
@@ -57,20 +61,50 @@ class Restitution(MaterialTunable):
     least, greatest = 0.0, 0.9
 
 
-class Slope(Tunable):
+class Slope(WorldTunable):
     """Angle by which the ground rises along x."""
 
     name = "slope"
-    order = IN_PLACE
     field = "slope_rad"
     unit = "rad"
     lower, upper = -0.1, 0.1
     least, greatest = -1.5, 1.5
 
+
+class GroundHeight(WorldTunable):
+    """Height of the ground in the frame of the sensors, like that of a camera that was not quite level with it."""
+
+    name = "ground_height"
+    field = "ground_m"
+    unit = "m"
+    lower, upper = -0.02, 0.02
+    least, greatest = -1.0, 1.0
+
+
+class TiltOptions(Frozen):
+    """Options of the tunable `gravity_tilt`."""
+
+    of: Literal["x", "y"] = Field(default="x", description="axis of the world that gravity is turned about")
+
+
+class GravityTilt(Tunable):
+    """Angle by which gravity is turned about an axis of the frame of the sensors, which is not quite upright."""
+
+    name = "gravity_tilt"
+    order = IN_PLACE
+    field = "gravity_tilt_rad"
+    unit = "rad"
+    lower, upper = -0.05, 0.05
+    least, greatest = -0.7, 0.7
+    Options = TiltOptions
+    options: TiltOptions
+
     def read(self, world: World) -> float:
         """Return the angle."""
-        return world.slope_rad
+        return world.gravity_tilt_rad["xy".index(self.options.of)]
 
     def edit(self, world: World, value: float) -> World:
-        """Return the world on another slope."""
-        return world.edited(self.field, slope_rad=float(value))
+        """Return the world whose gravity is turned by another angle about the axis."""
+        about_x, about_y = world.gravity_tilt_rad
+        tilt = (float(value), about_y) if self.options.of == "x" else (about_x, float(value))
+        return world.edited(self.field, gravity_tilt_rad=tilt)

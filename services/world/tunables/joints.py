@@ -23,6 +23,28 @@ class JointFriction(JointTunable):
     value = Limits(0.0, 0.5, 0.0, 1e4)
 
 
+class JointStaticFriction(JointTunable):
+    """Torque that a joint withstands at rest, beyond its dry friction: it sticks, and then gives way at once."""
+
+    name = "joint_static_friction"
+    source = "Stribeck 1902; the bounds are gaplab's"
+    field = "joint.static_friction"
+    value_unit = "N m"
+    Options = ValueOptions
+    value = Limits(0.0, 0.5, 0.0, 1e4)
+
+
+class JointStribeckSpeed(JointTunable):
+    """Speed of a joint at which a share of 1/e of its static friction is left."""
+
+    name = "joint_stribeck_speed"
+    source = "Stribeck 1902; the bounds are gaplab's"
+    field = "joint.stribeck_speed"
+    value_unit = "rad/s"
+    Options = ValueOptions
+    value = Limits(0.01, 1.0, 1e-4, 1e3)
+
+
 class Armature(JointTunable):
     """Inertia of a motor's rotor and gears, as seen from the joint."""
 

@@ -1,4 +1,4 @@
-"""Noise of commands, and noise and latency of observations."""
+"""Tunables of what lies between physics and sensors: noise, latency, biases, and clocks that differ."""
 
 from dataclasses import replace
 from typing import Literal
@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.world.tunables.base import IN_PLACE, Tunable
+from gaplab.services.world.tunables.base import ALL, IN_PLACE, Pattern, Tunable, WorldTunable, lacking, matching
 from gaplab.services.world.world import World
 
 UNITS = {
@@ -81,3 +81,62 @@ class Latency(Tunable):
     def edit(self, world: World, value: float) -> World:
         """Return the world with another latency."""
         return world.edited(self.field, noise=replace(world.noise, latency_s=float(value)))
+
+
+class TimeOffset(WorldTunable):
+    """Time by which commands begin later than the clock of the sensors says, rounded to whole time steps.
+
+    The robot rests until the first command. Where it is negative, the commands of before time 0 are lost, but for the
+    last one.
+    """
+
+    name = "time_offset"
+    field = "time_offset_s"
+    unit = "s"
+    lower, upper = -0.1, 0.4
+    least, greatest = -10.0, 10.0
+    needs_motion = True
+
+    def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
+        """Return, if the robot has no motor that follows commands, a sentence."""
+        return None if world.actuators else ("the robot has no motors", ())
+
+
+class BiasOptions(Frozen):
+    """Options of the tunable `bias`."""
+
+    of: Pattern = Field(default="*", description=ALL)
+
+
+class Bias(Tunable):
+    """What the encoders of joints read beyond the true angle; motors do not follow it, but controllers in a loop do."""
+
+    name = "bias"
+    order = IN_PLACE
+    field = "biases"
+    unit = "rad"
+    lower, upper = -0.1, 0.1
+    least, greatest = -10.0, 10.0
+    Options = BiasOptions
+    options: BiasOptions
+
+    def read(self, world: World) -> float:
+        """Return the bias; of several joints their mean."""
+        known, names = dict(world.biases), self.sensors(world)
+        return sum(known.get(name, 0.0) for name in names) / len(names)
+
+    def edit(self, world: World, value: float) -> World:
+        """Return the world with the bias of each chosen joint replaced."""
+        names = self.sensors(world)
+        biases = {name: bias for name, bias in world.biases if name not in names}
+        if value:
+            biases |= dict.fromkeys(names, float(value))
+        return world.edited(self.field, biases=tuple(sorted(biases.items())))
+
+    def sensors(self, world: World) -> tuple[str, ...]:
+        """Return the names of the encoders."""
+        return tuple(f"angle {name}" for name in matching(self.options.of, [each.name for each in world.joints]))
+
+    def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
+        """Return, if the robot has no such joint, a sentence and the names of its joints."""
+        return lacking("joint", self.options.of, [joint.name for joint in world.joints])
