@@ -71,7 +71,7 @@ def import_(  # noqa: PLR0913, PLR0917 - each is an option of the command
     try:
         found = import_pool(source, robot, name, options)
     except InvalidSpec as error:
-        told = [f"{each.pointer[1:]}: {each.message}" for each in error.violations]
+        told = [f"{each.pointer[1:]}: {each.message}".removeprefix(": ") for each in error.violations]
         more = [f"and {len(told) - MOST_TOLD} more"] if len(told) > MOST_TOLD else []
         lines = [f"{source} cannot be imported:", *told[:MOST_TOLD], *more]
         raise CommandError("\n  - ".join(lines), Exit.INVALID) from error

@@ -90,6 +90,8 @@ def import_pool(source: str | Path, robot: AnyRobot, name: str, options: PoolOpt
         ValueError: a file cannot be read.
     """
     chosen, world, path = options or PoolOptions(), read_robot(robot).world, Path(source)
+    if unfit := list(_unfit(chosen)):
+        raise InvalidSpec(unfit)
     found, errors, lost = list[_Read](), list[Violation](), list[str]()
     names = set[str]()
     for part in _parts(path, chosen):
@@ -105,9 +107,19 @@ def import_pool(source: str | Path, robot: AnyRobot, name: str, options: PoolOpt
         names.add(part.name)
         errors += [_moved(each, part.before) for each in wrong]
     if errors and not (chosen.skip and found):
-        raise InvalidSpec({each.message: each for each in reversed(errors)}.values())
+        raise InvalidSpec([*{each.message: each for each in reversed(errors)}.values()][::-1])
     lost += sorted({f"{each.pointer[1:]} is left out: {each.message}"[:900] for each in errors})
     return _pool(found, world, chosen, name, path.name, lost)
+
+
+def _unfit(options: PoolOptions) -> Iterator[Violation]:
+    for name, value in (("seconds", options.seconds), ("every_s", options.every_s)):
+        if value is not None and not 0 < value < np.inf:
+            yield Violation(f"/{name}", value, f"must be a number above 0, not {value:g}", "above 0")
+    for group in options.sensors:
+        if group not in {"base", *JOINTS}:
+            permitted = ["base", *JOINTS]
+            yield Violation("/sensors", group, f"unknown {group!r}; permitted: {', '.join(permitted)}", permitted)
 
 
 def _unlike(trace: Trace, first: _Read, options: PoolOptions) -> Iterator[str]:
@@ -188,10 +200,10 @@ def _pool(found: Sequence[_Read], world: World, options: PoolOptions, name: str,
     first = found[0].trace
     driven, joints = _whole(first.commands), _whole(first.angles_rad)
     channels = tuple(_channels(options, world, joints, moving=first.positions_m is not None))
-    recordings = tuple(_recorded(each, world, channels, (driven, joints), times_s, lost) for each in found)
     if not len(times_s) or not channels:
         message = f"nothing is read: {len(channels)} sensors, every {every_s:g} s for {longest_s:g} s"
         raise InvalidSpec([Violation("/", None, message, "a sensor, and an interval below the longest recording")])
+    recordings = tuple(_recorded(each, world, channels, (driven, joints), times_s, lost) for each in found)
     return Pool(
         name=name,
         source=source,

@@ -9,7 +9,7 @@ expects. The place is aligned by the pose at the start of the motion. Heights ar
 Source: gaplab.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -263,13 +263,25 @@ def unlikely_joints(trace: Trace, world: World, commands: FloatArray | None = No
         told = targets.get(joint.name) if joint.follows == "position" else None
         if not (wrong := _wrong(joint, angles, told, trace.lines)):
             continue
-        ways = {"-": -angles, "ticks @ 2048": (angles - TICKS / 2) * 2 * np.pi / TICKS}
+        ways: dict[str, Callable[[FloatArray], FloatArray]] = {"-": np.negative, "ticks @ 2048": _of_ticks}
         if joint.limits is None or np.nanmax(np.abs(angles)) > joint.limits[1] - joint.limits[0]:
-            ways = {"deg": np.deg2rad(angles), "-deg": -np.deg2rad(angles), **ways}
-        likely = (f"is it `[{how}]`?" for how, values in ways.items() if not _wrong(joint, values, told))
+            ways = {"deg": np.deg2rad, "-deg": lambda values: -np.deg2rad(values), **ways}
+        likely = (f"is it `[{how}]`?" for how, way in ways.items() if _explains(way, joint, angles, told))
         column = (trace.headings or {}).get(f"angle {joint.name}", f"angle {joint.name}")
         advice = next(likely, "say `[@ ZERO]`, what it reads where the joint is at zero, or map another column")
         yield f"the column {column!r}{wrong}; {advice}"
+
+
+def _of_ticks(values: FloatArray) -> FloatArray:
+    return (values - TICKS / 2) * 2 * np.pi / TICKS
+
+
+def _explains(
+    way: Callable[[FloatArray], FloatArray], joint: Joint, angles: FloatArray, targets: FloatArray | None
+) -> bool:
+    """Return whether a joint can have had angles that are read this way, as targets beyond its limits are too."""
+    beyond = targets is not None and joint.limits and np.nanmax(np.abs(targets)) > joint.limits[1] - joint.limits[0]
+    return not _wrong(joint, way(angles), way(targets) if targets is not None and beyond else targets)
 
 
 def _wrong(joint: Joint, angles: FloatArray, targets: FloatArray | None, lines: Sequence[int] = ()) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,6 +81,12 @@ NAN = "line 61, command_elbow: 'nan' is not a finite number"
 BEYOND = "line 21: 2.5 is outside the limits of shoulder, -1.6 to 1.6"
 MORE = [f"{HEADER},angle wrist", *(f"{each},0" for each in LINES[1:])]
 
+
+def in_degrees(line: str) -> str:
+    motion, time_s, *numbers = line.split(",")
+    return ",".join([motion, time_s, *(str(float(np.rad2deg(float(each)))) for each in numbers)])
+
+
 WRONG: dict[str, tuple[list[str], str]] = {
     "a column too few": ([line.rsplit(",", 3)[0] for line in LINES], COLUMN),
     "a clock that runs backwards": (changed(6, "100.100000", "99.000000"), "line 7: time_s must ascend"),
@@ -87,6 +94,7 @@ WRONG: dict[str, tuple[list[str], str]] = {
     "nan in a later recording": (changed(60, "-0.200000", "nan"), NAN),
     "a joint that the robot lacks": (MORE, "no joint 'wrist'"),
     "degrees for radians": (with_angles(LINES, lambda k: "5.73" if k % 51 < 10 else "17.19"), "is it `[deg]`?"),
+    "degrees of angles and of commands": ([HEADER, *map(in_degrees, LINES[1:])], "is it `[deg]`?"),
     "outside limits": (with_angles(LINES, lambda k: "2.5" if k == 19 else "0"), BEYOND),
     "two motions of one name": ([*LINES, row("wave", 0), row("wave", 1)], "two motions are named wave"),
     "shorter than a time step": ([*LINES, row("tap", 0), row("tap", 0).replace("100.00", "100.001")], "a time step"),
@@ -104,6 +112,19 @@ def test_what_is_wrong_is_told_with_its_line(case: str, read: Callable[..., Pool
         read(lines)
 
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"every_s": -1.0}, "/every_s: must be a number above 0, not -1"),
+        ({"seconds": float("nan")}, "/seconds: must be a number above 0, not nan"),
+        ({"sensors": ("base", "angles")}, "unknown 'angles'; permitted: base, angle, speed, torque"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(options: Any, words: str, read: Callable[..., Pool]) -> None:
+    with pytest.raises(InvalidSpec, match=words):
+        read(LINES, replace(OPTIONS, **options))
 
 
 def test_a_wrong_recording_may_be_left_out_and_is_told(read: Callable[..., Pool]) -> None:
