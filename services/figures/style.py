@@ -32,6 +32,7 @@ OTHERS: dict[str, tuple[str, Dash, Marker]] = {
     "weighted": ("#8A8A2B", "dotted", "diamond"),
     "domain_randomization": ("#9C6B3F", "dashed", "triangle"),
     "noise_envelope": ("#7A5CC0", "dashdot", "inverted"),
+    "farthest": ("#7F7F7F", "longdot", "cross"),
 }
 """Colour, dash and marker of gaplab's other strategies; the colours are legible on white and on dark pages."""
 

@@ -127,10 +127,11 @@ test("a replay begins with the last iteration that the first repetition is sure 
 });
 
 test("the catalogue tells units, and functions from robots that move", () => {
-  const catalogue = { robots: [{ name: "legs", details: { unit: "m/s", function: false } }, { name: "curve", details: { unit: "1", function: true } }] };
-  const of = (name) => ({ spec: { robot: { name } } });
+  const catalogue = { robots: [{ name: "legs", details: { unit: "m/s", function: false } }, { name: "curve", details: { unit: "1", function: true } }],
+    tasks: [{ name: "recorded", details: { unit: "× untuned" } }] };
+  const of = (name, task) => ({ spec: { robot: { name }, task: task && { name: task } } });
   assert.deepEqual(["legs", "curve", "gone"].map((name) => isFunction(catalogue, of(name))), [false, true, false]);
-  assert.deepEqual([unitsOf(catalogue)(of("legs")), unitsOf(catalogue)(of("gone")), unitsOf(catalogue)(undefined)], ["m/s", "", ""]);
+  assert.deepEqual([of("legs"), of("legs", "recorded"), of("gone"), undefined].map(unitsOf(catalogue)), ["m/s", "× untuned", "", ""]);
 });
 
 test("an experiment says in a sentence what it waits for", () => {

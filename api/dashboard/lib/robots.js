@@ -15,9 +15,10 @@ export const robotName = (spec) => readableName(robotOf(spec));
  * Return a function that gives the unit of an experiment's fitness; the empty text if its robot is not installed.
  * @param {Api.Catalogue} catalogue
  */
-export function unitsOf({ robots }) {
-  const units = new Map(robots.map(({ name, details }) => [name, details.unit]));
-  return (/** @type {Experiment} */ experiment) => /** @type {string} */ ((experiment && units.get(robotOf(experiment.spec))) ?? "");
+export function unitsOf({ robots, tasks }) {
+  const [ofRobots, ofTasks] = [robots, tasks].map((plugins) => new Map(plugins.map(({ name, details }) => [name, details.unit])));
+  const unit = (/** @type {Record<string, any>} */ spec) => (spec.task ? ofTasks?.get(spec.task.name) : ofRobots?.get(robotOf(spec)));
+  return (/** @type {Experiment} */ experiment) => /** @type {string} */ ((experiment && unit(experiment.spec)) ?? "");
 }
 
 /**
