@@ -58,6 +58,18 @@ def pointer_to(path: Iterable[object]) -> str:
     return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in path)
 
 
+def within(body: object, path: Sequence[str | int]) -> Sequence[str | int]:
+    """Return as much of the path as exists in the body, where `"smoke"` may be short for `{"preset": "smoke"}`."""
+    for depth, part in enumerate(path):
+        if isinstance(body, Mapping):
+            body = body.get(part)
+        elif isinstance(body, list | tuple) and isinstance(part, int) and part < len(body):
+            body = body[part]
+        else:
+            return path[:depth]
+    return path
+
+
 def permitted_by(error: Mapping[str, Any]) -> tuple[str, ...] | str | None:
     """Return what is permitted instead of the refused value: a description, or all permitted texts."""
     context = error.get("ctx", {})

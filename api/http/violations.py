@@ -11,7 +11,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from fastapi import Request
 from pydantic import BaseModel
 
-from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
+from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence, within
 from gaplab.services.core.errors import Violation, unknown_name
 
 MOST_ERRORS = 50
@@ -37,7 +37,7 @@ def explain(error: Mapping[str, Any], body: object, request: Request) -> Violati
     if len(kinds) > 1 and path:  # the kind of the body comes first
         kinds = [each for each in kinds if each.__name__.lower().startswith(str(path[0]))]
         path = path[1:]
-    path = path[: _depth(body, path)] if place == "body" else path
+    path = within(body, path) if place == "body" else path
     if error["type"] == "extra_forbidden":
         fields = _fields(kinds, path[:-1]) if place == "body" else tuple(_parameters(request))
         kind, name = "field" if place == "body" else "parameter", _text(path[-1])
@@ -64,18 +64,6 @@ def finite(value: object, depth: int = 6) -> object:
     if isinstance(value, Sequence) and not isinstance(value, bytes) and depth:
         return [finite(item, depth - 1) for item in islice(value, MOST_ERRORS)]
     return "…"
-
-
-def _depth(body: object, path: Sequence[str | int]) -> int:
-    """Return how much of the path exists in the body, where `"smoke"` may be short for `{"preset": "smoke"}`."""
-    for depth, part in enumerate(path):
-        if isinstance(body, dict):
-            body = body.get(part)
-        elif isinstance(body, list) and isinstance(part, int) and part < len(body):
-            body = body[part]
-        else:
-            return depth
-    return len(path)
 
 
 def _pointer(place: str, path: Sequence[str | int]) -> str:

@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from pydantic import ValidationError
 
-from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
+from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence, within
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec, PoolRef, SharedSettings, StudySpec
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec, Violation, unknown_name
@@ -56,17 +56,19 @@ def settings(kind: type[S], robot: AnyRobot, **others: Any) -> S:  # noqa: ANN40
     said = {name: each for name, each in dict(spec).items() if name in {"robot", "controller", "task", "engine"}}
     if isinstance(named := said.get("robot"), str | Path):
         said["robot"] = _of_file(Path(named)) if Path(named).suffix else _of_name(str(named))
+    said |= {name: each for name, each in others.items() if each is not None}
     try:
-        return kind.model_validate(said | {name: each for name, each in others.items() if each is not None})
+        return kind.model_validate(said)
     except ValidationError as error:
-        raise invalid(error) from error
+        raise invalid(error, said) from error
 
 
-def invalid(error: ValidationError) -> InvalidSpec:
-    """Return an error of a schema in the words of the service."""
+def invalid(error: ValidationError, body: object) -> InvalidSpec:
+    """Return an error of a schema about a body in the words of the service."""
     found: Iterable[dict[str, Any]] = map(dict, error.errors())
+    placed = ((each, within(body, each["loc"])) for each in found)
     return InvalidSpec(
-        Violation(pointer_to(each["loc"]), each["input"], sentence(each), permitted_by(each)) for each in found
+        Violation(pointer_to(place), each["input"], sentence(each, place), permitted_by(each)) for each, place in placed
     )
 
 

@@ -6,7 +6,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from gaplab.api.clients.trace_files import trace_csv
 from gaplab.api.library.robots import invalid
@@ -24,6 +24,8 @@ from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.sample_tables import read_samples
 from gaplab.services.store.session import Store
 
+_SAMPLES = TypeAdapter(list[KnownSample])
+
 
 def samples_in(table: Any, spec: ResolvedSpec, *, confirmed: bool) -> list[Told] | None:  # noqa: ANN401 - anything
     """Return the samples of a file, a data frame or a list of samples; None if it is none of these.
@@ -40,9 +42,9 @@ def samples_in(table: Any, spec: ResolvedSpec, *, confirmed: bool) -> list[Told]
     elif not (isinstance(table, Sequence) and table and isinstance(table[0], Mapping)):
         return None
     try:
-        samples = [KnownSample.model_validate(each) for each in table]
+        samples = _SAMPLES.validate_python(table := list(table))
     except ValidationError as error:
-        raise invalid(error) from error
+        raise invalid(error, table) from error
     answers = (each.model_dump(exclude={"genome"}) | {"confirmed": confirmed} for each in samples)
     found = zip(samples, answers, strict=True)
     return [(frozen(each.genome), MeasurementSpec.model_validate(answer), None) for each, answer in found]
@@ -82,10 +84,11 @@ def sample_of(
         InvalidSpec: it is not an answer, or a trace does not contain the motion; with every violation.
     """
     files = dict(_attached(store, Path(each), columns) for each in traces)
+    parts |= {"traces": tuple(files)} if files else {}
     try:
-        answer = MeasurementSpec.model_validate(parts | ({"traces": tuple(files)} if files else {}))
+        answer = MeasurementSpec.model_validate(parts)
     except ValidationError as error:
-        raise invalid(error) from error
+        raise invalid(error, parts) from error
     if answer.traces is None:
         return genome, answer, None
     asked = TracesSpec(traces=answer.traces, lags_s=answer.lags_s)
