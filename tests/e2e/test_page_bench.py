@@ -105,7 +105,7 @@ def test_a_phone_is_told_that_readings_are_needed_and_sends_traces(
     taking.take(written, request.id, TakeSpec(operator="Eve", lease_s=600.0), FREELY)
     page = visit(f"{api.url}/#/bench?experiment={experiment.id}", **PHONE)
     page.get_by_role("button", name="Show Quadruped").click()
-    expect(page.get_by_text("send a trace of the base for each repeat")).to_be_visible()
+    expect(page.get_by_text("send a trace for each repeat")).to_be_visible()
     expect(page.get_by_text("move the joints slowly to the start pose")).to_be_visible()
 
     page.get_by_role("button", name="End that take…").click()
