@@ -85,7 +85,7 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> tuple[Path, i
                 longest = _copy(source, target, most_rows)
     except sqlite3.IntegrityError as error:
         raise InvalidArchive(f"its rows contradict each other: {error}"[:300]) from error
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:  # the latter of a name in a damaged schema
         raise InvalidArchive(f"its database cannot be read: {error}"[:300]) from error
     given.unlink()
     if revision != REVISION:

@@ -261,7 +261,9 @@ EMPTIED = ("step", "attempt", "repetition", "experiment_provenance", "experiment
 def test_what_is_no_database(sqlite_store: Store, good: bytes) -> None:
     database = database_of(good)
     cases = [(b"", "does not say its revision"), (b"no database" * 999, "not a database"), (NOISE, "not a database")]
-    cases += [(database[:most], "its database cannot be read") for most in (100, 5_000, len(database) // 2)]
+    unreadable = [database.replace(b"tablestepstep", b"tables\x80epstep", 1)]
+    unreadable += [database[:most] for most in (100, 5_000, len(database) // 2)]
+    cases += [(each, "its database cannot be read") for each in unreadable]
 
     all_refused(sqlite_store, [(packed(each), said) for each, said in cases])
 
