@@ -5,7 +5,7 @@ for each time, and the columns `toss, time_s, x_m … z_m, qw … qz`, velocitie
 frame.
 """
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -29,6 +29,7 @@ TUNABLES: list[dict[str, Any]] = [
     {"name": "restitution", "lower": 0.0, "upper": 0.6},
     {"name": "ground_height", "lower": -0.003, "upper": 0.003},
 ]
+ROUNDS = 6
 NAMES = [each["name"] for each in TUNABLES]
 
 
@@ -42,6 +43,28 @@ def widths(stored: dict[str, Any], simulators: FloatArray) -> FloatArray:
     return np.asarray(np.nanmean(away, axis=2).mean(axis=0) / WIDTH_M)
 
 
+def spec_for(given: Namespace, folder: Path) -> dict[str, Any]:
+    """Return the spec of the study, whose robot and pool are written into a folder."""
+    robot, pool = folder / "cube.urdf", folder / "tosses.json"
+    robot.write_text(CUBE, "utf-8")
+    options = PoolOptions(recording="toss", sensors=["place"], every_s=0.05, seconds=1.0)
+    pool.write_text(import_pool(given.path, str(robot), "tosses", options).text, "utf-8")
+    return {
+        "name": f"cube in {given.engine}",
+        "engine": given.engine,
+        "strategies": given.strategies,
+        "repetitions": given.orders,
+        "direct_repetitions": 1,
+        "iterations": given.tosses,
+        "robot": str(robot),
+        "tunables": TUNABLES,
+        "tuner": {"name": "gauss_newton", "options": {"evaluations": given.evaluations, "rounds": ROUNDS}},
+        "seed": given.seed,
+        "budget": {"preset": "smoke", "simulator_evaluations": given.evaluations},
+        "reality": {"kind": "recorded", "pool": str(pool)},
+    }
+
+
 def main() -> None:
     """Import the tosses, run the study, and print its verdict and what its simulators err by."""
     asked = ArgumentParser(description=__doc__)
@@ -51,25 +74,11 @@ def main() -> None:
     asked.add_argument("--orders", type=int, default=40)
     asked.add_argument("--tosses", type=int, default=10)
     asked.add_argument("--evaluations", type=int, default=90)
+    asked.add_argument("--seed", type=int, default=0)
     asked.add_argument("--output", type=Path, default=Path("cube.zip"))
     given = asked.parse_args()
     with TemporaryDirectory() as folder:
-        robot, pool = Path(folder) / "cube.urdf", Path(folder) / "tosses.json"
-        robot.write_text(CUBE, "utf-8")
-        read = import_pool(given.path, str(robot), "tosses", PoolOptions(recording="toss", every_s=0.05, seconds=1.0))
-        pool.write_text(read.text, "utf-8")
-        study = {"name": f"cube in {given.engine}", "engine": given.engine, "strategies": given.strategies}
-        sizes = {"repetitions": given.orders, "direct_repetitions": 1, "iterations": given.tosses}
-        budget = {"preset": "smoke", "simulator_evaluations": given.evaluations}
-        reality = {"kind": "recorded", "pool": str(pool)}
-        spec = {
-            "robot": str(robot),
-            "tunables": TUNABLES,
-            "tuner": "gauss_newton",
-            "budget": budget,
-            "reality": reality,
-        }
-        result = gaplab.run(study | sizes | spec)
+        result = gaplab.run(spec_for(given, Path(folder)))
     result.save(given.output)
     print(result.verdict)
     best = result.simulators.query("rank == 0").copy()

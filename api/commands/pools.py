@@ -39,7 +39,9 @@ def import_(  # noqa: PLR0913, PLR0917 - each is an option of the command
     recording: Annotated[str, typer.Option(help="column of a table that names the recording")] = "recording",
     seconds: Annotated[float | None, typer.Option(help="longest part of a recording, from its beginning")] = None,
     every: Annotated[float | None, typer.Option(help="seconds between readings; left out: those of the lines")] = None,
-    sensors: Annotated[str, typer.Option(help="what is read: base, angle, speed, torque")] = "base,angle",
+    sensors: Annotated[
+        str, typer.Option(help="what is read: base (or its place, direction), angle, speed, torque")
+    ] = "base,angle",
     noises: Annotated[
         list[str] | None,
         typer.Option("--noise", metavar="NAME=NUMBER", help="of place, direction, angle, speed or torque; repeatable"),

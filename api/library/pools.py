@@ -45,7 +45,8 @@ class PoolOptions:
     Attributes:
         columns: by joint, or `*` for all others, its name in the tables, and how it counts; see `Bench.attach_trace`.
         recording: the column that names the recording of a line.
-        sensors: groups to read: `base` and `angle`, `speed`, `torque`; empty: the base if it moves, and angles.
+        sensors: groups to read: `base`, or of it `place` or `direction` alone, and `angle`, `speed`, `torque`; empty:
+            the base if it moves, and angles.
         noises: standard deviations in place of `NOISES`.
         seconds: longest part of a recording, from its beginning; None: all.
         every_s: interval of the readings; None: that of the lines.
@@ -117,8 +118,7 @@ def _unfit(options: PoolOptions) -> Iterator[Violation]:
         if value is not None and not 0 < value < np.inf:
             yield Violation(f"/{name}", value, f"must be a number above 0, not {value:g}", "above 0")
     for group in options.sensors:
-        if group not in {"base", *JOINTS}:
-            permitted = ["base", *JOINTS]
+        if group not in (permitted := ["base", *NOISES]):
             yield Violation("/sensors", group, f"unknown {group!r}; permitted: {', '.join(permitted)}", permitted)
 
 
@@ -218,8 +218,9 @@ def _pool(found: Sequence[_Read], world: World, options: PoolOptions, name: str,
 
 def _channels(options: PoolOptions, world: World, joints: Sequence[int], *, moving: bool) -> Iterator[Channel]:
     noises, groups = {**NOISES, **options.noises}, options.sensors or ("base", "angle")
-    if moving and "base" in groups:
+    if moving and {"base", "place"} & {*groups}:
         yield from (Channel(name=each, unit="m", noise=noises["place"]) for each in PLACES)
+    if moving and {"base", "direction"} & {*groups}:
         yield from (Channel(name=each, noise=noises["direction"]) for each in DIRECTIONS)
     units = {"angle": ("rad", "m"), "speed": ("rad/s", "m/s"), "torque": ("N·m", "N")}
     for group in (each for each in JOINTS if each in groups):
