@@ -27,6 +27,7 @@ OPTIONS: list[tuple[str, dict[str, Any]]] = [
     ("search", {"warm_start": True, "equal_rollouts": True}),
     ("gauss_newton", {"rounds": 1}),
     ("gauss_newton", {"rounds": 20, "evaluations": 8}),
+    ("least_squares", {"loss": "huber", "step": 0.1}),
     ("abc_smc", {"rounds": 1}),
     ("abc_smc", {"rounds": 100}),
     ("abc_smc", {"rounds": 100, "kept": 0.9}),
