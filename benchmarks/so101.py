@@ -2,16 +2,28 @@
 
 The data are of isaac-sim2real/sage, the robot of TheRobotStudio/SO-ARM100 (both Apache-2.0). TABLE is CSV or Parquet,
 with a line for each time, and the columns `motion, time_s, command_J, position_J` of the joints below, in rad. ROBOT is
-the MJCF.
+the MJCF. Errors are root mean squares over time, and their mean over joints and held-out motions. With `--sysid N`, the
+motions of the first N orders are given to `mujoco.sysid`, too.
 """
 
+import json
 from argparse import ArgumentParser
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 import gaplab
 from gaplab.api.library.pools import PoolOptions, import_pool
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.robots.importing import import_robot
+from gaplab.services.robots.options import ImportOptions
+from gaplab.services.specs.assembly import engine_of, simulation_of
+from gaplab.services.specs.recorded import held_out, pool_of
+from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.simulation import Simulation
+from gaplab.services.specs.stored_specs import spec_of
 
 JOINTS = {
     "shoulder_pan": "Rotation",
@@ -21,55 +33,101 @@ JOINTS = {
     "wrist_roll": "Wrist_Roll",
     "gripper": "Jaw",
 }
+STEP_S = 0.005
 EACH = {
-    "kp({})": (0.001, 0.03),
-    "joint_friction({})": (0.0, 0.6),
-    "joint_damping({})": (0.0, 1.0),
+    "kp({}, as=value)": (0.5, 20.0),
+    "joint_damping({})": (0.0, 2.0),
+    "joint_friction({})": (0.0, 1.0),
+    "joint_static_friction({})": (0.0, 0.5),
+    "armature({})": (0.0, 0.1),
     "bias({})": (-0.1, 0.1),
 }
-SHARED = {"armature": (0.0, 0.1), "delay": (0.0, 0.1)}
+SHARED = {"delay": (0.0, 0.1), "kd(*, as=value)": (0.0, 0.3)}
+BOUNDS = {label.format(joint): bounds for joint in JOINTS for label, bounds in EACH.items()} | SHARED
 
 
-def tunables() -> list[dict[str, Any]]:
-    """Return gain, friction, damping and bias of each joint, and one armature and delay."""
-    every = {label.format(joint): bounds for joint in JOINTS for label, bounds in EACH.items()}
-    return [{"name": name, "lower": low, "upper": high} for name, (low, high) in (every | SHARED).items()]
+def errors(stored: dict[str, Any], simulators: FloatArray | None) -> FloatArray:
+    """Return `(m,)`: errors on held-out motions of simulators `(m, p)`, or of the robot as its file has it, rad."""
+    spec = spec_of(stored)
+    robot, pool, numbers = robot_of(spec), pool_of(spec), held_out(spec)
+    simulation = simulation_of(spec, robot)
+    if simulators is None:
+        simulation, simulators = Simulation(robot, engine_of(spec.engine), []), np.empty((1, 0))
+    outcomes = simulation.sense(frozen([[number] for number in numbers]), frozen(simulators))
+    away = robot.sensors.values(outcomes[..., 1:]) - np.array([pool.readings(number) for number in numbers])[:, None]
+    squares = np.nanmean((away**2).reshape(*away.shape[:2], -1, len(JOINTS)), axis=2)
+    return np.asarray(np.sqrt(squares).mean(axis=(0, 2)))
+
+
+def compared(result: gaplab.Result, robot: Path, strategy: str, orders: int, motions: int) -> None:
+    """Print the errors of gaplab and of `mujoco.sysid` on the motions that a strategy chose."""
+    from benchmarks.sysid import Arm  # an extra of MuJoCo, for this alone
+
+    one = next(each for each in result.study.experiments if each.name == strategy)
+    spec = spec_of(one.spec)
+    arm = Arm(robot, pool_of(spec), {name.replace(", as=value", ""): bounds for name, bounds in BOUNDS.items()}, STEP_S)
+    unseen = held_out(spec)
+    print(f"mujoco.sysid, untuned: {arm.errors(unseen).mean():.5f} rad")
+    some = f"name == {strategy!r} and iteration"
+    chosen = result.samples.query(f"{some} <= {motions}").groupby("repetition")
+    for number, rows in list(chosen)[:orders]:
+        fitted = [int(each) for each in rows["genome"].map(lambda genome: genome[0])]
+        best = result.simulators.query(f"{some} == {motions} and rank == 0 and repetition == {number}")
+        ours = errors(one.spec, _parameters(best))[0]
+        theirs = arm.errors(unseen, fitted).mean()
+        print(f"order {number}, motions {fitted}: gaplab {ours:.5f}, sysid {theirs:.5f} rad, ratio {ours / theirs:.3f}")
+
+
+def _parameters(rows: Any) -> FloatArray:  # noqa: ANN401 - a data frame
+    return frozen(rows[list(BOUNDS)])
 
 
 def main() -> None:
-    """Import the motions, run the study, and print its verdict and curve."""
+    """Import the motions, run the study, and print its verdict, curve and errors."""
     asked = ArgumentParser(description=__doc__)
     asked.add_argument("table", type=Path)
     asked.add_argument("robot", type=Path)
-    asked.add_argument("--engine", default="mujoco")
     asked.add_argument("--strategies", nargs="+", default=["random", "farthest", "informative", "direct"])
     asked.add_argument("--orders", type=int, default=10)
     asked.add_argument("--motions", type=int, default=5)
     asked.add_argument("--seconds", type=float, default=20.0)
-    asked.add_argument("--evaluations", type=int, default=400)
+    asked.add_argument("--evaluations", type=int, default=240)
+    asked.add_argument("--seed", type=int, default=0)
+    asked.add_argument("--sysid", type=int, default=0)
     asked.add_argument("--output", type=Path, default=Path("so101.zip"))
     given = asked.parse_args()
     with TemporaryDirectory() as folder:
-        pool = Path(folder) / "motions.json"
+        robot, pool = Path(folder) / "so101.json", Path(folder) / "motions.json"
+        imported = import_robot(given.robot, ImportOptions(name="so101", time_step_s=STEP_S))
+        robot.write_text(json.dumps(imported.robot.content), "utf-8")
         options = PoolOptions(columns=JOINTS, recording="motion", every_s=0.1, seconds=given.seconds)
-        pool.write_text(import_pool(given.table, str(given.robot), "motions", options).text, "utf-8")
+        pool.write_text(import_pool(given.table, str(robot), "motions", options).text, "utf-8")
         result = gaplab.run(
             {
                 "name": "SO-101",
-                "robot": str(given.robot),
-                "engine": given.engine,
+                "robot": str(robot),
+                "engine": "mujoco",
                 "strategies": given.strategies,
                 "repetitions": given.orders,
+                "direct_repetitions": 1,
                 "iterations": given.motions,
-                "tunables": tunables(),
-                "tuner": "gauss_newton",
+                "tunables": [{"name": name, "lower": low, "upper": high} for name, (low, high) in BOUNDS.items()],
+                "tuner": "least_squares",
+                "seed": given.seed,
                 "budget": {"preset": "smoke", "simulator_evaluations": given.evaluations},
                 "reality": {"kind": "recorded", "pool": str(pool)},
             }
         )
     result.save(given.output)
     print(result.verdict)
-    print(result.curve.to_string())
+    best = result.simulators.query("rank == 0").copy()
+    stored = {each.name: each.spec for each in result.study.experiments}
+    for name, rows in best.groupby("name"):
+        best.loc[rows.index, "rad"] = errors(stored[str(name)], _parameters(rows))
+    print(f"as its file has it: {errors(next(iter(stored.values())), None)[0]:.5f} rad")
+    print(best.groupby(["name", "iteration"])["rad"].agg(["mean", "std", "count"]).to_string())
+    if given.sysid:
+        compared(result, given.robot, given.strategies[0], given.sysid, min(3, given.motions))
 
 
 if __name__ == "__main__":
