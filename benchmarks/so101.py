@@ -42,7 +42,7 @@ EACH = {
     "armature({})": (0.0, 0.1),
     "bias({})": (-0.1, 0.1),
 }
-SHARED = {"delay": (0.0, 0.1), "kd(*, as=value)": (0.0, 0.3)}
+SHARED = {"delay": (0.0, 0.1), "kd(as=value)": (0.0, 0.3)}
 BOUNDS = {label.format(joint): bounds for joint in JOINTS for label, bounds in EACH.items()} | SHARED
 
 
