@@ -3,11 +3,11 @@
 The data are of isaac-sim2real/sage, the robot of TheRobotStudio/SO-ARM100 (both Apache-2.0). TABLE is CSV or Parquet,
 with a line for each time, and the columns `motion, time_s, command_J, position_J` of the joints below, in rad. ROBOT is
 the MJCF. Errors are root mean squares over time, and their mean over joints and held-out motions. With `--sysid N`, the
-motions of the first N orders are given to `mujoco.sysid`, too.
+motions of the first N orders are given to `mujoco.sysid`, too. An archive that is there already is not computed again.
 """
 
 import json
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -71,7 +71,7 @@ def compared(result: gaplab.Result, robot: Path, strategy: str, orders: int, mot
     some = f"name == {strategy!r} and iteration"
     chosen = result.samples.query(f"{some} <= {motions}").groupby("repetition")
     for number, rows in list(chosen)[:orders]:
-        fitted = [int(each) for each in rows["genome"].map(lambda genome: genome[0])]
+        fitted = [int(each) for each in rows["gene_0"]]
         best = result.simulators.query(f"{some} == {motions} and rank == 0 and repetition == {number}")
         ours = errors(one.spec, _parameters(best))[0]
         theirs = arm.errors(unseen, fitted).mean()
@@ -82,20 +82,7 @@ def _parameters(rows: Any) -> FloatArray:  # noqa: ANN401 - a data frame
     return frozen(rows[list(BOUNDS)])
 
 
-def main() -> None:
-    """Import the motions, run the study, and print its verdict, curve and errors."""
-    asked = ArgumentParser(description=__doc__)
-    asked.add_argument("table", type=Path)
-    asked.add_argument("robot", type=Path)
-    asked.add_argument("--strategies", nargs="+", default=["random", "farthest", "informative", "direct"])
-    asked.add_argument("--orders", type=int, default=10)
-    asked.add_argument("--motions", type=int, default=5)
-    asked.add_argument("--seconds", type=float, default=20.0)
-    asked.add_argument("--evaluations", type=int, default=240)
-    asked.add_argument("--seed", type=int, default=0)
-    asked.add_argument("--sysid", type=int, default=0)
-    asked.add_argument("--output", type=Path, default=Path("so101.zip"))
-    given = asked.parse_args()
+def _run(given: Namespace) -> gaplab.Result:
     with TemporaryDirectory() as folder:
         robot, pool = Path(folder) / "so101.json", Path(folder) / "motions.json"
         imported = import_robot(given.robot, ImportOptions(name="so101", time_step_s=STEP_S))
@@ -119,6 +106,24 @@ def main() -> None:
             }
         )
     result.save(given.output)
+    return result
+
+
+def main() -> None:
+    """Import the motions, run the study, and print its verdict, curve and errors."""
+    asked = ArgumentParser(description=__doc__)
+    asked.add_argument("table", type=Path)
+    asked.add_argument("robot", type=Path)
+    asked.add_argument("--strategies", nargs="+", default=["random", "farthest", "informative", "direct"])
+    asked.add_argument("--orders", type=int, default=10)
+    asked.add_argument("--motions", type=int, default=5)
+    asked.add_argument("--seconds", type=float, default=20.0)
+    asked.add_argument("--evaluations", type=int, default=240)
+    asked.add_argument("--seed", type=int, default=0)
+    asked.add_argument("--sysid", type=int, default=0)
+    asked.add_argument("--output", type=Path, default=Path("so101.zip"))
+    given = asked.parse_args()
+    result = gaplab.run(given.output) if given.output.exists() else _run(given)
     print(result.verdict)
     best = result.simulators.query("rank == 0").copy()
     stored = {each.name: each.spec for each in result.study.experiments}

@@ -5,6 +5,8 @@ are compared, with the same tunables and bounds.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,9 @@ from mujoco import rollout, sysid
 
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.world.pools import Pool
+
+ROUNDS = 25
+"""Most iterations; each costs a rollout of each motion for each tunable."""
 
 Bounds = Mapping[str, tuple[float, float]]
 """Bounds by label, like `bias(elbow_flex)`, or `delay`."""
@@ -30,7 +35,7 @@ class Arm:
     """
 
     def __init__(self, file: Path, pool: Pool, bounds: Bounds, step_s: float) -> None:
-        self.spec, self.pool = mujoco.MjSpec.from_file(str(file)), pool
+        self.spec, self.pool = sysid.remove_visuals(mujoco.MjSpec.from_file(str(file))), pool
         self.spec.option.timestep = step_s
         for joint in pool.joints:
             kind = mujoco.mjtSensor.mjSENS_JOINTPOS
@@ -50,7 +55,8 @@ class Arm:
                 modify_residual=self._residual,
                 resample_true=False,
             )
-            params, _ = sysid.optimize(self.params, residual, "mujoco", verbose=False, max_iters=60)
+            with redirect_stdout(StringIO()):
+                params, _ = sysid.optimize(self.params, residual, "mujoco", verbose=False, max_iters=ROUNDS)
             found = sysid.apply_param_modifiers(params, self.spec)
         return frozen([self._error(found, params, each) for each in motions])
 
