@@ -70,6 +70,7 @@ class _Simulator(_Checked):
 class _Body(_Checked):
     genome: list[float] = []
     told: bool = False
+    members: list[list[float]] = []
     readings: list[float | None] = []
     repeats: list[float] = []
     simulators: list[_Simulator] = []
@@ -257,8 +258,8 @@ def _on_a_bench(id_: str, spec: Row) -> Robot | None:
 
 def _moves_it_wrongly(table: str, row: Row, robot: Robot) -> Iterator[Violation]:
     """Yield violations: a genome or readings that do not fit the robot, and traces that the answer does not have."""
-    genome = row["body"].get("genome") if table == "step" else row.get("genome")
-    if genome is not None:
+    body = row["body"] if table == "step" else row
+    for genome in filter(None, [body.get("genome"), *body.get("members", ())]):
         yield from genome_violations(genome, robot.label, robot.space)
     if table == "answer":
         if row["readings"] is not None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gaplab.services.contract.promises import check_repeats
 from gaplab.services.core.arrays import (
+    NO_GENOMES,
     NO_READINGS,
     Fitnesses,
     FloatArray,
@@ -55,15 +56,19 @@ class GridSearch:
     """A search that looks at every point of a grid, and counts its calls and its simulators.
 
     Attributes:
+        several: whether a genome may have several scores.
         calls: number of its calls.
         simulators: most simulators of a call.
-        scores: `(n,)`: scores of its last call.
+        scores: `(n,)`, or `(n, o)`: scores of its last call.
+        members: `(n, g)`: the best genomes of its last call.
     """
 
-    def __init__(self, believed: Belief) -> None:
+    def __init__(self, believed: Belief, *, several: bool = False) -> None:
         self.believed = believed
+        self.several = several
         self.calls = self.simulators = 0
         self.scores: FloatArray = NO_READINGS
+        self.members: Genomes = NO_GENOMES
 
     def __call__(
         self,
@@ -72,23 +77,30 @@ class GridSearch:
         parameters: Parameters | None = None,
         senses: bool = False,
         candidates: Genomes | None = None,
+        start: Genomes | None = None,
     ) -> Genome:
-        """Return the genome of the grid, or of the candidates, with the highest score."""
+        """Return the genome of the grid, of the start or of the candidates, with the highest score."""
         self.calls += 1
         simulators = self.believed.parameters if parameters is None else parameters
         self.simulators = max(self.simulators, len(simulators))
         axis = np.linspace(0, 1, 41)
         grid = np.array(np.meshgrid(axis, axis)).reshape(2, -1).T if candidates is None else candidates
+        if candidates is None and start is not None and len(start):
+            grid = np.vstack([start, grid])
         scores = np.asarray(score(grid, (seen if senses else hill)(grid, simulators)))
-        assert scores.shape == (len(grid),), f"its score of {len(grid)} genomes has the shape {scores.shape}"
+        sized = scores.shape[:1] == (len(grid),) and scores.ndim in ((1, 2) if self.several else (1,))
+        assert sized, f"its score of {len(grid)} genomes has the shape {scores.shape}"
         self.scores = scores
-        best: Genome = grid[int(np.argmax(np.where(np.isnan(scores), -np.inf, scores)))]
+        first = scores.reshape(len(grid), -1)[:, 0]
+        order = np.argsort(-np.where(np.isnan(first), -np.inf, first), kind="stable")
+        self.members = grid[order[:20]]
+        best: Genome = grid[order[0]]
         return best
 
 
 def chosen(strategy: Strategy, samples: Sequence[Sample], *, transfer: bool) -> tuple[FloatArray, GridSearch]:
     """Return the genome that a strategy selects or transfers, and how it searched for it."""
-    search = GridSearch(belief(strategy, samples))
+    search = GridSearch(belief(strategy, samples), several=strategy.controller_optimizer is not None)
     choose = strategy.transfer if transfer else strategy.select
     return np.asarray(choose(search.believed, search, np.random.default_rng(0))), search
 

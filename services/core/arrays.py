@@ -44,6 +44,10 @@ NO_READINGS: Readings = frozen([])
 """Readings of a robot without sensors."""
 
 
+NO_GENOMES: Genomes = frozen(np.empty((0, 0)))
+"""No controllers."""
+
+
 def no_readings() -> Readings:
     """Return the readings of a robot without sensors, for fields of frozen values."""
     return NO_READINGS

@@ -14,7 +14,7 @@ from typing import Literal
 from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers
-from gaplab.services.core.arrays import FloatArray, Genome, Genomes, frozen, no_readings
+from gaplab.services.core.arrays import NO_GENOMES, FloatArray, Genome, Genomes, frozen, no_readings
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
@@ -197,6 +197,9 @@ def _belief(setting: Setting, history: History) -> Belief:
         discrepancy=setting.discrepancy,
         candidates=_left(setting, history),
         commands=setting.commands,
+        members=history.members,
+        reading_times_s=setting.reading_times_s,
+        reading_periods=setting.reading_periods,
     )
 
 
@@ -213,6 +216,11 @@ def _search(setting: Setting, belief: Belief, answers: Answers, given: Allowance
     return ControllerSearch(setting.strategy.name, optimizer, belief, answers, given, rng)
 
 
+def _kept(strategy: Strategy, search: ControllerSearch) -> Genomes:
+    """Return what a strategy that continues goes on from, `(n, g)`: none if its optimizer has not searched."""
+    return frozen(search.members) if strategy.continues else NO_GENOMES
+
+
 def _select(setting: Setting, history: History, iteration: int, answers: Answers) -> Selected:
     """Return the controller that the strategy selects, from a search if it has one."""
     budget, strategy, learned = setting.budget, setting.strategy, bool(learnable(history.samples))
@@ -226,16 +234,18 @@ def _select(setting: Setting, history: History, iteration: int, answers: Answers
     genome = setting.genomes.check(selected, f"strategy {strategy.name!r}")
     if belief.candidates is not None and not (belief.candidates == genome).all(axis=1).any():
         raise PluginBroken(f"strategy {strategy.name!r} selected {genome}; permitted: a candidate that is left")
-    return Selected(iteration, genome, answers.cost)
+    return Selected(iteration, genome, answers.cost, members=_kept(strategy, search))
 
 
 def _tune(setting: Setting, history: History, iteration: int, answers: Answers) -> Tuned:
     """Return simulators tuned on the strategy's lessons whose measurement succeeded; random ones if there are none.
 
     The best simulator is tested on samples that are held out. The budget includes samples that are not lessons or whose
-    measurement failed; their rollouts count as saved.
+    measurement failed; their rollouts count as saved. The simulators of a strategy that does not tune stay.
     """
     strategy = setting.strategy
+    if not strategy.tunes:
+        return Tuned(iteration, history.simulators or _drawn(setting, iteration))
     seen, unseen = split(history.samples, setting.held_out)
     evaluations = setting.budget.simulator_evaluations // setting.tuner.divisor(len(seen))
     unseen = (*unseen, *setting.tests)
@@ -273,7 +283,7 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
     search = _search(setting, belief, answers, allowance, setting.stream(iteration, "transfer"))
     transferred = strategy.transfer(belief, search, setting.stream(iteration, "transfer draws"))
     genome = setting.genomes.check(transferred, f"strategy {strategy.name!r}")
-    return Transferred(iteration, genome, search.score_of(genome), answers.cost)
+    return Transferred(iteration, genome, search.score_of(genome), answers.cost, _kept(strategy, search))
 
 
 def _record(setting: Setting, history: History, iteration: int) -> Probed:

@@ -1,17 +1,17 @@
 """The one driver that spends a budget of evaluations on an optimizer, and the search that a strategy gets."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
-from math import nan
+from math import isfinite, nan
 from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers, Following, nothing
-from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters, nearest
+from gaplab.services.core.arrays import NO_GENOMES, FloatArray, Genome, Genomes, Parameters, nearest
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.space import Space
@@ -60,6 +60,8 @@ def maximise(
 ) -> Population:
     """Return the ranked population after exactly `evaluations` fitness evaluations; nan and infinities never win.
 
+    An optimizer with several objectives may be told `(n, o)` fitnesses.
+
     A copy of a genome that the search has evaluated counts, but is not evaluated again unless it was rejected. Copies
     are common: genes clip at their bounds.
 
@@ -69,28 +71,37 @@ def maximise(
         evaluate: returns fitnesses; each call has the optimizer's genomes, or as many as the budget has left.
         evaluations: the budget, at least 1.
         rng: all randomness of the search.
-        start: `(n, g)`, n ≥ 1: genomes that are evaluated before those that the optimizer asks for; default: none.
+        start: `(n, g)`: genomes that are evaluated before those that the optimizer asks for; default: none.
     """
     thresholds_of = optimizer.rejection_thresholds if isinstance(optimizer, Rejecting) else _unknown
     state = optimizer.init(space)
-    known: dict[bytes, float] = {}
+    known: dict[bytes, FloatArray] = {}
     while evaluations > 0:
-        genomes = (_asked(optimizer, state, space, rng) if start is None else start)[:evaluations]
+        begins = start is not None and len(start) > 0
+        genomes = (start if begins else _asked(optimizer, state, space, rng))[:evaluations]
         start = None
         if not len(genomes):
             raise PluginBroken(f"optimizer {optimizer.name!r} asks for no genome; evaluations left: {evaluations}")
         keys = [genome.tobytes() for genome in genomes]
         new = [index for index, key in enumerate(keys) if key not in known]
-        fitness = np.array([known.get(key, np.nan) for key in keys])
+        answers: Iterator[FloatArray] = iter(())
         if new:
             thresholds = thresholds_of(state, genomes)[new]
             following = partial(_following, optimizer, state, thresholds, rng, evaluations - len(genomes))
-            fitness[new] = evaluate(Question(genomes[new], thresholds, following))
-            exact = (index for index, least in zip(new, thresholds, strict=True) if not fitness[index] < least)
-            known.update((keys[index], float(fitness[index])) for index in exact)
-        state = optimizer.tell(state, genomes, np.where(np.isfinite(fitness), fitness, -np.inf))
+            answers = iter(evaluate(Question(genomes[new], thresholds, following)))
+        fitness = np.array([known[key] if key in known else next(answers) for key in keys])
+        if new:
+            exact = (index for index, least in zip(new, thresholds, strict=True) if not np.all(fitness[index] < least))
+            known.update((keys[index], fitness[index]) for index in exact)
+        state = optimizer.tell(state, genomes, _finite(fitness))
         evaluations -= len(genomes)
     return state.ranked()
+
+
+def _finite(scores: FloatArray) -> FloatArray:
+    """Return scores `(n,)` or `(n, o)`: -inf for a genome with one that is not finite."""
+    finite = np.isfinite(scores) if scores.ndim == 1 else np.isfinite(scores).all(axis=1, keepdims=True)
+    return np.where(finite, scores, -np.inf)
 
 
 def _asked(optimizer: Optimizer, state: Population, space: Space, rng: Generator) -> Genomes:
@@ -176,6 +187,7 @@ class ControllerSearch:
         answers: answers of the simulators.
         allowance: the rollouts to spend.
         rng: random generator of the optimizer.
+        members: `(n, g)`: the final population of its optimizer, best first.
     """
 
     strategy: str
@@ -184,9 +196,9 @@ class ControllerSearch:
     answers: Answers
     allowance: Allowance
     rng: Generator
+    members: Genomes = field(default_factory=lambda: NO_GENOMES, init=False)
     _spent: bool = field(default=False, init=False)
-    _found: Genome | None = field(default=None, init=False)
-    _score: float = field(default=nan, init=False)
+    _found: Population | None = field(default=None, init=False)
 
     def __call__(
         self,
@@ -195,35 +207,42 @@ class ControllerSearch:
         parameters: Parameters | None = None,
         senses: bool = False,
         candidates: Genomes | None = None,
+        start: Genomes | None = None,
     ) -> Genome:
-        """Return the genome `(g,)` with the highest score found."""
+        """Return the genome `(g,)` with the highest score found; of several scores, the first counts."""
         self._spend()
         simulators = self._checked(parameters)
 
         def scored(genomes: Genomes, following: Following = nothing) -> FloatArray:
             if senses:
-                return score(genomes, self._sensed(genomes, simulators, following))
-            return score(genomes, self.answers(genomes, simulators, following))
+                return self._scores(score(genomes, self._sensed(genomes, simulators, following)), len(genomes))
+            return self._scores(score(genomes, self.answers(genomes, simulators, following)), len(genomes))
 
         space, evaluations = self.belief.space, self.allowance.evaluations
         if candidates is None and self.belief.candidates is not None:
             candidates = self.belief.draw(evaluations, self.rng)
         if candidates is None:
             found = maximise(
-                self.optimizer, space, lambda asked: scored(asked.genomes, asked.following), evaluations, self.rng
+                self.optimizer,
+                space,
+                lambda asked: scored(asked.genomes, asked.following),
+                evaluations,
+                self.rng,
+                start,
             )
+            self.members = found.genomes
         else:
-            scores = scored(candidates[:evaluations])
-            scores = np.where(np.isfinite(scores), scores, -np.inf)
+            scores = _finite(scored(candidates[:evaluations]))
             found = Population(space, candidates[:evaluations], scores).ranked()
+        self._found = found
         best: Genome = found.genomes[0]
-        self._found, self._score = best, float(found.fitness[0])
         return best
 
     def score_of(self, genome: Genome) -> float:
-        """Return the score of a genome `(g,)` if the search found it, and the score is finite; else nan."""
-        found = self._found is not None and np.array_equal(genome, self._found)
-        return self._score if found and np.isfinite(self._score) else nan
+        """Return the first score of a genome `(g,)` if the search kept it, and the score is finite; else nan."""
+        at = [] if self._found is None else np.flatnonzero((self._found.genomes == genome).all(axis=1))
+        score = float(self._found.first[at[0]]) if self._found is not None and len(at) else nan
+        return score if isfinite(score) else nan
 
     def _spend(self) -> None:
         if self._spent or not self.allowance.evaluations:
@@ -242,6 +261,19 @@ class ControllerSearch:
             permitted = f"permitted: 1 to {self.allowance.simulators}, as it states"
             raise PluginBroken(f"{source} searches in {len(rows)} simulators; {permitted}")
         return rows
+
+    def _scores(self, scores: FloatArray, count: int) -> FloatArray:
+        """Return the scores of so many genomes, `(n,)`, or `(n, o)` for an optimizer with several objectives.
+
+        Raises:
+            PluginBroken: they are not such an array.
+        """
+        scores, several = np.asarray(scores, dtype=np.float64), self.optimizer.objectives
+        if scores.shape[:1] != (count,) or scores.ndim not in ((1, 2) if several else (1,)):
+            msg = f"scores {count} genomes with an array of shape {scores.shape}; permitted: (n,)"
+            more = ", or (n, o)" if several else f", as the optimizer {self.optimizer.name!r} has one objective"
+            raise PluginBroken(f"strategy {self.strategy!r} {msg}{more}")
+        return scores
 
     def _sensed(self, genomes: Genomes, simulators: Parameters, following: Following) -> FloatArray:
         if self.answers.senses:

@@ -7,7 +7,16 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.random import Generator
 
-from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Genomes, Parameters, Readings, no_readings
+from gaplab.services.core.arrays import (
+    NO_GENOMES,
+    NO_READINGS,
+    FloatArray,
+    Genome,
+    Genomes,
+    Parameters,
+    Readings,
+    no_readings,
+)
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.fitness import SquaredFitness
 from gaplab.services.core.space import Space
@@ -113,6 +122,8 @@ class Belief:
         candidates: `(n, g)`: the recordings that are left to select from, which have readings and no fitness; None if
             any genome of the space may be tried.
         commands: `(n, c)`: what was commanded in recording 0 to n - 1, nan after its end; None if nothing was.
+        members: `(n, g)`: the final population of the latest search of a strategy that `continues`; else none.
+        reading_times_s, reading_periods: `(q,)`: time of each reading, and its period over its noise; 0 for none.
     """
 
     space: Space
@@ -125,6 +136,9 @@ class Belief:
     discrepancy: Discrepancy = field(default_factory=SquaredFitness)
     candidates: Genomes | None = None
     commands: FloatArray | None = None
+    members: Genomes = field(default_factory=lambda: NO_GENOMES)
+    reading_times_s: FloatArray = field(default_factory=no_readings)
+    reading_periods: FloatArray = field(default_factory=no_readings)
 
     def at_most(self, evaluations: int) -> int:
         """Return how many of these evaluations a selection can use: as many as there are candidates."""
@@ -188,12 +202,14 @@ class Selected:
 
     Attributes:
         told: true if it does not follow from the steps before, since a person chose it; false if the strategy did.
+        members: `(n, g)`: the final population of the search, of a strategy that `continues`; else none.
     """
 
     iteration: int
     genome: Genome
     cost: Cost = field(default_factory=Cost)
     told: bool = False
+    members: Genomes = field(default_factory=lambda: NO_GENOMES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,12 +236,14 @@ class Transferred:
     Attributes:
         fitness: score of the strategy's search, by default the fitness in the best simulator; nan if it is unknown, or
             the physics failed for every controller tried.
+        members: as of Selected.
     """
 
     iteration: int
     genome: Genome
     fitness: float
     cost: Cost = field(default_factory=Cost)
+    members: Genomes = field(default_factory=lambda: NO_GENOMES)
 
 
 @dataclass(frozen=True)
@@ -288,6 +306,7 @@ class History:
         probed: its latest probe.
         scale: absolute fitness in simulation of the first transferred controller that has one; None without any.
         seen: number of samples before the latest step of each kind.
+        members: `(n, g)`: the latest final population of a search that was kept; none before.
     """
 
     last: Step | None = None
@@ -297,10 +316,13 @@ class History:
     probed: Probed | None = None
     scale: float | None = None
     seen: Mapping[type[Step], int] = field(default_factory=dict)
+    members: Genomes = field(default_factory=lambda: NO_GENOMES)
 
     def after(self, step: Step) -> "History":
         """Return the history with one more step."""
         now = replace(self, last=step, seen={**self.seen, type(step): len(self.samples)})
+        if isinstance(step, Selected | Transferred) and len(step.members):
+            now = replace(now, members=step.members)
         match step:
             case Measured(sample=sample):
                 return replace(now, samples=(*self.samples, sample))

@@ -56,7 +56,7 @@ SENTENCES = {
     EventKind.DECIDED: "{step}: {decided} about the answer by {operator}{why}",
     EventKind.SELECTED: "{step}: selected a controller to try in reality",
     EventKind.MEASURED: "{step}: {measured}",
-    EventKind.TUNED: "{step}: simulators tuned, sum of squared errors {error}",
+    EventKind.TUNED: "{step}: {tuned}",
     EventKind.TRANSFERRED: "{step}: controller evolved, {reached} in simulation",
     EventKind.PROBED: "{step}: {probed}",
 }
@@ -102,7 +102,9 @@ def _parts(body: Body) -> dict[str, str]:
         "says": f", says {by}" if by else "",
         "decided": f"{by} decided" if by else "decided",
         "measured": "failed in reality" if fitness is None else f"measured in reality, {number(fitness)}",
-        "error": "unknown" if error is None else number(error),
+        "tuned": f"simulators tuned, sum of squared errors {'unknown' if error is None else number(error)}"
+        if "squared_error" in body
+        else "nothing to tune simulators on",
         "reached": "the physics failed" if simulated is None else f"reaching {number(simulated)}",
         "probed": "the controller is not measured, as the spec says" if body.get("left_out") else reached,
     }

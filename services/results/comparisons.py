@@ -87,7 +87,7 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
         _check_the_end(rows, compared, to_evaluations)
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
     pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
-    where = sentences.where(first, final, *(row.known for row in rows if row.tunes))
+    where = sentences.where(first, final, *(row.known for row in rows if row.tunes or row.known))
     told = {"fitness": fitness, "unit": unit(spec_of(rows[0].spec)), "where": where, "shared_evaluations": shared}
     warned = (tuple(_warnings(settings[pair.first], settings[pair.second])) for pair in pairs)
     return tuple(pair.model_copy(update={"warnings": each, **told}) for pair, each in zip(pairs, warned, strict=True))

@@ -11,6 +11,7 @@ from typing import Any
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.resolved import ResolvedReality, ResolvedTunable
 from gaplab.schemas.spec import BudgetName, ExperimentSpec, SharedSettings
+from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.registry import Plugin, Registry
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners import tuners
@@ -60,17 +61,16 @@ LEAN_OPTIMIZER = PluginRef(name="cma_es")
 
 
 def with_preset(spec: ExperimentSpec) -> ExperimentSpec:
-    """Return the spec with the plug-ins and options that its preset sets, where the spec does not give them."""
-    preset = PRESETS[spec.budget.preset]
-    if not (preset.as_published or preset.lean):
-        return spec
-    changes: dict[str, Any] = {
-        "strategy": _with(preset, spec.strategy, strategies),
-        "tuner": _with(preset, spec.tuner, tuners),
-    }
-    if preset.lean:
-        changes["controller_optimizer"] = spec.controller_optimizer or LEAN_OPTIMIZER
-    return spec.model_copy(update=changes)
+    """Return the spec with the plug-ins and options that its preset and strategy set, where it does not give them."""
+    preset, kind = PRESETS[spec.budget.preset], strategies.get(spec.strategy.name)
+    own = PluginRef(name=kind.controller_optimizer) if kind and kind.controller_optimizer else None
+    of_controllers = spec.controller_optimizer or own or (LEAN_OPTIMIZER if preset.lean else None)
+    changes: dict[str, Any] = {"controller_optimizer": of_controllers} if of_controllers else {}
+    if preset.as_published or preset.lean:
+        kinds = {"strategy": strategies, "tuner": tuners, "controller_optimizer": optimizers}
+        given = {name: changes.get(name, getattr(spec, name)) for name in kinds}
+        changes |= {name: _with(preset, ref, kinds[name]) for name, ref in given.items() if ref}
+    return spec.model_copy(update=changes) if changes else spec
 
 
 def preset_options(preset: Preset, kind: type[Plugin]) -> Mapping[str, Any]:

@@ -91,9 +91,11 @@ def recorded_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Vi
     if not discrepancies[spec.discrepancy.name].senses:
         able = [name for name, each in discrepancies.items() if each.senses]
         yield Violation("/discrepancy", spec.discrepancy.name, "recordings have readings, and no fitness", able)
-    if strategy.needs_fitness or not (strategy.takes_samples or strategy.in_reality):
-        able = [name for name, each in strategies.items() if each.in_reality or not each().needs_fitness]
+    if strategy.needs_fitness or not (strategy.takes_samples or strategy.in_reality) or not strategy.tunes:
+        tuning = {name: each for name, each in strategies.items() if each.tunes}
+        able = [name for name, each in tuning.items() if each.in_reality or not each().needs_fitness]
         message = f"{strategy.name} selects by fitness with these options, and recordings have none"
+        message = message if strategy.tunes else f"{strategy.name} tunes nothing, which recordings are for"
         permitted = f"{', '.join(able)}, {WITH_OPTIONS}"
         yield Violation("/strategy", strategy.name, message, permitted)
     most = selectable(spec)

@@ -89,7 +89,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     if violations := [
         *engine_violations(robot, {reality_engine: "/reality/engine", engine: "/engine"}),
         *tunable_violations(spec, robot, engine),
-        *strategy_violations(spec, strategy, robot),
+        *strategy_violations(spec, strategy, robot, controllers),
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, robot, simulated=engine, engine=reality_engine),
         *bench_violations(spec, robot, discrepancy),
@@ -249,7 +249,8 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
         counts = range(iterations + 1) if strategy.takes_samples else [recordings]
         return selections + sum(_of_tuning(spec, samples) + tests for samples in counts)
     transfer = Allowance.of_transfer(strategy, budget.controller_evaluations, tunables)
-    tuned = sum(_of_tuning(spec, number) for number in range(iterations + 1)) if strategy.takes_samples else 0
+    tunes = strategy.takes_samples and strategy.tunes
+    tuned = sum(_of_tuning(spec, number) for number in range(iterations + 1)) if tunes else 0
     return transfer.rollouts * (iterations + 1) + selections + tuned
 
 

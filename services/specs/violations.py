@@ -10,6 +10,7 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tuners.base import Tuner
@@ -55,8 +56,18 @@ def tuning_violations(robot: Robot, discrepancy: Discrepancy, tuner: Tuner) -> I
         yield Violation("/discrepancy", discrepancy.name, message, able)
 
 
-def strategy_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) -> Iterator[Violation]:
-    """Yield what a strategy lacks: sensors of the robot, tunables that it names, samples."""
+def strategy_violations(
+    spec: ExperimentSpec, strategy: Strategy, robot: Robot, optimizer: Optimizer
+) -> Iterator[Violation]:
+    """Yield what a strategy lacks: sensors of the robot, tunables that it names, samples, objectives.
+
+    The optimizer is that of controllers.
+    """
+    own = optimizers.get(strategy.controller_optimizer or "")
+    if own is not None and own.objectives and not optimizer.objectives:
+        able = [name for name, each in optimizers.items() if each.objectives]
+        message = f"{strategy.name} has several objectives, and the optimizer {optimizer.name} has one"
+        yield Violation("/controller_optimizer", optimizer.name, message, able)
     if spec.iterations == 0 and strategy.takes_samples and not spec.reality.samples:
         message = "0 iterations tune on samples from before alone, and the spec has none"
         yield Violation("/iterations", 0, message, "at least 1, or samples in /reality/samples")
@@ -225,7 +236,7 @@ def budget_violations(
     if strategy.searches and strategy.takes_samples:
         selection = strategy.selection_simulators(tunables, learned=False) if shared else 1
         needed["selection_evaluations"] = (budget.selection_evaluations, least, selection, "simulators")
-    if strategy.takes_samples:
+    if strategy.takes_samples and strategy.tunes:
         needed["simulator_evaluations"] = (
             budget.simulator_evaluations,
             tuner.least_evaluations(of_simulators, strategy.ensemble),

@@ -124,6 +124,7 @@ def test_truth_is_not_among_what_a_strategy_is_given() -> None:
 
     known = {"space", "known", "samples", "simulators", "tunables", "names", "scale", "discrepancy"}
     known |= {"candidates", "commands"}  # of recordings
+    known |= {"members", "reading_times_s", "reading_periods"}
     assert set(vars(believed)) == known
     assert not any(np.array_equal(each.parameters, TRUTH) for each in believed.simulators)
 

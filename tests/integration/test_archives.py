@@ -49,6 +49,9 @@ FITNESS = FINITE | st.just(nan)
 ERROR = st.floats(0, allow_nan=False, allow_infinity=False) | st.just(inf)
 COST = st.builds(Cost, st.integers(0, 2**40), st.just(0), st.integers(0, 2**40))
 GENOME = st.lists(FINITE, min_size=1, max_size=9).map(frozen)
+MEMBERS = st.lists(st.lists(FINITE, min_size=2, max_size=2), max_size=3).map(
+    lambda rows: frozen(np.reshape(rows, (-1, 2)) if rows else np.empty((0, 0)))
+)
 SIMULATOR = st.builds(Simulator, st.lists(FINITE, min_size=2, max_size=2).map(frozen), ERROR)
 TOY_STUDY = {"robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 2}
 NAME = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1, max_size=200)
@@ -63,10 +66,10 @@ def logs(draw: Any) -> Any:
 def _steps(draw: Any) -> Iterator[Any]:
     for iteration in range(3):
         if iteration:
-            yield Selected(iteration, draw(GENOME), draw(COST))
+            yield Selected(iteration, draw(GENOME), draw(COST), members=draw(MEMBERS))
             yield Measured(iteration, Sample(draw(GENOME), draw(FITNESS)))
         yield Tuned(iteration, tuple(draw(st.lists(SIMULATOR, min_size=1, max_size=4))), draw(COST))
-        yield Transferred(iteration, draw(GENOME), draw(FITNESS), draw(COST))
+        yield Transferred(iteration, draw(GENOME), draw(FITNESS), draw(COST), draw(MEMBERS))
         yield Probed(iteration, draw(FITNESS), draw(FITNESS))
 
 

@@ -52,6 +52,24 @@ class Stubborn(Plain):
         return ()
 
 
+class Continuing(Plain):
+    """Tunes nothing, and each of its searches begins with what the last one ended with."""
+
+    tunes, continues = False, True
+
+    def select(self, belief: Any, search: Any, rng: Any) -> Any:
+        self.began = belief.members
+        found = search(lambda _, fitnesses: fitnesses.mean(axis=1), start=belief.members)
+        assert np.array_equal(search.members[0], found)
+        return found
+
+    def transfer_simulators(self, tunables: Any) -> Any:
+        return self.ensemble
+
+    def transfer(self, belief: Any, search: Any, rng: Any) -> Any:
+        return self.select(belief, search, rng)
+
+
 def steps_of(strategy: Any, **changes: Any) -> Any:
     return list(repetition(replace(small_setting(**changes), strategy=strategy)))
 
@@ -173,7 +191,30 @@ def test_samples_that_are_no_lessons_are_not_tuned_on() -> None:
     assert [step.cost for step in tuned[1:]] == [Cost(rollouts=50 * 1, saved=50 * count) for count in (0, 1, 2)]
 
 
-@pytest.mark.parametrize("strategy", [Robust(), Patient(), Stubborn()], ids=lambda each: type(each).__name__)
+def test_a_strategy_that_does_not_tune_pays_for_none_and_searches_each_transfer_anew() -> None:
+    steps = steps_of(Continuing())
+
+    tuned, transferred = of(Tuned, steps), of(Transferred, steps)
+    assert len({flat(step.simulators) for step in tuned}) == 1
+    assert {step.cost for step in tuned} == {Cost()}
+    assert all(step.cost.rollouts + step.cost.saved == 40 * 3 for step in transferred)
+
+
+def test_a_strategy_that_continues_begins_each_search_with_the_members_of_the_last_one() -> None:
+    strategy, log = Continuing(), []
+    for step in repetition(replace(small_setting(), strategy=strategy)):
+        if isinstance(step, Selected | Transferred):
+            before = [each.members for each in of(Selected | Transferred, log)]
+            np.testing.assert_array_equal(strategy.began, before[-1] if before else np.empty((0, 0)))
+            assert step.members.shape == (5, 2)
+        log.append(step)
+
+    assert not any(len(step.members) for step in of(Selected | Transferred, steps_of(Plain())))
+
+
+@pytest.mark.parametrize(
+    "strategy", [Robust(), Patient(), Stubborn(), Continuing()], ids=lambda each: type(each).__name__
+)
 def test_a_repetition_with_a_strategy_of_ones_own_resumes_bit_equal_wherever_it_stopped(strategy: Any) -> None:
     steps = steps_of(strategy)
 

@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -18,7 +19,7 @@ class Population:
     Attributes:
         space: the space of the genomes.
         genomes: `(n, g)`, the members from the oldest to the newest.
-        fitness: `(n,)`; -inf for a member that has none.
+        fitness: `(n,)`, or `(n, o)` of several objectives; -inf for a member that has none.
     """
 
     space: Space
@@ -30,9 +31,14 @@ class Population:
         """The number of members."""
         return len(self.fitness)
 
+    @property
+    def first(self) -> FloatArray:
+        """The fitness `(n,)`; of several objectives, the first."""
+        return self.fitness if self.fitness.ndim == 1 else self.fitness[:, 0]
+
     def ranked(self) -> "Population":
-        """Return the members from the fittest to the least fit; of equals, the older first."""
-        order = np.argsort(-self.fitness, kind="stable")
+        """Return the members from the fittest to the least fit, by the first objective; of equals, the older first."""
+        order = np.argsort(-self.first, kind="stable")
         return Population(self.space, self.genomes[order], self.fitness[order])
 
 
@@ -40,7 +46,13 @@ class Optimizer(Plugin):
     """Maximises a fitness: it asks for genomes and is told their fitness.
 
     It compares fitnesses by rank, so any monotone transform of the fitness gives the same search.
+
+    Attributes:
+        objectives: true if the fitness that it is told may be `(n, o)`, of which it maximises each. With one objective,
+            it still is an optimizer.
     """
+
+    objectives: ClassVar[bool] = False
 
     def init(self, space: Space) -> Population:
         """Return an empty population in the space."""

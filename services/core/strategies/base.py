@@ -21,12 +21,19 @@ from gaplab.services.core.types import Belief, Sample
 Score: TypeAlias = Callable[[Genomes, FloatArray], FloatArray]
 """A function from genomes `(n, g)` and their fitnesses `(n, m)` in the simulators to scores `(n,)`, maximised.
 
+For an optimizer with several objectives, it may return `(n, o)`.
+
 A search with readings gives it outcomes `(n, m, 1 + q)`: fitness, then readings.
 """
 
 
 class Search(Protocol):
     """A search over controllers, with the whole budget of a selection or a transfer; it can be called once."""
+
+    @property
+    def members(self) -> Genomes:
+        """Return the final population `(n, g)` of its optimizer, best first; none before, and none of candidates."""
+        ...
 
     def __call__(
         self,
@@ -35,14 +42,16 @@ class Search(Protocol):
         parameters: Parameters | None = None,
         senses: bool = False,
         candidates: Genomes | None = None,
+        start: Genomes | None = None,
     ) -> Genome:
-        """Return the genome `(g,)` with the highest score found.
+        """Return the genome `(g,)` with the highest score found; of several scores, the first counts.
 
         Args:
             score: what to maximise; a score that is not finite never wins.
             parameters: `(m, p)`, the simulators to search in; default: all that were tuned.
             senses: true if the score needs `(n, m, 1 + q)`: fitness, then q readings; 0 of a robot without sensors.
             candidates: `(n, g)`, the only genomes to evaluate, as far as the budget goes; default: the optimizer's.
+            start: `(n, g)`, genomes that the optimizer is given first; they count.
 
         Raises:
             PluginBroken: the budget is spent, or an evaluation needs more simulators than the strategy states.
@@ -58,12 +67,20 @@ class Strategy(Plugin):
         selects_transferred: true if its search has the transfer's goal, the fittest controller in the best simulator.
         takes_samples: false if it tunes nothing and transfers one controller at once; its curve is a horizontal line.
         in_reality: true for the direct baseline, which evolves in reality and takes no samples.
+        tunes: false if the first simulators stay, at no cost; the transfer is searched anew after each sample.
+        continues: true if the final populations of its searches are kept, so that the next one can go on from
+            `Belief.members`.
+        controller_optimizer: name of the optimizer that searches for its controllers if the spec names none; None:
+            that of the spec. If it has several objectives, an optimizer with a single one is refused.
     """
 
     searches: ClassVar[bool] = True
     selects_transferred: ClassVar[bool] = False
     takes_samples: ClassVar[bool] = True
     in_reality: ClassVar[bool] = False
+    tunes: ClassVar[bool] = True
+    continues: ClassVar[bool] = False
+    controller_optimizer: ClassVar[str | None] = None
 
     @property
     def ensemble(self) -> int:

@@ -179,8 +179,9 @@ class ExperimentRow(Base):
 
     @property
     def tunes(self) -> bool:
-        """Whether it has samples to tune on: it takes some, has some from before, or recordings."""
-        return not self.level or self.recorded
+        """Whether its strategy tunes, and has samples for it: it takes some, has some from before, or recordings."""
+        strategy = strategies.get(self.strategy)
+        return (not self.level or self.recorded) and (strategy is None or strategy.tunes)
 
     @property
     def level(self) -> bool:

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.services.core.arrays import known
-from gaplab.services.core.types import Measured, Probed, Selected, Step, Transferred, Tuned
+from gaplab.services.core.types import Cost, Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import EventCounterRow, EventRow
 from gaplab.services.store.texts import brief
@@ -85,7 +85,8 @@ def _event_of(step: Step) -> tuple[EventKind, dict[str, Any]]:
             return EventKind.MEASURED, {"fitness": known(step.sample.fitness)}
         case Tuned():
             best = known(step.simulators[0].squared_error) if step.simulators else None
-            return EventKind.TUNED, {"simulators": len(step.simulators), "squared_error": best}
+            tuned = {"squared_error": best} if step.cost != Cost() else {}
+            return EventKind.TUNED, {"simulators": len(step.simulators)} | tuned
         case Transferred():
             return EventKind.TRANSFERRED, {"simulated_fitness": known(step.fitness)}
         case Probed():

@@ -11,7 +11,7 @@ from typing import Any, cast
 from sqlalchemy import Row, Table, select
 from sqlalchemy.orm import Session
 
-from gaplab.services.core.arrays import NO_READINGS, FloatArray, frozen, known
+from gaplab.services.core.arrays import NO_GENOMES, NO_READINGS, FloatArray, Genomes, frozen, known
 from gaplab.services.core.types import (
     Cost,
     Fit,
@@ -101,16 +101,21 @@ def columns_of(step: Step) -> dict[str, Any]:
 
 def _outcome(step: Step) -> dict[str, Any]:
     match step:
-        case Selected(genome=genome, told=told):
-            return {"body": {"genome": genome.tolist()} | ({"told": True} if told else {})}
+        case Selected(told=told):
+            return {"body": _found(step) | ({"told": True} if told else {})}
         case Measured(sample=sample):
             return {"fitness": known(sample.fitness), "body": {"genome": sample.genome.tolist()} | _seen(sample)}
         case Tuned(simulators=simulators):
             return {"body": {"simulators": [*map(_packed, simulators)]}}
-        case Transferred(genome=genome):
-            return {"fitness": known(step.fitness), "body": {"genome": genome.tolist()}}
+        case Transferred():
+            return {"fitness": known(step.fitness), "body": _found(step)}
         case Probed():
             return {"fitness": known(step.fitness), "recorded": known(step.recorded), "body": _seen(step)}
+
+
+def _found(step: Selected | Transferred) -> dict[str, Any]:
+    members = step.members.tolist()
+    return {"genome": step.genome.tolist()} | ({"members": members} if members else {})
 
 
 def _seen(measured: Sample | Probed) -> dict[str, Any]:
@@ -143,14 +148,15 @@ def step_of(row: StepRow | Row[Any]) -> Step:
     cost = Cost(row.rollouts, row.failures, row.saved)
     match row.kind:
         case StepKind.SELECTED:
-            return Selected(row.iteration, frozen(body["genome"]), cost, body.get("told", False))
+            told, members = body.get("told", False), _members(body)
+            return Selected(row.iteration, frozen(body["genome"]), cost, told, members)
         case StepKind.MEASURED:
             sample = Sample(frozen(body["genome"]), fitness, _vector(body, "readings"), _vector(body, "repeats"))
             return Measured(row.iteration, sample)
         case StepKind.TUNED:
             return Tuned(row.iteration, tuple(map(simulator_of, body["simulators"])), cost)
         case StepKind.TRANSFERRED:
-            return Transferred(row.iteration, frozen(body["genome"]), fitness, cost)
+            return Transferred(row.iteration, frozen(body["genome"]), fitness, cost, _members(body))
     seen = _vector(body, "readings"), _vector(body, "repeats")
     return Probed(row.iteration, fitness, _or(nan, row.recorded), *seen, left_out=row.measured_by is None)
 
@@ -173,6 +179,10 @@ def _fit_of(stored: Sequence[float | None] | None, noise: Sequence[float]) -> Fi
         return None
     expected, surprise, scale, *errors = [_or(nan, each) for each in stored]
     return Fit(expected, surprise, scale, frozen(errors), frozen(noise))
+
+
+def _members(body: Mapping[str, Any]) -> Genomes:
+    return frozen(body["members"]) if "members" in body else NO_GENOMES
 
 
 def _vector(body: Mapping[str, Any], name: str) -> FloatArray:

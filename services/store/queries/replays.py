@@ -35,6 +35,8 @@ def tuned_samples(session: Session, experiment: ExperimentRow) -> tuple[TunedSam
 
     Held-out samples are not among them.
     """
+    if not experiment.tunes:
+        return ()
     row, before, after = StepRow, aliased(StepRow), aliased(StepRow)
     query = steps_of([experiment.id], StepKind.MEASURED, RepetitionRow.number, row, best(before), best(after))
     for found, iteration in ((before, row.iteration - 1), (after, row.iteration)):

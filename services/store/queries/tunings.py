@@ -80,7 +80,9 @@ class MeasuredIterations:
 
 
 def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
-    """Return the iterations whose sample has a fitness."""
+    """Return the iterations whose sample has a fitness; none of a strategy that tunes nothing."""
+    if not experiment.tunes:
+        return MeasuredIterations({}, {})
     row, share = StepRow, experiment.spec["held_out"]
     query = steps_of([experiment.id], StepKind.MEASURED, RepetitionRow.number, row.iteration)
     tuned_on, held_out = dict[int, list[int]](), dict[int, list[int]]()
