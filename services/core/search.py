@@ -77,8 +77,7 @@ def maximise(
     state = optimizer.init(space)
     known: dict[bytes, FloatArray] = {}
     while evaluations > 0:
-        begins = start is not None and len(start) > 0
-        genomes = (start if begins else _asked(optimizer, state, space, rng))[:evaluations]
+        genomes = (_asked(optimizer, state, space, rng) if start is None or not len(start) else start)[:evaluations]
         start = None
         if not len(genomes):
             raise PluginBroken(f"optimizer {optimizer.name!r} asks for no genome; evaluations left: {evaluations}")
@@ -240,9 +239,10 @@ class ControllerSearch:
 
     def score_of(self, genome: Genome) -> float:
         """Return the first score of a genome `(g,)` if the search kept it, and the score is finite; else nan."""
-        at = [] if self._found is None else np.flatnonzero((self._found.genomes == genome).all(axis=1))
-        score = float(self._found.first[at[0]]) if self._found is not None and len(at) else nan
-        return score if isfinite(score) else nan
+        if self._found is None:
+            return nan
+        scores = self._found.first[(self._found.genomes == genome).all(axis=1)]
+        return float(scores[0]) if len(scores) and isfinite(scores[0]) else nan
 
     def _spend(self) -> None:
         if self._spent or not self.allowance.evaluations:

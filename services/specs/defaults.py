@@ -67,7 +67,7 @@ def with_preset(spec: ExperimentSpec) -> ExperimentSpec:
     of_controllers = spec.controller_optimizer or own or (LEAN_OPTIMIZER if preset.lean else None)
     changes: dict[str, Any] = {"controller_optimizer": of_controllers} if of_controllers else {}
     if preset.as_published or preset.lean:
-        kinds = {"strategy": strategies, "tuner": tuners, "controller_optimizer": optimizers}
+        kinds: dict[str, Registry[Any]] = {"strategy": strategies, "tuner": tuners, "controller_optimizer": optimizers}
         given = {name: changes.get(name, getattr(spec, name)) for name in kinds}
         changes |= {name: _with(preset, ref, kinds[name]) for name, ref in given.items() if ref}
     return spec.model_copy(update=changes) if changes else spec

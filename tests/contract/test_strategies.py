@@ -77,10 +77,11 @@ def scores(name: str, unit: float) -> Any:
     known = replace(known, simulators=simulators, scale=0.9 * unit)
     grid, found = np.random.default_rng(3).random((50, 2)), list[Any]()
 
-    def search(score: Any, **_: Any) -> Any:
+    def look(score: Any, **_: Any) -> Any:
         found.append(score(grid, unit * paraboloid(grid, known.parameters)))
         return grid[0]
 
+    search: Any = look
     strategy.select(known, search, np.random.default_rng(0))
     return found[0]
 

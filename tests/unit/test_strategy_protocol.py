@@ -201,7 +201,7 @@ def test_a_strategy_that_does_not_tune_pays_for_none_and_searches_each_transfer_
 
 
 def test_a_strategy_that_continues_begins_each_search_with_the_members_of_the_last_one() -> None:
-    strategy, log = Continuing(), []
+    strategy, log = Continuing(), list[Any]()
     for step in repetition(replace(small_setting(), strategy=strategy)):
         if isinstance(step, Selected | Transferred):
             before = [each.members for each in of(Selected | Transferred, log)]
