@@ -179,7 +179,12 @@ def _drawn(setting: Setting, iteration: int) -> tuple[Simulator, ...]:
 
 
 def _keeps(setting: Setting, history: History, kind: type[Step]) -> bool:
-    """Return whether the latest result of a kind of step stays, since the strategy learns nothing from what is new."""
+    """Return whether the latest result of a kind of step stays, since the strategy learns nothing from what is new.
+
+    A transfer that asks no simulator is made anew after each sample.
+    """
+    if kind is not Tuned and not setting.strategy.transfer_simulators(setting.parameters.size):
+        return False
     newest = history.samples[history.seen.get(kind, len(history.samples)) :]
     lessons = setting.strategy.lessons(history.samples) if newest else ()
     return bool(newest) and not any(each is sample for each in lessons for sample in newest)
@@ -252,7 +257,8 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     ensemble, answers.budget = strategy.ensemble, evaluations * len(seen) + len(unseen)
     if _keeps(setting, history, Tuned):
         return Tuned(iteration, history.simulators, answers.cost)
-    samples, tests = learnable(strategy.lessons(seen)), learnable(unseen)
+    lessons = [each for each in strategy.lessons(history.samples) if any(each is sample for sample in seen)]
+    samples, tests = learnable(lessons), learnable(unseen)
     untested = tests and Misfit(answers, tests, setting.discrepancy, setting.reading_times_s)
     if not samples:
         drawn = _drawn(setting, iteration)

@@ -44,6 +44,14 @@ def test_samples_are_split_by_their_place() -> None:
     assert [each.genome[0] for each in unseen] == [2, 4]
 
 
+def test_what_teaches_does_not_depend_on_what_is_held_out() -> None:
+    tuner = Listener()
+
+    list(repetition(small_setting("back_to_reality", {"trials": 1}, tuner=tuner, held_out=0.5, iterations=5)))
+
+    assert tuner.given == [1, 2, 3]  # samples 1, 3 and 5
+
+
 def test_no_tuning_sees_a_held_out_sample_and_the_best_simulator_is_tested_on_it() -> None:
     tuner = Listener()
 

@@ -226,6 +226,7 @@ def test_a_repetition_with_a_strategy_of_ones_own_resumes_bit_equal_wherever_it_
 OPTIONS: list[tuple[str, dict[str, Any]]] = [
     *((name, {}) for name in sorted(strategies)),
     ("domain_randomization", {"simulators": 3, "equal_rollouts": True}),
+    ("back_to_reality", {"trials": 1, "learn_from_trials": True}),
     ("noise_envelope", {"simulators": 2, "fitness": "mean_minus_deviation", "equal_rollouts": True}),
     ("noise_envelope", {"base": "static_friction, dynamic_friction", "epsilon": 0.02}),
     ("weighted", {"simulators": 4, "uniqueness_weight": 1, "reliability_weight": 1, "information_weight": 0.5}),
@@ -246,5 +247,6 @@ def test_every_strategy_runs_on_the_toy_and_costs_what_was_estimated(name: Any, 
     costs = [step.cost for step in steps if hasattr(step, "cost")]
     assert sum(cost.rollouts + cost.saved for cost in costs) == expected_rollouts(resolved)
     assert len(of(Probed, steps)) == (3 if strategies[name].takes_samples else 1)
-    assert all(np.isfinite(step.fitness) for step in of(Transferred, steps))
+    asks = bool(strategies[name]().transfer_simulators(2))
+    assert all(np.isfinite(step.fitness) == asks for step in of(Transferred, steps))
     assert resolve_experiment(resolved) == resolved

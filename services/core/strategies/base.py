@@ -150,8 +150,8 @@ class Strategy(Plugin):
     def lessons(self, samples: Sequence[Sample]) -> Sequence[Sample]:
         """Return the samples that simulators are tuned on, by default all; it depends on the samples alone.
 
-        After a sample that is not among its own lessons, the simulators, the transferred controller and its probe stay,
-        at no cost.
+        After a sample that is not among its own lessons, the simulators stay, and the transferred controller and its
+        probe too, at no cost; but a transfer that asks no simulator is made anew.
         """
         return samples
 
