@@ -33,6 +33,10 @@ OTHERS: dict[str, tuple[str, Dash, Marker]] = {
     "domain_randomization": ("#9C6B3F", "dashed", "triangle"),
     "noise_envelope": ("#7A5CC0", "dashdot", "inverted"),
     "farthest": ("#7F7F7F", "longdot", "cross"),
+    "surrogate": ("#6B7FD7", "solid", "cross"),
+    "fit_unless_near": ("#3E8E8E", "dashed", "square"),
+    "residual": ("#6F9A37", "long", "circle"),
+    "back_to_reality": ("#C0504D", "dashdot", "diamond"),
 }
 """Colour, dash and marker of gaplab's other strategies; the colours are legible on white and on dark pages."""
 
