@@ -1,0 +1,248 @@
+"""Whether each system from elsewhere does here what its authors say: `python -m benchmarks.systems NAME …`.
+
+Each check is a few studies at desk scale, and claims that are judged on them. A study is read from the folder of
+studies if it is there as an archive, or else computed and kept there; an interrupted one goes on. `--smoke` tries the
+studies at a size that shows nothing.
+
+A claim holds if the 90 % interval of its difference is on its side of 0, fails if that is on the other side, and is
+open otherwise. Repetitions are the unit; the interval is Welch's.
+"""
+
+from argparse import ArgumentParser
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import stats
+
+import gaplab
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.specs.assembly import simulation_of
+from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.stored_specs import spec_of
+from gaplab.services.world.robots.base import Robot
+
+if TYPE_CHECKING:
+    import pandas
+
+Spec = dict[str, Any]
+
+FOLDER = Path(__file__).parents[1] / "docs" / "studies"
+DESK: Spec = {"robot": "quadruped", "engine": "mujoco", "budget": "desk", "iterations": 10, "repetitions": 10}
+SMOKE: Spec = {"budget": "smoke", "repetitions": 2, "direct_repetitions": 2}
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What the authors say, what was found, and whether it holds; None if that is open."""
+
+    says: str
+    found: str
+    holds: bool | None
+
+    def __str__(self) -> str:
+        verdict = {True: "holds", False: "does not hold", None: "open"}[self.holds]
+        return f"{verdict.upper()}: {self.says}\n  {self.found}"
+
+
+def above(says: str, first: FloatArray, second: FloatArray, least: float = 0.0, unit: str = "m/s") -> Claim:
+    """Return the claim that the mean of one is above that of the other by `least`; each `(r,)` by repetition."""
+    away = _difference(first, second)
+    means = f"{np.nanmean(first):.3f} and {np.nanmean(second):.3f} {unit}, n = {len(first)} and {len(second)}"
+    found = f"{means}; difference {away[0]:.3f} ({away[1]:.3f} to {away[2]:.3f})" + (f", not {least:.3f}" * bool(least))
+    return Claim(says, found, True if away[1] > least else False if away[2] < least else None)
+
+
+def not_above(says: str, first: FloatArray, second: FloatArray) -> Claim:
+    """Return the claim that the mean of one is not shown to be above that of the other."""
+    claim = above(says, first, second)
+    return Claim(says, claim.found, claim.holds is not True)
+
+
+def _difference(first: FloatArray, second: FloatArray) -> tuple[float, float, float]:
+    """Return the difference of two means and the ends of its 90 % interval; nan is left out."""
+    kept = [each[np.isfinite(each)] for each in (first, second)]
+    lower, upper = stats.ttest_ind(*kept, equal_var=False).confidence_interval(0.9)
+    return float(kept[0].mean() - kept[1].mean()), float(lower), float(upper)
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One experiment of a study; repetitions and genes are in the order of the tables."""
+
+    spec: ResolvedSpec
+    samples: "pandas.DataFrame"
+    simulators: "pandas.DataFrame"
+
+    def measured(self, iteration: int, kind: str = "sample") -> FloatArray:
+        """Return the real fitness `(r,)` of one sample, or one transferred controller ("probe")."""
+        rows = self.samples[(self.samples["iteration"] == iteration) & (self.samples["kind"] == kind)]
+        return np.asarray(rows.sort_values("repetition")["fitness"], dtype=np.float64)
+
+    def recorded(self, evaluations: int) -> FloatArray:
+        """Return `(r,)`: the larger fitness of the transferred controller and the best sample so far."""
+        every = [self.measured(number) for number in range(1, evaluations + 1)]
+        return np.asarray(np.fmax.reduce([self.measured(evaluations, "probe"), *every]))
+
+    def genomes(self, iterations: range) -> FloatArray:
+        """Return the samples of these iterations, `(r, k, g)`."""
+        rows = self.samples[(self.samples["kind"] == "sample") & self.samples["iteration"].isin(iterations)]
+        genes = rows.sort_values(["repetition", "iteration"]).filter(regex="^gene_").to_numpy(dtype=np.float64)
+        return genes.reshape(-1, len(iterations), genes.shape[1])
+
+    def simulator(self, iteration: int) -> FloatArray:
+        """Return the best simulator of each repetition after an iteration, `(r, p)`."""
+        rows = self.simulators[(self.simulators["iteration"] == iteration) & (self.simulators["rank"] == 0)]
+        names = [each.name for each in self.spec.tunables]
+        return rows.sort_values("repetition")[names].to_numpy(dtype=np.float64)
+
+    @cached_property
+    def robot(self) -> Robot:
+        """Return what is simulated."""
+        return robot_of(self.spec)
+
+    def simulated(self, genomes: FloatArray, simulators: FloatArray) -> FloatArray:
+        """Return the fitness `(r,)` of each genome `(r, g)` in its own simulator `(r, p)`."""
+        simulation = simulation_of(self.spec, self.robot)
+        pairs = zip(genomes, simulators, strict=True)
+        return np.array([simulation(genome[None], simulator[None])[0, 0] for genome, simulator in pairs])
+
+
+@dataclass(frozen=True)
+class System:
+    """The check of a system.
+
+    Attributes:
+        studies: their specs, by label.
+        judge: returns the claims, given the experiments of each study, in the order of its strategies.
+    """
+
+    studies: Mapping[str, Spec]
+    judge: Callable[..., Iterator[Claim]]
+
+    def claims(self, folder: Path, changes: Spec) -> Iterator[Claim]:
+        """Yield the claims, judged; studies that are missing in the folder are computed, with these changes."""
+        yield from self.judge(**{label: arms(label, spec | changes, folder) for label, spec in self.studies.items()})
+
+
+def arms(label: str, spec: Spec, folder: Path) -> list[Arm]:
+    """Return the experiments of a study, in the order of its strategies, from its archive or by computing it."""
+    name = f"system-{label.replace('_', '-')}"
+    archive, database = folder / f"{name}.zip", folder / f"{name}.db"
+    if archive.exists():
+        result = gaplab.run(archive)
+    else:
+        result = gaplab.run(database if database.exists() else {"name": name, "seed": 2026} | spec, path=database)
+        result.save(archive)
+    samples, simulators = result.samples, result.simulators
+    return [
+        Arm(
+            spec_of(each.spec),
+            samples[samples["experiment"] == each.id],
+            simulators[simulators["experiment"] == each.id],
+        )
+        for each in result.study.experiments
+    ]
+
+
+SYSTEMS: dict[str, System] = {}
+
+
+def check(**studies: Spec) -> Callable[[Callable[..., Iterator[Claim]]], Callable[..., Iterator[Claim]]]:
+    """Register a function as the check of the system with its name, on these studies."""
+
+    def register(judge: Callable[..., Iterator[Claim]]) -> Callable[..., Iterator[Claim]]:
+        SYSTEMS[judge.__name__] = System(studies, judge)
+        return judge
+
+    return register
+
+
+# Back-to-Reality
+
+ROUND = 5
+"""Real-world evaluations of a round: a sample and four trials, the default."""
+
+
+@check(
+    back_to_reality=DESK
+    | {
+        "strategies": [
+            "back_to_reality",
+            {"name": "back_to_reality", "options": {"learn_from_trials": True}},
+            "simulated_fit",
+        ],
+        "discrepancy": "absolute_fitness",
+        "iterations": 3 * ROUND + 1,
+    }
+)
+def back_to_reality(back_to_reality: list[Arm]) -> Iterator[Claim]:
+    """Judge what Zagal and Ruiz-del-Solar say, and what Klaus et al. expect of it."""
+    plain, taught, fit = back_to_reality
+    begins = (1, 1 + 3 * ROUND)
+    gaps = [np.abs(plain.measured(at) - plain.simulated(*_selected(plain, at))) for at in begins]
+    yield above("the gap of L1's best halves within three rounds", gaps[0] / 2, gaps[1])
+    for says, of in (("recorded", Arm.recorded), ("transferred alone", lambda arm, at: arm.measured(at, "probe"))):
+        first, second, third = (of(arm, 10) for arm in (fit, plain, taught))
+        yield above(f"after ten evaluations it is below simulated fit ({says})", first, second)
+        yield above(f"to learn from trials narrows that ({says})", third, second)
+
+
+def _selected(arm: Arm, iteration: int) -> tuple[FloatArray, FloatArray]:
+    """Return the sample of an iteration and the simulator in which it was evolved, of each repetition."""
+    return arm.genomes(range(iteration, iteration + 1))[:, 0], arm.simulator(iteration - 1)
+
+
+# Sequential surrogate optimization
+
+
+@check(
+    surrogate_toy=DESK
+    | {"strategies": ["surrogate", "direct"], "robot": "toy_function", "engine": "analytic", "repetitions": 20},
+    surrogate=DESK
+    | {"strategies": ["surrogate", "known_fit", "simulated_fit", "fit_unless_near", "residual", "direct"]},
+)
+def surrogate(surrogate_toy: list[Arm], surrogate: list[Arm]) -> Iterator[Claim]:
+    """Judge what Hemker et al. say of few parameters, and what is expected of 24."""
+    toy, toy_direct = surrogate_toy
+    best = 0.95 * toy_direct.measured(0, "probe")
+    yield above("of one gene, surrogate reaches 0.95 of direct within ten evaluations", toy.recorded(10), best)
+    kriging, known, fit, unless_near, residual, direct = surrogate
+    yield not_above("of 24 genes, surrogate does not beat known fit", kriging.recorded(10), known.recorded(10))
+    spreads = [_spread(arm) for arm in (unless_near, fit)]
+    yield above("fit unless near spreads its samples more than simulated fit", *spreads, unit="extents")
+    margin = 0.05 * float(np.nanmean(direct.measured(0, "probe")))
+    for name, arm in (("fit unless near", unless_near), ("residual", residual)):
+        says = f"{name} is less fit than simulated fit by less than 0.05 of direct"
+        yield above(says, arm.recorded(10), fit.recorded(10), least=-margin)
+
+
+def _spread(arm: Arm) -> FloatArray:
+    """Return `(r,)`: the mean distance of pairs of samples, in units of the extents."""
+    genomes, space = arm.genomes(range(1, 11)), arm.robot.space
+    away = np.linalg.norm(space.apart(genomes[:, :, None], genomes[:, None]), axis=-1)
+    count = genomes.shape[1]
+    return np.asarray(away.sum(axis=(1, 2)) / (count * (count - 1)))
+
+
+def main() -> None:
+    """Print the claims of the systems that are named, or of all."""
+    parser = ArgumentParser(prog="python -m benchmarks.systems", description=__doc__)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(SYSTEMS)}; default: all")
+    parser.add_argument("--folder", type=Path, default=FOLDER, help="of the studies; default: docs/studies")
+    parser.add_argument("--smoke", action="store_true", help="try the studies at a tiny size; name another folder too")
+    arguments = parser.parse_args()
+    if unknown := set(arguments.names) - set(SYSTEMS):
+        parser.error(f"no system is called {', '.join(sorted(unknown))}")
+    for name in arguments.names or SYSTEMS:
+        print(f"{name}:")
+        for claim in SYSTEMS[name].claims(arguments.folder, SMOKE if arguments.smoke else {}):
+            print(claim)
+
+
+if __name__ == "__main__":
+    main()
