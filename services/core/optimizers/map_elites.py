@@ -3,7 +3,8 @@
 It is NumPy: pyribs would bring pandas, numba and scikit-learn for an archive that is a sort.
 """
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -23,10 +24,8 @@ class MapElitesOptions(Frozen):
     bins: Annotated[int, Field(strict=True, ge=2, le=1_000)] = Field(
         default=5, description="cells along each number of a descriptor; the authors': 5"
     )
-    first: Count = Field(
-        default=20, description="genomes drawn uniformly at first; the authors' 200 are too many for small budgets"
-    )
-    batch: Count = Field(default=20, description="newcomers evaluated at once; the authors': 400")
+    first: Count = Field(default=20, description="genomes drawn uniformly at first; gaplab's default; published: 200")
+    batch: Count = Field(default=20, description="newcomers evaluated at once; gaplab's default; published: 400")
 
 
 class MapElites(Optimizer):
@@ -42,6 +41,7 @@ class MapElites(Optimizer):
 
     name = "map_elites"
     source = "Mouret and Clune 2015; Cully et al. 2015, https://github.com/resibots/map_elites_hexapod"
+    published: ClassVar[Mapping[str, Any]] = {"first": 200, "batch": 400}
     objectives = True
     Options = MapElitesOptions
     options: MapElitesOptions
@@ -56,29 +56,25 @@ class MapElites(Optimizer):
         if not state.size:
             return state.space.draw(self.options.first, rng)
         variation = SteadyStateOptions(population=2, tournament=1, crossover=0.0, offspring=self.options.batch)
-        return SteadyState(variation).ask(Population(state.space, state.genomes, _rows(state.fitness)[:, 0]), rng)
+        return SteadyState(variation).ask(Population(state.space, state.genomes, state.first), rng)
 
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:
         """Return the elites after learning the fitness `(n,)` or `(n, 1 + d)` of genomes; of equals, the older stays.
 
-        Genomes whose physics failed are in no cell as long as another's did not.
+        A genome whose physics failed is in no cell as long as another's did not.
         """
-        genomes = np.vstack([state.genomes, genomes])
-        fitness = np.concatenate([state.fitness, fitness]) if state.size else fitness
-        fittest = _rows(fitness)[:, 0]
-        shares = _rows(fitness)[:, 1:] if fitness.ndim > 1 else (genomes - state.space.lower) / state.space.extent
+        if state.size:
+            genomes, fitness = np.vstack([state.genomes, genomes]), np.concatenate([state.fitness, fitness])
+        told = Population(state.space, genomes, fitness)
+        shares = fitness[:, 1:] if fitness.ndim > 1 else (genomes - state.space.lower) / state.space.extent
         cells = np.rint(np.clip(shares, 0.0, 1.0) * (self.options.bins - 1))
-        order = np.argsort(-fittest, kind="stable")
-        _, firsts = np.unique(cells[order], axis=0, return_index=True)
-        kept = np.sort(order[firsts])
-        works = kept[fittest[kept] > -np.inf]
-        kept = works if len(works) else kept
+        order = np.argsort(-told.first, kind="stable")
+        _, fittest = np.unique(cells[order], axis=0, return_index=True)
+        elites = np.sort(order[fittest])
+        alive = elites[told.first[elites] > -np.inf]
+        kept = alive if len(alive) else elites
         return Population(state.space, genomes[kept], fitness[kept])
 
     def diverse(self, size: int) -> Optimizer:
         """Return the diverse evolution of `steady_state`, since nothing describes a simulator."""
         return SteadyState().diverse(size)
-
-
-def _rows(fitness: FloatArray) -> FloatArray:
-    return fitness.reshape(len(fitness), -1)
