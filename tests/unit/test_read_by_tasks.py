@@ -15,6 +15,7 @@ from gaplab.services.specs.defaults import completed
 from gaplab.services.specs.robots import Driven, robot_of, sensors
 from gaplab.services.specs.simulation import Simulation
 from gaplab.services.world.motions import Trajectory, commands_at
+from gaplab.services.world.robots.quadruped import LEGS
 from gaplab.services.world.tasks import tasks
 
 QUADRUPED = PluginRef(name="quadruped")
@@ -67,7 +68,7 @@ def test_every_task_reads_the_groups_that_its_options_name(name: str) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"sensors": "angle"}, "unknown group of sensors 'angle'; permitted: base, angles, speeds, torques"),
+        ({"sensors": "angle"}, "unknown group of sensors 'angle'; permitted: base, angles, speeds, torques, contacts"),
         ({"sensors": []}, "sensors must have at least 1 item"),
         ({"every_s": 0.0}, "every_s must be at least 0.001"),
         ({"noise_angle": 0.0}, "noise_angle must be above 0"),
@@ -126,6 +127,23 @@ def test_readings_and_fitness_are_those_of_a_recording_of_the_motion() -> None:
     errors = np.vstack([-commands[:1], recorded.angles_rad - commands[1:]])  # all joints start at 0
     assert outcome[0] == pytest.approx(-np.sqrt((errors**2).mean()), abs=1e-6)
     assert outcome[0] == float(robot.fitness(recorded.trajectory)) == simulation(robot.known[None], nothing)[0, 0]
+
+
+def test_contacts_tell_which_feet_are_on_the_ground() -> None:
+    robot = robot_of(Driven(QUADRUPED, None, PluginRef(name="walk", options={"sensors": "contacts", "every_s": 0.05})))
+
+    outcomes = Simulation(robot, MuJoCo(), ()).sense(robot.known[None], np.empty((1, 0)))
+
+    contacts = robot.sensors.values(outcomes[0, 0, 1:])
+    assert robot.sensors.names == tuple(f"contact {leg}_shin" for leg in LEGS)
+    assert set(np.unique(contacts)) == {0.0, 1.0}
+    together = np.corrcoef(contacts.T)
+    assert together[0, 3] > 0.5 > together[0, 1] + 0.5  # in its trot, diagonal legs move together
+
+
+def test_contacts_are_refused_where_not_the_base_is_observed() -> None:
+    with pytest.raises(InvalidSpec, match="contacts need the motion of the base, and front_left_shin is observed"):
+        task("walk", sensors="contacts").prepare(replace(robot_of(Driven(QUADRUPED)).world, observed="front_left_shin"))
 
 
 class Blind(MuJoCo):

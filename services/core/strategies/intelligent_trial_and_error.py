@@ -38,7 +38,8 @@ class IntelligentTrialAndErrorOptions(Frozen):
     described: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
         default=2,
         description="so many sensors, the first ones, describe a behaviour, each by the shares of time in which it is "
-        "above and below 0 by more than its noise; gaplab's: 2, for the task walk roll and pitch",
+        "above and below 0 by more than its noise; gaplab's: 2, for the task walk roll and pitch; with four contacts "
+        "alone: 4",
     )
 
 
@@ -48,9 +49,10 @@ class IntelligentTrialAndError(Strategy):
     The model is a Gaussian process of real less simulated fitness over descriptors. The controller with the highest
     prediction plus a share of its uncertainty is tried; that with the highest prediction is transferred. The repertoire
     is made once, and its members are simulated again in each selection and transfer: the fittest, as far as the budget
-    goes. The authors describe a gait by how long each foot is on the ground. Here it is how long the first sensors are
-    above and below 0, like tilts of the trunk, or the genes of a robot without sensors. Do not use it where tuning can
-    repair the simulator, or where genes are many and nothing else describes behaviour.
+    goes. The authors describe a gait by how long each foot is on the ground, as a task does whose sensors are contacts;
+    by default it is how long the first sensors are above and below 0, like tilts of the trunk, or the genes of a robot
+    without sensors. Do not use it where tuning can repair the simulator, or where genes are many and nothing else
+    describes behaviour.
     """
 
     name = "intelligent_trial_and_error"

@@ -13,7 +13,7 @@ from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.registry import Plugin
 from gaplab.services.world.motions import Trajectory
-from gaplab.services.world.sensing import Sensors, in_order, listed
+from gaplab.services.world.sensing import Bearing, Sensors, feet, in_order, listed, observations
 from gaplab.services.world.world import World
 
 
@@ -66,11 +66,11 @@ JOINTS = MappingProxyType(
 )
 """Groups of sensors of joints: their names, units of hinges and of slides, and what of a trajectory they tell."""
 
-GROUPS = ("base", *JOINTS)
+GROUPS = ("base", *JOINTS, "contacts")
 """Groups of sensors, in the order of their readings."""
 
-NOISES = MappingProxyType({"tilt": 0.02, "place": 0.005, "angle": 0.002, "speed": 0.05, "torque": 0.05})
-"""Usual noises: gaplab's choice, of a cheap inertial sensor, a camera, encoders of 12 bits, and motor currents."""
+NOISES = MappingProxyType({"tilt": 0.02, "place": 0.005, "angle": 0.002, "speed": 0.05, "torque": 0.05, "contact": 0.5})
+"""Usual noises: gaplab's choice, of an inertial sensor, a camera, encoders of 12 bits, motor currents and switches."""
 
 MOST_READINGS = 20_000
 """Most readings of one rollout: twelve angles at 50 Hz for 33 s. A tuning holds those of a thousand rollouts."""
@@ -94,7 +94,8 @@ class ReadOptions(Frozen):
     """Options of a task that reads sensors; those left out are the task's own."""
 
     sensors: Groups | None = left_out(
-        "what is read, separated by commas: `base`, and `angles`, `speeds` and `torques` of the joints with a motor"
+        "what is read, separated by commas: `base`, `angles`, `speeds` and `torques` of the joints with a motor, and "
+        "`contacts`, 1 for each foot on the ground, else 0"
     )
     every_s: Annotated[Real, Field(ge=0.001, le=600)] | None = left_out(
         "interval between readings, s; left out: 0.25, of `track` 0.02"
@@ -132,9 +133,12 @@ class ReadingTask(Task):
         """Set the sensors; they are those of the joints of this robot.
 
         Raises:
-            InvalidSpec: there are too many readings.
+            InvalidSpec: there are too many readings, or contacts of a robot of which another body is observed.
         """
-        self._groups = self.options.sensors or self.usual
+        self._groups, self._world = self.options.sensors or self.usual, world
+        if "contacts" in self._groups and world.observed not in ("", world.bodies[0].name if world.bodies else ""):
+            message = f"contacts need the motion of the base, and {world.observed} is observed"
+            raise InvalidSpec([Violation("/task", "contacts", message, "other sensors, or another observed body")])
         self.joints = self._groups != ("base",)
         self._places = [place for place, joint in enumerate(world.joints) if joint.motor is not None]
         sensors = [each for group in self._groups for each in self._sensors(group, world)]
@@ -164,13 +168,26 @@ class ReadingTask(Task):
         return told[0] if len(told) == 1 else np.concatenate(told, axis=-1)
 
     def _told(self, trajectory: Trajectory, group: str) -> FloatArray:
+        if group == "contacts":
+            return self._contacts(trajectory)
         values: FloatArray | None = getattr(trajectory, JOINTS[group][2])
         if values is None:
             return np.full((*trajectory.positions_m.shape[:-1], len(self._places)), np.nan)
         return np.asarray(values[..., self._places])
 
+    def _contacts(self, trajectory: Trajectory) -> FloatArray:
+        shape = trajectory.positions_m.shape[:-1]
+        if trajectory.angles_rad is None:
+            return np.full((*shape, len(feet(self._world))), np.nan)
+        poses = np.concatenate([trajectory.positions_m, trajectory.orientations], axis=-1).reshape(-1, 7)
+        angles = trajectory.angles_rad.reshape(len(poses), -1)
+        seen = observations(self._world, ["contacts"], Bearing(poses, np.zeros((len(poses), 3)), angles, angles))
+        return seen.reshape(*shape, -1)
+
     def _sensors(self, group: str, world: World) -> Sequence[Sensor]:
         if group == "base":
             return self.base()
+        if group == "contacts":
+            return [(f"contact {foot.name}", "", self.noise("contact"), 0.0) for foot in feet(world)]
         name, units, _ = JOINTS[group]
         return [(f"{name} {joint.name}", units[joint.slides], self.noise(name), 0.0) for joint in world.actuators]
