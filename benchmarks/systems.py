@@ -12,6 +12,7 @@ from argparse import ArgumentParser
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,9 @@ from scipy import stats
 import gaplab
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.specs.assembly import simulation_of
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.types import Transferred
+from gaplab.services.specs.assembly import reality_of, setting, simulation_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.world.robots.base import Robot
@@ -229,6 +232,44 @@ def _spread(arm: Arm) -> FloatArray:
     away = np.linalg.norm(space.apart(genomes[:, :, None], genomes[:, None]), axis=-1)
     count = genomes.shape[1]
     return np.asarray(away.sum(axis=(1, 2)) / (count * (count - 1)))
+
+
+# Intelligent trial and error
+
+CONTACTS: Spec = {"name": "walk", "options": {"sensors": "contacts", "every_s": 0.02}}
+BY_CONTACTS: Spec = {"name": "intelligent_trial_and_error", "options": {"described": 4}}
+BY_TILT = "intelligent_trial_and_error"
+REPERTOIRE: Spec = {"preset": "desk", "controller_evaluations": 2_000, "selection_evaluations": 700}
+"""A repertoire is made once, so that it may cost as much as four searches at desk scale."""
+
+
+@check(
+    trial_and_error=DESK | {"strategies": [BY_CONTACTS], "task": CONTACTS, "budget": REPERTOIRE},
+    trial_and_error_tilt=DESK | {"strategies": [BY_TILT], "budget": REPERTOIRE},
+    trial_and_error_fit=DESK | {"strategies": ["simulated_fit"]},
+)
+def trial_and_error(
+    trial_and_error: list[Arm], trial_and_error_tilt: list[Arm], trial_and_error_fit: list[Arm]
+) -> Iterator[Claim]:
+    """Judge what Cully et al. say, and that tuning wins where reality is within the simulators' span."""
+    (contacts,), (tilt,), (fit,) = trial_and_error, trial_and_error_tilt, trial_and_error_fit
+    for described, arm in (("contacts", contacts), ("tilt", tilt)):
+        says = f"within ten trials it measures 0.9 of the repertoire's best in reality ({described})"
+        tried = np.fmax.reduce([arm.measured(number) for number in range(1, 11)])
+        yield above(says, tried, 0.9 * _best_of_repertoire(arm))
+        says = f"after ten samples, simulated fit, which tunes, is fitter ({described})"
+        yield above(says, fit.recorded(10), arm.recorded(10))
+
+
+def _best_of_repertoire(arm: Arm) -> FloatArray:
+    """Return `(r,)`: the best fitness in reality of a member of each repertoire, which follows from the spec alone."""
+    truth, reality = reality_of(arm.spec, arm.robot)
+    best = []
+    for number in sorted(arm.samples["repetition"].unique()):
+        _, transferred = islice(repetition(setting(arm.spec, int(number))), 2)
+        assert isinstance(transferred, Transferred)
+        best.append(np.nanmax(reality(transferred.members, truth[None])))
+    return np.array(best)
 
 
 def main() -> None:

@@ -37,7 +37,7 @@ OTHERS: dict[str, tuple[str, Dash, Marker]] = {
     "fit_unless_near": ("#3E8E8E", "dashed", "square"),
     "residual": ("#6F9A37", "long", "circle"),
     "back_to_reality": ("#C0504D", "dashdot", "diamond"),
-    "intelligent_trial_and_error": ("#2F9E8F", "long", "star"),
+    "intelligent_trial_and_error": ("#A8479B", "long", "star"),
 }
 """Colour, dash and marker of gaplab's other strategies; the colours are legible on white and on dark pages."""
 
