@@ -150,6 +150,8 @@ def _plugin(found: PluginRead) -> Iterator[str]:
     details = "; ".join(f"{name}: {_value(value)}" for name, value in found.details.items())
     if details:
         yield f"{details[0].upper()}{details[1:]}.\n"
+    for preset, options in found.presets.items():
+        yield f"Preset `{preset}`: {', '.join(f'{name} {value}' for name, value in options.items())}.\n"
     required = found.options.get("required", ())
     rows = [
         (

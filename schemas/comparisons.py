@@ -153,6 +153,17 @@ class Comparison(Groups, Pair):
     fitness: Fitness = Fitness.RECORDED
     unit: Unit = Field("", description="of fitness", examples=["m/s"])
     where: str = Field("", description="these numbers", examples=["after 5 real-world evaluations"])
+    cost: Statistic = Field(
+        None,
+        description="rollouts, seconds or cost at which they are compared; null: after numbers of real-world "
+        "evaluations. At equal cost, `from_evaluations` and `to_evaluations` are the fewer and the more of the two",
+    )
+    evaluations_first: int | None = Field(
+        None,
+        description="at equal cost: real-world evaluations that the first could pay for; null: it ended with less, or "
+        "is the direct baseline, which counts at any cost",
+    )
+    evaluations_second: int | None = Field(None, description="those of the second")
     shared_evaluations: int = Field(
         0, description="last number of real-world evaluations that all compared experiments share"
     )
@@ -230,6 +241,7 @@ _SUMMARIES = tuple(
 )
 _PATHS = (
     *("first", "first_name", "second", "second_name", "from_evaluations", "to_evaluations", "fitness"),
+    *("cost", "evaluations_first", "evaluations_second"),
     *_GROUPS,
     *(f"{test}.{part}" for test in TESTS for part in _OF_A_TEST),
     *("lower", "upper", *(f"improvement.{part}" for part in _OF_AN_ESTIMATE)),

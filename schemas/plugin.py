@@ -42,9 +42,16 @@ class Named(Frozen):
 
 
 class PluginRef(Named):
-    """A plug-in by name, with the options that differ from their defaults."""
+    """A plug-in by name, with the options that differ from their defaults, or from those of one of its presets."""
 
     options: dict[str, Any] = Field(default_factory=dict)
+    preset: str | None = Field(
+        None,
+        max_length=LONGEST_NAME,
+        exclude_if=lambda value: value is None,
+        description="options that are left out are those of this preset of the plug-in, like the published ones; a "
+        "stored spec has the options alone",
+    )
 
 
 class TunableRef(Named):
@@ -89,6 +96,9 @@ class PluginRead(Read):
     summary: str
     source: str
     options: dict[str, Any] = Field(description="JSON Schema of the plug-in's options, with defaults")
+    presets: dict[str, dict[str, Any]] = Field(
+        default_factory=dict, description="options under names that a spec may choose as `preset`"
+    )
     available: bool = True
     note: str | None = Field(None, description="why the plug-in is not available, and how to install or repair it")
     details: dict[str, Any] = Field(
@@ -112,10 +122,9 @@ class BudgetRead(Read):
     controller_evaluations: int
     selection_evaluations: int
     simulator_evaluations: int
-    as_published: bool = Field(
-        False, description="whether options that a spec leaves out are those of the plain, published formulas"
+    controller_optimizer: str | None = Field(
+        None, description="optimizer of controllers, if a spec leaves it out; null: that of simulators"
     )
-    lean: bool = Field(False, description="whether plug-ins and options that a spec leaves out save rollouts")
 
 
 class Catalogue(Read):

@@ -52,6 +52,7 @@ RealityKind = Literal["simulated", "physical", "recorded"]
 Probes = Literal["each", "last", "never"]
 Repeats = Annotated[Count, Field(le=1_000)]
 KnownSamples = Annotated[tuple[KnownSample, ...], Field(max_length=10_000)]
+NoiseOfReality = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 HeldOut = Annotated[float, Field(strict=True, ge=0, le=0.5)]
 
 
@@ -92,6 +93,18 @@ class RealitySpec(Frozen):
     )
     engine: PluginRef | None = Field(None, description="of a simulated reality; default: the simulators'")
     parameters: dict[str, Real] = Field(default_factory=dict, description="hidden; of a simulated reality")
+    noise: NoiseOfReality | None = Field(
+        None,
+        exclude_if=_is_none,
+        description="of a simulated reality: standard deviation of the noise of each measured fitness, as a share of "
+        "about the fitness of `direct` (the fitness in simulation of the first transferred controller). Readings have "
+        "the noise of their sensors then. The search of `direct` itself is without noise. Default: none",
+    )
+    noise_unit: NoiseOfReality | None = Field(
+        None,
+        exclude_if=_is_none,
+        description="the same in the unit of fitness, in place of `noise`: equal for all strategies and repetitions",
+    )
     bench: Label | None = Field(
         None,
         description="name of the physical robot; default: the robot's. The requests of one bench are taken one at a "

@@ -107,6 +107,7 @@ class Results(Connected):
         margin_of_direct: float | None = None,
         intervals: bool | None = None,
         fitness: str = "recorded",
+        **costs: str | float | None,
     ) -> Comparisons:
         """Compare every pair of experiments, one value for each repetition: over a range, its mean.
 
@@ -122,9 +123,13 @@ class Results(Connected):
             margin_of_direct: the same margin as a share of the direct baseline's mean fitness, like 0.03.
             intervals: with intervals; left out: for up to 20 experiments.
             fitness: whose fitness counts, as in `curves`.
+            costs: in place of `first` and `last`: x="rollouts", "time" or "cost", the model of it as in a figure of
+                curves, like cost_s=90 and rollout_s=0.01, and perhaps at, an amount of it. Each experiment is compared
+                after the last evaluation that it could pay for.
         """
         query: dict[str, Parameter] = {"study": _ids(of), "from": first, "to": last}
         query |= {"margin": margin, "margin_of_direct": margin_of_direct, "intervals": intervals, "fitness": fitness}
+        query |= costs
         return Comparisons(self._connection.get(tuple[Comparison, ...], "/comparisons", **query))
 
     def diff(self, *of: Of) -> SpecDiff:

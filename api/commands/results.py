@@ -203,6 +203,15 @@ def compare(  # noqa: PLR0913, PLR0917 - each is an option of the command
     fitness: Annotated[
         Fitness, typer.Option(help="recorded as in the paper, transferred controllers alone, or the best of these")
     ] = Fitness.RECORDED,
+    options: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            "-s",
+            metavar="NAME=VALUE",
+            help="compare at equal cost: x=rollouts, time or cost, then its model, like cost_s=90; repeatable",
+        ),
+    ] = None,
     format: Annotated[Format, typer.Option(help="format of the output")] = Format.TABLE,  # noqa: A002 - as the API says
     as_json: AsJson = False,
 ) -> None:
@@ -212,7 +221,8 @@ def compare(  # noqa: PLR0913, PLR0917 - each is an option of the command
     """
     first, last = _range(at)
     width, share = _margins(margin)
-    pairs = client.compare(ids, first, last, margin=width, margin_of_direct=share, fitness=fitness)
+    costs: dict[str, Any] = dict(map(_named_option, options or []))
+    pairs = client.compare(ids, first, last, margin=width, margin_of_direct=share, fitness=fitness, **costs)
     _PRINTERS[Format.JSON if as_json else format](pairs)
 
 

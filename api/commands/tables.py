@@ -74,6 +74,7 @@ def plugin(found: PluginRead) -> list[Table | str]:
     lines = [f"[bold]{escape(found.name)}[/]", escape(found.summary), f"source: {escape(found.source)}"]
     lines += [escape(found.note)] if found.note else []
     lines += [f"{name}: {escape(_in_words(value))}" for name, value in found.details.items()]
+    lines += [f"preset {name}: {escape(_in_words(value))}" for name, value in found.presets.items()]
     options = [
         (name, escape(str(schema.get("default", "-"))), escape(schema.get("description", "")))
         for name, schema in found.options.get("properties", {}).items()

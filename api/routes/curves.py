@@ -10,6 +10,7 @@ from gaplab.api.http.answers import attachment
 from gaplab.api.http.dependencies import Asked, Id, Parameters, StoreDep
 from gaplab.api.http.documentation import sent
 from gaplab.schemas.comparisons import COLUMNS, Comparison, row
+from gaplab.schemas.costs import CostModel
 from gaplab.schemas.curves import Curve, Fitness
 from gaplab.schemas.differences import SpecDiff
 from gaplab.services.core.errors import InvalidSpec, Violation
@@ -105,8 +106,8 @@ class MarginQuery(Parameters):
         return None if self.margin is None else Margin(self.margin)
 
 
-class ComparisonQuery(MarginQuery):
-    """The experiments to compare, and the numbers of real-world evaluations.
+class ComparisonQuery(MarginQuery, CostModel):
+    """The experiments to compare, and the numbers of real-world evaluations, or what they cost.
 
     Over a range, each repetition is one value: its mean over the range.
     """
@@ -118,6 +119,13 @@ class ComparisonQuery(MarginQuery):
     )
     to_evaluations: Evaluations = Field(
         None, alias="to", description="last number; left out: the last that the experiments share"
+    )
+    at: float | None = Field(
+        None,
+        ge=0,
+        le=1e12,
+        description="if x is not evaluations: the rollouts, seconds or cost at which to compare; each experiment has "
+        "the last evaluation that it could pay for. Left out: the least that an experiment with samples has spent",
     )
     fitness: Fitness = FITNESS
     intervals: bool | None = Field(None, description="with intervals; left out: for up to 20 experiments")
@@ -145,6 +153,8 @@ def compare_experiments(store: StoreDep, query: Asked[ComparisonQuery]) -> tuple
             margin=query.chosen(),
             intervals=query.intervals,
             fitness=query.fitness,
+            model=query,
+            at=query.at,
         )
     except InvalidSpec as error:
         renamed = (replace(each, pointer=each.pointer.removesuffix("_evaluations")) for each in error.violations)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import Field, Json
@@ -12,6 +12,7 @@ from gaplab.api.http.figures import SENT, FigureQuery, answer
 from gaplab.api.http.problems import documented
 from gaplab.api.routes.curves import Ids
 from gaplab.api.routes.replays import ReplayQuery
+from gaplab.schemas.costs import CostModel
 from gaplab.schemas.curves import Fitness
 from gaplab.schemas.figures import FigureRead
 from gaplab.schemas.replays import Replay
@@ -28,7 +29,7 @@ from gaplab.services.figures.words import TITLE, titled
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.replays import predictions, replay
 from gaplab.services.results import curves
-from gaplab.services.results.curves import cost_axis
+from gaplab.services.results.costs import cost_axis
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.results.tuned_simulators import setting_coordinates, simulator_coordinates, tuned_simulators
 from gaplab.services.specs.resolution import is_direct, takes_samples
@@ -55,16 +56,12 @@ class CoordinatesDrawing(FigureQuery):
     study: Ids
 
 
-class CurvesDrawing(CoordinatesDrawing):
+class CurvesDrawing(CoordinatesDrawing, CostModel):
     """The curves to draw, and how."""
 
     band: Band | None = Field(
         None, description="around each curve: 95 % interval of the mean, or SD; left out: SD below five repetitions"
     )
-    x: Literal["evaluations", "rollouts", "time"] = Field(
-        "evaluations", description="real-world evaluations, or the rollouts or the time that they took"
-    )
-    cost_s: float = Field(0.0, ge=0, le=1e9, description="seconds per real-world evaluation, if x is time")
     each: bool = EACH
     fitness: Fitness | None = Field(
         None, description="as of curves; left out: recorded, with thin lines for transferred controllers alone"
@@ -238,7 +235,7 @@ def _curves(store: Store, query: CurvesDrawing) -> FigureDefinition:
     found = curves.curves(store, query.study, query.fitness or Fitness.RECORDED)
     drawn = curves.arranged(found, query.labels, query.order.split(",") if query.order else ())
     beside = () if query.fitness else curves.curves(store, query.study, Fitness.TRANSFERRED)
-    against = None if query.x == "evaluations" else cost_axis(store, drawn, query.x, cost_s=query.cost_s)
+    against = None if query.x == "evaluations" else cost_axis(store, drawn, query)
     return curves_figure(
         drawn, title=_names(store, query), band=query.band, against=against, each=query.each, beside=beside
     )

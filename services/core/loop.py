@@ -34,6 +34,7 @@ from gaplab.services.core.types import (
     Cost,
     History,
     Measured,
+    Outcome,
     Probed,
     Sample,
     Selected,
@@ -81,6 +82,9 @@ class Setting:
         tests: samples that no tuning sees, known beforehand.
         untuned: discrepancy of the robot as it is from `tests`.
         commands: `(n, c)`: what was commanded in each recording; None if nothing was.
+        noise: standard deviation of the noise of a measured fitness, as a share of `Belief.scale`; 0: no noise. With
+            noise, each reading has its sensor's too.
+        noise_unit: the same in the unit of fitness, in place of `noise`; 0: `noise` counts.
     """
 
     simulate: Simulate
@@ -110,6 +114,8 @@ class Setting:
     tests: tuple[Sample, ...] = ()
     untuned: Callable[[], float] = lambda: nan
     commands: FloatArray | None = None
+    noise: float = 0.0
+    noise_unit: float = 0.0
 
     @property
     def tunes_first(self) -> bool:
@@ -163,7 +169,7 @@ def next_step(setting: Setting, history: History, answers: Answers) -> Step | No
         case Probed(iteration=iteration) if iteration < setting.iterations:
             return _select(setting, history, iteration + 1, answers)
         case Selected(iteration=iteration, genome=genome):
-            return Measured(iteration, Sample(genome, *setting.reality(genome)))
+            return Measured(iteration, Sample(genome, *_measure(setting, history, iteration, "sample", genome)))
         case Measured(iteration=iteration):
             return _tune(setting, history, iteration, answers)
     return None
@@ -313,4 +319,17 @@ def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -
         return probe_of(history, iteration, nan, left_out=True)
     if (last := history.probed) is not None and not last.left_out and _keeps(setting, history, Probed):
         return probe_of(history, iteration, last.fitness, last.readings, last.repeats)
-    return probe_of(history, iteration, *setting.reality(genome))
+    return probe_of(history, iteration, *_measure(setting, history, iteration, "probe", genome))
+
+
+def _measure(
+    setting: Setting, history: History, iteration: int, kind: Literal["sample", "probe"], genome: Genome
+) -> Outcome:
+    """Return what reality answers, with the noise of its measurement, which strategies know nothing about."""
+    outcome = setting.reality(genome)
+    deviation = setting.noise_unit or setting.noise * (history.scale or 1.0)
+    if not deviation:
+        return outcome
+    rng = setting.stream(iteration, f"noise of a {kind}")
+    fitness = outcome.fitness + deviation * float(rng.standard_normal())
+    return Outcome(fitness, frozen(outcome.readings + rng.standard_normal(len(outcome.readings))))

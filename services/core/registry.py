@@ -7,7 +7,7 @@ from inspect import cleandoc, isabstract
 from pathlib import PurePath
 from pkgutil import iter_modules
 from traceback import walk_tb
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from pydantic import ValidationError
 
@@ -23,6 +23,10 @@ LONGEST = 300
 """Longest message of a plug-in's own error that is quoted, in characters."""
 
 
+Presets: TypeAlias = Mapping[str, Mapping[str, Any]]
+"""Options of a plug-in, under the name of a preset."""
+
+
 class NoOptions(Frozen):
     """Options of a plug-in without options."""
 
@@ -34,18 +38,22 @@ class Plugin:
         name: name in specs.
         source: origin of its idea or its numbers.
         Options: frozen model whose fields all have defaults.
-        published: options of the formula as its source prints it, which the preset `as_published` sets.
-        lean: options that save rollouts, which the preset `lean` sets.
+        presets: options under a name, like those that its source published, from which a spec may choose. Those under
+            the name of a budget, as `as_published` or `lean`, are set by that budget too.
     """
 
     name: ClassVar[str]
     source: ClassVar[str] = "gaplab"
     Options: ClassVar[type[Frozen]] = NoOptions
-    published: ClassVar[Mapping[str, Any]] = {}
-    lean: ClassVar[Mapping[str, Any]] = {}
+    presets: ClassVar[Presets] = {}
 
     def __init__(self, options: Frozen | None = None) -> None:
         self.options = options if options is not None else self.Options()
+
+    @classmethod
+    def preset(cls, name: str | None) -> Mapping[str, Any]:
+        """Return the options of a preset; none if there is none of this name."""
+        return cls.presets.get(name or "", {})
 
     @classmethod
     def describe(cls) -> PluginRead:
@@ -56,6 +64,7 @@ class Plugin:
             summary=summary,
             source=cls.source,
             options=cls.Options.model_json_schema(),
+            presets={name: dict(options) for name, options in cls.presets.items()},
             details=cls.details(),
         )
 
@@ -146,11 +155,11 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         """Return the plug-in class that a spec names, and its complete options.
 
         Args:
-            ref: name and options.
+            ref: name, options, and perhaps the preset of those that it leaves out.
             pointer: place in the spec, for errors.
 
         Raises:
-            InvalidSpec: the name is unknown, the plug-in is unusable, or it refuses the options.
+            InvalidSpec: the name or the preset is unknown, the plug-in is unusable, or it refuses the options.
         """
         if (refused := self.refused.get(ref.name)) is not None:
             message = f"the {self.kind} {ref.name!r} is not available: {refused.why}"
@@ -158,8 +167,11 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         if ref.name not in self:
             raise InvalidSpec([unknown_name(pointer, self.kind, ref.name, list(self))])
         plugin = self[ref.name]
+        if ref.preset is not None and ref.preset not in plugin.presets:
+            of = f"preset of {ref.name!r}"
+            raise InvalidSpec([unknown_name(f"{pointer}/preset", of, ref.preset, list(plugin.presets) or ["none"])])
         try:
-            return plugin, plugin.Options.model_validate(ref.options)
+            return plugin, plugin.Options.model_validate({**plugin.preset(ref.preset), **ref.options})
         except ValidationError as error:
             raise InvalidSpec(
                 option_violation(plugin, dict(each), f"{pointer}/options") for each in error.errors()

@@ -11,7 +11,7 @@ vary unequally and baselines have more repetitions, and then Student's p, which 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, TypeVar
 
@@ -76,6 +76,11 @@ class Compared:
     level: bool
     seed: int
     strategy: str
+
+    def after(self, count: int | None) -> "Compared":
+        """Return its values after one number of real-world evaluations, as a level; all are nan for None."""
+        missing = np.full((len(self.recorded), 1), np.nan)
+        return replace(self, recorded=missing if count is None else self.recorded[:, [count]], level=True)
 
 
 @dataclass(frozen=True)

@@ -59,11 +59,19 @@ def comparison(pairs: Sequence[Comparison]) -> Iterator[Grid]:
 def experiments(names: Mapping[str, str], pairs: Sequence[Comparison], what: str) -> Grid:
     """Return mean and interquartile mean of each experiment, whose names are given by id."""
     found = {pair.first: pair.summary_first for pair in pairs} | {pair.second: pair.summary_second for pair in pairs}
+    counts = {pair.first: pair.evaluations_first for pair in pairs}
+    counts |= {pair.second: pair.evaluations_second for pair in pairs}
+    at_cost = pairs[0].cost is not None
     rows = tuple(
-        (names[id_], f"{one.n}", one.mean.text, one.interquartile_mean.text, number(one.sd))
+        (
+            names[id_],
+            *([MISSING if counts[id_] is None else f"{counts[id_]}"] if at_cost else []),
+            *(f"{one.n}", one.mean.text, one.interquartile_mean.text, number(one.sd)),
+        )
         for id_, one in found.items()
     )
-    return Grid(f"{what}, with 95 % intervals", ("Experiment", "n", "Mean", "Interquartile mean", "SD"), rows)
+    head = ("Experiment", *(["Evaluations"] if at_cost else []), "n", "Mean", "Interquartile mean", "SD")
+    return Grid(f"{what}, with 95 % intervals", head, rows)
 
 
 def differences(names: Mapping[str, str], pairs: Sequence[Comparison], what: str) -> Grid:

@@ -15,9 +15,6 @@ from gaplab.services.core.registry import EXTERNAL, Plugin, Unusable, option_vio
 from gaplab.services.plugins.contents import Contents, module_of
 from gaplab.services.specs.registries import REGISTRIES
 
-SETS_OF_OPTIONS = ("published", "lean")
-"""Attributes of a plug-in with values for some of its options."""
-
 
 def remedied(why: str) -> str:
     """Return the sentence with what to do."""
@@ -93,12 +90,12 @@ def _fault_of_name(plugin: type[Any], kind: str) -> str | None:
 
 
 def _fault_of_options(plugin: type[Any]) -> str | None:
-    """Return why the defaults, completed as a spec stores them, are refused, alone or with a set of options."""
+    """Return why the defaults, completed as a spec stores them, are refused, alone or with a preset."""
     options = plugin.Options
     if not isinstance(options, type) or not issubclass(options, Frozen):
         return "has Options that accept misspelt names: derive them from gaplab.plugins.Frozen"
     defaults = options().model_dump(mode="json", by_alias=True, warnings=False)
-    sets = {f"options of `{name}`": getattr(plugin, name, {}) for name in SETS_OF_OPTIONS}
+    sets = {f"preset {name!r}": changes for name, changes in plugin.presets.items()}
     for what, changes in {"defaults": {}, **sets}.items():
         try:
             options.model_validate({**defaults, **changes})

@@ -1,11 +1,12 @@
 """Comparisons of stored experiments, computed by the core."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
 from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.costs import OF_EVALUATIONS, CostModel
 from gaplab.schemas.curves import Fitness
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.records import common_count
@@ -15,6 +16,7 @@ from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.experiments.views import fitness_of, hidden, view_experiments
 from gaplab.services.findings import sentences
 from gaplab.services.findings.comparisons import Compared, compare_all
+from gaplab.services.results.costs import equal_cost
 from gaplab.services.results.curves import values_of
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.specs.robots import unit
@@ -50,6 +52,8 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
     margin: Margin | None = None,
     intervals: bool | None = None,
     fitness: Fitness = Fitness.RECORDED,
+    model: CostModel = OF_EVALUATIONS,
+    at: float | None = None,
 ) -> tuple[Comparison, ...]:
     """Compare every pair of experiments on their fitness in reality, one value for each repetition.
 
@@ -59,38 +63,75 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
         store: database with the experiments.
         ids: of studies and experiments, which mean two or more experiments.
         from_evaluations: the first number of evaluations; by default the last.
-        to_evaluations: the last number of evaluations; by default the last that the experiments share.
+        to_evaluations: the last number; by default the last that the experiments share.
         margin: difference within which two experiments are equivalent; None: not tested.
         intervals: by default for up to `MOST_WITH_INTERVALS` experiments.
         fitness: whose fitness counts; by default the recorded one, as in the paper.
+        model: what is equal, if not the number of evaluations: then each experiment has the last number that it could
+            pay for. The direct baseline counts at any cost.
+        at: the rollouts, seconds or cost that are equal; by default the least that an experiment with samples spent.
 
     Raises:
         NotFound: there is nothing with one of the ids.
         InvalidSpec: fewer than two experiments, a range that is empty, negative or beyond
-            all experiments, or a share of direct without one direct baseline.
+            all experiments, a share of direct without one direct baseline, or a cost that none has spent.
     """
+    _refuse_both(model, at, (from_evaluations, to_evaluations))
     with store.reading() as session:
-        if len(rows := experiments.meant(session, ids)) < 2:
-            message = "a comparison needs two or more experiments, and this names one"
-            raise InvalidSpec([Violation("study", list(ids), message)])
+        rows = _several(session, ids)
         values = values_of(session, rows, fitness)
         shared = common_count(view_experiments(session, rows)) or 0
         within = None if margin is None else _in_units(session, rows, margin)
         settings = _settings(session, rows)
-    final = shared if to_evaluations is None else to_evaluations
-    first = final if from_evaluations is None else from_evaluations
+        compared = [_compared(row, values[row.id]) for row in rows]
+        equal = None if model.x == "evaluations" else equal_cost(session, _direct(rows, are=False), model, at)
+    first, final = (0, 0) if equal else _range(rows, compared, shared, from_evaluations, to_evaluations)
+    compared = equal.applied(compared) if equal else compared
+    with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
+    pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
+    where = equal.where if equal else sentences.where(first, final, *(row.known for row in rows if row.tunes or row.known))
+    told = {"fitness": fitness, "unit": unit(spec_of(rows[0].spec)), "where": where, "shared_evaluations": shared}
+    told_pairs = (pair.model_copy(update=told) for pair in (equal.told(pairs) if equal else pairs))
+    return tuple(pair.model_copy(update=_warned(settings, pair)) for pair in told_pairs)
+
+
+def _several(session: Session, ids: Sequence[str]) -> Sequence[ExperimentRow]:
+    if len(rows := experiments.meant(session, ids)) < 2:
+        message = "a comparison needs two or more experiments, and this names one"
+        raise InvalidSpec([Violation("study", list(ids), message)])
+    return rows
+
+
+def _refuse_both(model: CostModel, at: float | None, counts: tuple[int | None, int | None]) -> None:
+    """Refuse numbers of evaluations at equal cost, and a cost at equal evaluations.
+
+    Raises:
+        InvalidSpec: there is one.
+    """
+    if model.x == "evaluations" and at is not None:
+        message = "at is an amount of rollouts, time or cost, and x names which"
+        raise InvalidSpec([Violation("at", at, message, "left out, or x=rollouts, time or cost")])
+    if model.x != "evaluations" and counts != (None, None):
+        message = "experiments are compared after equal numbers of real-world evaluations, or at equal cost"
+        raise InvalidSpec([Violation("from_evaluations", list(counts), message, "left out, or x=evaluations")])
+
+
+def _range(
+    rows: Sequence[ExperimentRow], compared: Sequence[Compared], shared: int, first: int | None, last: int | None
+) -> tuple[int, int]:
+    """Return the numbers of evaluations that are compared; by default the last that is shared.
+
+    Raises:
+        InvalidSpec: the range is empty, negative or beyond all experiments.
+    """
+    final = shared if last is None else last
+    first = final if first is None else first
     if not 0 <= first <= final:
         message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
         raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
-    compared = [_compared(row, values[row.id]) for row in rows]
-    if to_evaluations is not None:
-        _check_the_end(rows, compared, to_evaluations)
-    with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
-    pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
-    where = sentences.where(first, final, *(row.known for row in rows if row.tunes or row.known))
-    told = {"fitness": fitness, "unit": unit(spec_of(rows[0].spec)), "where": where, "shared_evaluations": shared}
-    warned = (tuple(_warnings(settings[pair.first], settings[pair.second])) for pair in pairs)
-    return tuple(pair.model_copy(update={"warnings": each, **told}) for pair, each in zip(pairs, warned, strict=True))
+    if last is not None:
+        _check_the_end(rows, compared, last)
+    return first, final
 
 
 def _check_the_end(rows: Sequence[ExperimentRow], compared: Sequence[Compared], last: int) -> None:
@@ -130,8 +171,9 @@ def _in_units(session: Session, rows: Sequence[ExperimentRow], margin: Margin) -
     return margin.value * means[0]
 
 
-def _direct(rows: Sequence[ExperimentRow]) -> list[ExperimentRow]:
-    return [row for row in rows if is_direct(spec_of(row.spec))]
+def _direct(rows: Sequence[ExperimentRow], *, are: bool = True) -> list[ExperimentRow]:
+    """Return the experiments that are the direct baseline, or those that are not."""
+    return [row for row in rows if is_direct(spec_of(row.spec)) is are]
 
 
 def warnings_of(store: Store, ids: Sequence[str]) -> tuple[str, ...]:
@@ -143,6 +185,10 @@ def warnings_of(store: Store, ids: Sequence[str]) -> tuple[str, ...]:
     with store.reading() as session:
         settings = _settings(session, experiments.meant(session, ids))
     return tuple(dict.fromkeys(text for pair in combinations(settings.values(), 2) for text in _warnings(*pair)))
+
+
+def _warned(settings: Mapping[str, "_Setting"], pair: Comparison) -> dict[str, tuple[str, ...]]:
+    return {"warnings": tuple(_warnings(settings[pair.first], settings[pair.second]))}
 
 
 @dataclass(frozen=True)
@@ -185,7 +231,8 @@ def _rates(task: PluginRef | None) -> tuple[str, dict[str, Any]] | None:
 
 def _setup(spec: ResolvedSpec) -> tuple[object, ...]:
     bench = bench_key(spec.reality.bench or "")
-    return spec.reality.kind, spec.reality.engine, bench, sorted(spec.reality.parameters)
+    noise = spec.reality.noise, spec.reality.noise_unit
+    return spec.reality.kind, spec.reality.engine, noise, bench, sorted(spec.reality.parameters)
 
 
 def _reality(spec: ResolvedSpec) -> tuple[object, ...]:

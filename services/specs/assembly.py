@@ -107,6 +107,8 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         probes=spec.reality.probes,
         known_samples=samples_of(spec),
         forecast=forecast_of(spec, robot, simulation),
+        noise=spec.reality.noise or 0.0,
+        noise_unit=spec.reality.noise_unit or 0.0,
     )
     return _recorded(found, spec, robot) if is_recorded(spec) else found
 

@@ -4,15 +4,15 @@ A named budget is a share of the paper's computation. With each of them, all str
 searches of equal size. `reuse_transfer: true` in a spec changes that: docs/decisions/a-fair-comparison.md.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.resolved import ResolvedReality, ResolvedTunable
 from gaplab.schemas.spec import BudgetName, ExperimentSpec, SharedSettings
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.registry import Plugin, Registry
+from gaplab.services.core.registry import Registry
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
@@ -28,9 +28,10 @@ from gaplab.services.world.world import World
 class Preset:
     """Iterations, repetitions, and the evaluations of each search.
 
+    Options that a spec leaves out are those of a plug-in's preset of the same name, if it has one.
+
     Attributes:
-        as_published: true if options that a spec leaves out are those of the plain, published formulas.
-        lean: true if options and the optimizer of controllers that a spec leaves out save rollouts.
+        controller_optimizer: optimizer of controllers, if a spec leaves it out; None: that of simulators.
     """
 
     iterations: int
@@ -38,8 +39,7 @@ class Preset:
     controller_evaluations: int
     selection_evaluations: int
     simulator_evaluations: int
-    as_published: bool = False
-    lean: bool = False
+    controller_optimizer: str | None = None
 
 
 # Source: paper, sections 2 and 3; that a selection takes as many evaluations as the final search is its reading
@@ -52,37 +52,32 @@ PRESETS: dict[BudgetName, Preset] = {
     "desk": Preset(5, 8, 500, 150, 200),
     "paper": PAPER,
     # the whole Fig. 4 at a tenth of the rollouts: docs/lean.md
-    "lean": Preset(10, 40, 1_350, 1_350, 2_000, lean=True),
-    "as_published": replace(PAPER, as_published=True),
+    "lean": Preset(10, 40, 1_350, 1_350, 2_000, controller_optimizer="cma_es"),
+    # the paper's, with the formulas as it prints them: the presets of this name
+    "as_published": PAPER,
 }
-
-LEAN_OPTIMIZER = PluginRef(name="cma_es")
-"""Optimizer of controllers of a lean budget."""
 
 
 def with_preset(spec: ExperimentSpec) -> ExperimentSpec:
-    """Return the spec with the plug-ins and options that its preset and strategy set, where it does not give them."""
-    preset, kind = PRESETS[spec.budget.preset], strategies.get(spec.strategy.name)
-    own = PluginRef(name=kind.controller_optimizer) if kind and kind.controller_optimizer else None
-    of_controllers = spec.controller_optimizer or own or (LEAN_OPTIMIZER if preset.lean else None)
-    changes: dict[str, Any] = {"controller_optimizer": of_controllers} if of_controllers else {}
-    if preset.as_published or preset.lean:
-        kinds: dict[str, Registry[Any]] = {"strategy": strategies, "tuner": tuners, "controller_optimizer": optimizers}
-        given = {name: changes.get(name, getattr(spec, name)) for name in kinds}
-        changes |= {name: _with(preset, ref, kinds[name]) for name, ref in given.items() if ref}
-    return spec.model_copy(update=changes) if changes else spec
+    """Return the spec with the plug-ins and options that its budget and strategy set, where it does not give them."""
+    budget, kind = spec.budget.preset, strategies.get(spec.strategy.name)
+    optimizer = (kind and kind.controller_optimizer) or PRESETS[budget].controller_optimizer
+    of_controllers = spec.controller_optimizer or (PluginRef(name=optimizer) if optimizer else None)
+    changes: dict[str, Any] = {
+        "strategy": _with(budget, spec.strategy, strategies),
+        "tuner": _with(budget, spec.tuner, tuners),
+        "controller_optimizer": of_controllers and _with(budget, of_controllers, optimizers),
+    }
+    changed = {name: value for name, value in changes.items() if value != getattr(spec, name)}
+    return spec.model_copy(update=changed)
 
 
-def preset_options(preset: Preset, kind: type[Plugin]) -> Mapping[str, Any]:
-    """Return the options of a plug-in that a preset sets."""
-    if preset.as_published:
-        return kind.published
-    return kind.lean if preset.lean else {}
-
-
-def _with(preset: Preset, ref: PluginRef, registry: Registry[Any]) -> PluginRef:
-    options = preset_options(preset, registry[ref.name]) if ref.name in registry else {}
-    return PluginRef(name=ref.name, options={**options, **ref.options})
+def _with(budget: str, ref: PluginRef, registry: Registry[Any]) -> PluginRef:
+    if ref.name not in registry:
+        return ref
+    plugin = registry[ref.name]
+    options = {**plugin.preset(budget), **plugin.preset(ref.preset), **ref.options}
+    return ref.model_copy(update={"options": options})
 
 
 def default_engine(robot: Robot | type[Robot]) -> str:
@@ -174,6 +169,8 @@ def resolved_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine:
         samples=(),
         limits=None,
         beyond="warn",
+        noise=spec.reality.noise or None,
+        noise_unit=spec.reality.noise_unit or None,
     )
 
 

@@ -24,7 +24,7 @@ HELD_OUT = 0.2
 WITH_OPTIONS = "estimation_exploration with select: disagreement, or weighted with information_weight alone"
 """Strategies that need no fitness with some options."""
 
-OF_OTHERS = ("engine", "parameters", "bench", "repeats", "samples", "probes", "limits", "beyond")
+OF_OTHERS = ("engine", "parameters", "noise", "noise_unit", "bench", "repeats", "samples", "probes", "limits", "beyond")
 """Fields of other realities."""
 
 

@@ -32,7 +32,6 @@ from gaplab.services.specs.defaults import (
     Preset,
     completed,
     default_engine,
-    preset_options,
     resolved_reality,
     runs,
     shared_fields,
@@ -101,7 +100,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     return ResolvedSpec.filled_from(
         spec,
         **plugins,
-        name=spec.name or _label(strategy, preset),
+        name=spec.name or _label(strategy, spec),
         iterations=iterations,
         repetitions=spec.repetitions or preset.repetitions,
         controller_optimizer=completed(optimizers, spec.controller_optimizer or spec.optimizer),
@@ -210,12 +209,15 @@ def usable(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
     return engine
 
 
-def _label(strategy: Strategy, preset: Preset) -> str:
-    kind = type(strategy)
-    defaults = kind.Options(**preset_options(preset, kind)).model_dump(mode="json", by_alias=True)
+def _label(strategy: Strategy, spec: ExperimentSpec) -> str:
+    """Return what an experiment is called: its strategy, a preset that it names, and the options that differ."""
+    kind, preset = type(strategy), spec.strategy.preset
+    usual = {**kind.preset(spec.budget.preset), **kind.preset(preset)}
+    defaults = kind.Options(**usual).model_dump(mode="json", by_alias=True)
     chosen = strategy.options.model_dump(mode="json", by_alias=True)
     changed = [f"{name} {value}" for name, value in chosen.items() if value != defaults[name]]
-    return f"{strategy.name} ({', '.join(changed)})"[:200] if changed else strategy.name
+    told = [*([preset] if preset else []), *changed]
+    return f"{strategy.name} ({', '.join(told)})"[:200] if told else strategy.name
 
 
 def _budget(spec: ExperimentSpec, preset: Preset) -> ResolvedBudget:

@@ -175,6 +175,18 @@ def reality_violations(
         message = f"{strategy.name} evolves in reality itself, and the engine {engine.name!r} may move hardware"
         yield Violation("/strategy", strategy.name, message, "another strategy, or an engine with `repeatable = True`")
     yield from parameter_violations(spec.reality.parameters, robot, engine, ("reality", "parameters"))
+    if spec.reality.noise and spec.reality.noise_unit:
+        message = "noise is a share of the scale of fitness and noise_unit its size; a reality has one of them"
+        yield Violation("/reality/noise", spec.reality.noise, message, "left out, or without noise_unit")
+    if engine is not simulated and not engine.repeatable:
+        yield from _noise_violations(spec, f"the engine {engine.name!r} may move hardware")
+
+
+def _noise_violations(spec: ExperimentSpec, why: str) -> Iterator[Violation]:
+    for name in ("noise", "noise_unit"):
+        if given := getattr(spec.reality, name):
+            message = f"{name} is of a simulated reality, and {why}, whose measurements have noise of their own"
+            yield Violation(f"/reality/{name}", given, message, "left out")
 
 
 def parameter_violations(
@@ -206,6 +218,7 @@ def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[V
     for name, value in reality.parameters.items():
         message = "a physical reality has no hidden parameters; leave them out"
         yield Violation(pointer_to(["reality", "parameters", name]), value, message, "left out")
+    yield from _noise_violations(spec, "this one is physical")
     if reality.probes == "never" and not strategy.takes_samples:
         message = f"{strategy.name} takes no samples, so without probes nothing would be measured"
         yield Violation("/reality/probes", reality.probes, message, ["each", "last"])

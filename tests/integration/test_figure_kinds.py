@@ -2,12 +2,15 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 from warnings import catch_warnings
 
 import pytest
 
+from gaplab.schemas.costs import CostModel
 from gaplab.services.core.arrays import frozen
+from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
 from gaplab.services.core.types import Tuned as TunedStep
 from gaplab.services.figures.kinds.curves import curves_figure
@@ -18,7 +21,8 @@ from gaplab.services.figures.marks import Diagonal, FigureDefinition, Label, Lev
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.results import curves
-from gaplab.services.results.curves import cost_axis
+from gaplab.services.results.comparisons import compare
+from gaplab.services.results.costs import cost_axis
 from gaplab.services.results.tuned_simulators import setting_coordinates, tuned_simulators
 from gaplab.services.running import execution
 from gaplab.services.store.models import ExperimentRow
@@ -295,7 +299,7 @@ def experiment(store: Store) -> str:
 def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: Store, experiment: str) -> None:
     found_curves = curves.curves(store, [experiment])
 
-    found = cost_axis(store, found_curves, "rollouts")
+    found = cost_axis(store, found_curves, CostModel(x="rollouts"))
 
     assert found.label == "Rollouts in simulation"
     assert [found.at[experiment, at] for at in range(3)] == [30, 75, 120]
@@ -308,7 +312,7 @@ def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(
     steps = TunedStep(0, ()), Transferred(0, genome, 1.0, Cost(10_000_000)), Probed(0, 1.0, 1.0)
     run(store, claim, iter(steps))
 
-    found = cost_axis(store, curves.curves(store, [experiment, direct]), "rollouts")
+    found = cost_axis(store, curves.curves(store, [experiment, direct]), CostModel(x="rollouts"))
 
     assert found.label == "Rollouts in simulation"
 
@@ -316,7 +320,7 @@ def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(
 def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store, experiment: str) -> None:
     found_curves = curves.curves(store, [experiment])
 
-    simulated, both = (cost_axis(store, found_curves, "time", cost_s=each) for each in (0, 3600))
+    simulated, both = (cost_axis(store, found_curves, CostModel(x="time", cost_s=each)) for each in (0, 3600))
 
     steps = [3, 8, 13]  # of half a second each
     assert simulated.label == "Time (s)"
@@ -324,6 +328,46 @@ def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store,
     assert both.label == "Time (min)"
     assert both.at[experiment, 2] == pytest.approx(120 + 6.5 / 60)
     assert "at 3600\N{NO-BREAK SPACE}s each and simulation as measured" in both.note
+
+
+def test_a_cost_has_a_price_for_the_machine_for_attention_and_for_wear(store: Store, experiment: str) -> None:
+    model = CostModel(x="cost", cost_s=90, rollout_s=12, cores=4, machine=2, attention=40, wear=0.25)
+
+    found = cost_axis(store, curves.curves(store, [experiment]), model)
+
+    rollouts = [30, 75, 120]
+    expected = [k * (40 * 90 / 3600 + 0.25) + 2 * each * 12 / 4 / 3600 for k, each in enumerate(rollouts)]
+    assert [found.at[experiment, at] for at in range(3)] == pytest.approx(expected)
+    assert found.label == "Cost"
+    assert "40 an hour of real-world evaluations at 90" in found.note
+
+
+def test_experiments_are_compared_after_the_last_evaluation_that_each_could_pay_for(
+    store: Store, experiment: str
+) -> None:
+    dear, late = (submit_one(store, toy(strategy="random", repetitions=2, seed=each)).id for each in (1, 2))
+    for claim in execution.claim(store, "test", limit=9):
+        if claim.experiment_id != experiment:
+            steps = list(log(4, iterations=2))  # 80 rollouts, then 120 with each iteration
+            probes = [replace(each, recorded=5.0 + each.iteration) for each in steps if isinstance(each, Probed)]
+            run(store, claim, iter(probes.pop(0) if isinstance(each, Probed) else each for each in steps))
+    ids = [experiment, dear, late]
+
+    cheap, *_ = compare(store, ids, model=CostModel(x="rollouts"))  # the first one has spent 120
+    at_100, *_ = compare(store, ids, model=CostModel(x="rollouts"), at=100)
+    slow, *_ = compare(store, ids, model=CostModel(x="time", cost_s=9, rollout_s=1, cores=10))
+
+    assert (cheap.cost, cheap.where) == (120, "at 120 rollouts")
+    assert (cheap.evaluations_first, cheap.evaluations_second) == (2, 0)
+    assert cheap.summary_second.mean.value == 5.0
+    assert (at_100.evaluations_first, at_100.evaluations_second) == (1, 0)
+    assert slow.cost == pytest.approx(18 + 12)
+    assert (slow.evaluations_first, slow.evaluations_second) == (2, 1)
+    assert slow.summary_second.mean.value == 6.0
+    with pytest.raises(InvalidSpec, match="no experiment has spent 1,000 rollouts; the most is 320 rollouts"):
+        compare(store, ids, model=CostModel(x="rollouts"), at=1000)
+    with pytest.raises(InvalidSpec, match="or at equal cost"):
+        compare(store, ids, to_evaluations=1, model=CostModel(x="rollouts"))
 
 
 def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(store: Store, experiment: str) -> None:

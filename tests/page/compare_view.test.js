@@ -55,14 +55,14 @@ const TEST = { found: "n. s.", text: "0.500 (raw 0.500)" };
 const ESTIMATE = { text: "1" };
 const SUMMARY = { n: 2, mean: ESTIMATE, interquartile_mean: ESTIMATE, sd: 1 };
 const PAIR = {
-  first: "a", second: "b", from_evaluations: 10, to_evaluations: 10, shared_evaluations: 10, where: "after 1 real-world evaluation (and 12 from before)", sizes: "2, 2",
+  first: "a", second: "b", cost: null, from_evaluations: 10, to_evaluations: 10, shared_evaluations: 10, where: "after 1 real-world evaluation (and 12 from before)", sizes: "2, 2",
   difference_text: "0", effect_size_text: "0", improvement: ESTIMATE, shared_streams: false, streams: "apart", summary_first: SUMMARY, summary_second: SUMMARY, trusted: TEST, student: TEST, welch: TEST, mann_whitney: TEST, brown_forsythe: TEST,
 };
 
 /** Return the section of tests in a view, whose loading the test begins. */
 function comparing() {
   const cache = { known: (ids) => ids, get: () => EXPERIMENT, namesOf: (ids) => new Map(ids.map((id) => [id, id])) };
-  const choice = { experiments: ["a", "b"], from: null, to: null, test: "trusted", margin: null, margin_of_direct: null };
+  const choice = { experiments: ["a", "b"], x: "evaluations", model: {}, equal: false, from: null, to: null, test: "trusted", margin: null, margin_of_direct: null };
   const loading = { now: 0 };
   const sections = { add: (_element, _kinds, load) => { loading.load = load; return () => { loading.now += 1; }; } };
   const view = { cache, choice, sections, signal: new AbortController().signal, change: (changes) => { Object.assign(view.choice, changes); part.update(); } };
@@ -84,6 +84,17 @@ test("one range is asked for, and the others once their table is unfolded", asyn
   await loading.load();
   assert.equal(paths.length, 6);
   assert.match(part.element.querySelector("details.every").textContent, /At 1Mean of 1–10/);
+});
+
+test("pairs are tested at equal cost if that is asked for, and the evaluations of each are said", async () => {
+  const { part, loading, view } = comparing();
+  const pair = { ...PAIR, cost: 7200, where: "at 2 h", evaluations_first: 3, evaluations_second: null };
+  const paths = serving(() => [200, [pair]]);
+  view.change({ x: "time", model: { cost_s: 90, rollout_s: 0.5, wear: 3 }, equal: true, from: 1, to: 2 });
+  await loading.load();
+  assert.deepEqual(paths, ["comparisons?study=a&study=b&x=time&cost_s=90&rollout_s=0.5"]);
+  assert.match(part.element.querySelector("details.each").textContent, /A a32.*B b–2/);
+  assert.equal(part.element.querySelector(".range").hidden, true);
 });
 
 test("a small spread is not written as 0", async () => {
@@ -170,7 +181,7 @@ test("the arrows go round the matches", async () => {
 test("the figure of a comparison is loaded at once for a choice, and with its section for an event", async () => {
   const [loads, asked] = [[], []];
   const sections = { add: (_, kinds, load) => { asked.push(kinds, load); return () => loads.push("now"); } };
-  const choice = { experiments: ["a"], x: "evaluations", cost_s: 60, band: "", each: false };
+  const choice = { experiments: ["a"], x: "evaluations", model: { cost_s: 60 }, equal: false, band: "", each: false };
   const view = { cache: { known: (ids) => ids }, choice, sections, signal: new AbortController().signal };
   const part = figure(view);
   part.update();

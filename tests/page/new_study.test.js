@@ -83,6 +83,18 @@ test("a resolved reality without a bench is simulated", () => {
   assert.deepEqual(specOf(draftOf({ reality: resolved }, CATALOGUE)).reality, { engine: "slow", probes: "each" });
 });
 
+test("the noise of a simulated reality goes through the form unchanged, and a bench has none", () => {
+  const draft = draftOf({ reality: { noise: 0.1 } }, CATALOGUE);
+  assert.deepEqual(specOf(draft).reality, { noise: 0.1 });
+  draft.bench.isPhysical = true;
+  assert.deepEqual(specOf(draft).reality, { kind: "physical" });
+});
+
+test("a preset goes through the form, with the options that change it", () => {
+  const strategies = [{ name: "one", preset: "smith_2019", options: { gain: 2 } }, { name: "one", preset: "smith_2019" }];
+  assert.deepEqual(specOf(draftOf({ strategies }, CATALOGUE)).strategies, strategies);
+});
+
 test("a table of samples is described by its columns, and what is used of it in words", () => {
   assert.match(hintOf(1), /^Columns gene_0, then value,/);
   assert.match(hintOf(24), /^Columns gene_0 to gene_23, then value,/);

@@ -82,7 +82,7 @@ class TestPreset:
     def test_the_options_that_it_sets_are_options(self, name: str) -> None:
         plugin = strategies[name] if name in strategies else tuners[name]
 
-        plugin.Options.model_validate(plugin.lean)
+        plugin.Options.model_validate(plugin.preset("lean"))
 
     def test_a_resolved_spec_resolves_to_itself(self) -> None:
         parts = {"controller_optimizer": "cma_es", "tuner": {"name": "search", "options": {"warm_start": True}}}

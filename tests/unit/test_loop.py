@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaplab.services.core.arrays import frozen
 from gaplab.services.core.discrepancies.fitness import AbsoluteFitness
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.loop import repetition
@@ -17,6 +18,7 @@ from gaplab.services.core.types import (
     Budget,
     History,
     Measured,
+    Outcome,
     Probed,
     Sample,
     Selected,
@@ -85,6 +87,43 @@ def test_a_resumed_repetition_does_not_measure_again_what_is_in_the_log() -> Non
 
     assert isinstance(log[-1], Measured)
     assert reality.asked == 2 + 3
+
+
+def test_noise_is_as_large_as_the_spec_says_and_none_by_default() -> None:
+    def away(**noise: float) -> Any:
+        """The noise of samples and probes, and of a reading, of 100 repetitions; and the scales of these."""
+        noises, readings, scales = [], [], []
+        real = CountedReality()
+        for number in range(100):
+            noisy = small_setting("random", reality=lambda genome: Outcome(real(genome).fitness, frozen([7.0])))
+            steps: list[Any] = list(repetition(replace(noisy, repetition=number, iterations=1, **noise)))
+            measured = [step.sample if isinstance(step, Measured) else step for step in steps[2:]]
+            kept: list[Any] = [each for each in measured if isinstance(each, Sample | Probed)]
+            genomes = [steps[1].genome, kept[1].genome, steps[-2].genome]
+            noises += [each.fitness - real(genome).fitness for each, genome in zip(kept, genomes, strict=True)]
+            readings += [float(each.readings[0]) - 7.0 for each in kept]
+            scales.append(abs(steps[1].fitness))
+        return np.array(noises), np.array(readings), float(np.mean(scales))
+
+    in_unit, read, scale = away(noise_unit=0.5)
+    share, _, _ = away(noise=0.5)
+
+    assert np.unique(in_unit).size == in_unit.size == 300
+    assert in_unit.std() == pytest.approx(0.5, rel=0.15)
+    assert read.std() == pytest.approx(1.0, rel=0.15)
+    assert abs(np.corrcoef(in_unit, read)[0, 1]) < 0.2
+    assert share.std() == pytest.approx(0.5 * scale, rel=0.15)
+    assert away()[0].tolist() == [0.0] * 300
+
+
+@pytest.mark.parametrize("strategy", ["simulated_fit", "informative"])
+def test_a_resumed_repetition_has_the_noise_of_an_uninterrupted_one(strategy: Any) -> None:
+    noisy = small_setting(strategy, noise=0.3)
+    steps = list(repetition(noisy))
+
+    for stopped_after in range(len(steps)):
+        rest = repetition(replace(noisy, batch_size=lambda: 9), steps[:stopped_after])
+        assert [flat(step) for step in rest] == [flat(step) for step in steps[stopped_after:]]
 
 
 @pytest.mark.parametrize(

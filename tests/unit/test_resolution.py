@@ -4,13 +4,14 @@ from copy import deepcopy
 from dataclasses import replace
 from functools import reduce
 from operator import getitem
+from pathlib import Path
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.spec import ExperimentSpec, Schedule, StudySpec
+from gaplab.schemas.spec import AnySpec, ExperimentSpec, Schedule, StudySpec
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
@@ -85,8 +86,30 @@ def test_an_option_given_beats_the_published_one() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(strategies))
-def test_published_options_are_options(name: str) -> None:
-    strategies[name].Options.model_validate(strategies[name].published)
+def test_presets_are_options(name: str) -> None:
+    for options in strategies[name].presets.values():
+        strategies[name].Options.model_validate(options)
+
+
+@pytest.mark.parametrize("path", sorted(Path("examples").glob("*.json")), ids=lambda path: path.stem)
+def test_example_specs_are_specs(path: Path) -> None:
+    assert resolve(TypeAdapter(AnySpec).validate_json(path.read_text()))
+
+
+def test_a_preset_of_a_strategy_sets_what_a_spec_leaves_out_and_is_in_the_name() -> None:
+    named = {"name": "estimation_exploration", "preset": "bongard_2005", "options": {"models": 6}}
+
+    resolved = resolve_experiment(experiment(strategy=named, tuner="climbers", engine="mujoco"))
+    plain = resolve_experiment(experiment(strategy="estimation_exploration", engine="mujoco"))
+    within = {"name": "informative", "preset": "as_published"}
+    both = resolve_experiment(experiment(strategy=within, budget="lean"))
+
+    assert resolved.strategy.preset is None
+    assert (resolved.strategy.options["select"], resolved.strategy.options["models"]) == ("disagreement", 6)
+    assert resolved.name == "estimation_exploration (bongard_2005, models 6)"
+    assert plain.strategy.options["select"] == "fittest"
+    assert (both.strategy.options["least_error"], both.strategy.options["weightiest"]) == (0.0, 10)
+    assert refused(strategy=named | {"preset": "bongard"})["/strategy/preset"].permitted == ("bongard_2005",)
 
 
 @pytest.mark.parametrize(("tuner", "least"), [("search", 20), ("gauss_newton", 2), ("abc_smc", 2)])
@@ -191,6 +214,8 @@ def test_everything_that_is_wrong_is_said_at_once() -> None:
             "/optimizer/options/population",
             "at least 2",
         ),
+        ({"reality": {"kind": "physical", "noise": 0.1}}, "/reality/noise", "left out"),
+        ({"reality": {"noise": 0.1, "noise_unit": 0.02}}, "/reality/noise", "left out, or without noise_unit"),
         ({"strategy": {"name": "known_fit", "options": {"spred": 1}}}, "/strategy/options/spred", ("spread",)),
     ],
 )

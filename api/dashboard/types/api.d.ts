@@ -62,8 +62,7 @@ declare namespace Api {
     controller_evaluations: number;
     selection_evaluations: number;
     simulator_evaluations: number;
-    as_published: boolean;
-    lean: boolean;
+    controller_optimizer: string | null;
   }
   interface BudgetSpec {
     preset: "smoke" | "desk" | "paper" | "lean" | "as_published";
@@ -126,6 +125,9 @@ declare namespace Api {
     fitness: Fitness;
     unit: string;
     where: string;
+    cost: number | null;
+    evaluations_first: number | null;
+    evaluations_second: number | null;
     shared_evaluations: number;
     caution: string | null;
     lower: number | null;
@@ -435,6 +437,7 @@ declare namespace Api {
     summary: string;
     source: string;
     options: Record<string, any>;
+    presets: Record<string, Record<string, any>>;
     available: boolean;
     note: string | null;
     details: Record<string, any>;
@@ -535,6 +538,8 @@ declare namespace Api {
     held_out: number | string | null;
     engine: PluginRef | null;
     parameters: Record<string, number>;
+    noise: number | null;
+    noise_unit: number | null;
     bench: string | null;
     repeats: number;
     samples: Array<KnownSample>;

@@ -88,7 +88,10 @@ declare namespace Page {
   interface Comparison {
     experiments: string[];
     x: string;
-    cost_s: number;
+    /** What an axis of time or cost needs to know; null is the service's default. */
+    model: Record<string, number | null>;
+    /** Whether pairs are tested at equal rollouts, time or cost. */
+    equal: boolean;
     band: string;
     fitness: string;
     each: boolean;
@@ -118,6 +121,8 @@ declare namespace Page {
   /** A plug-in in the form for a new study; `on` is whether it is ticked. */
   interface PluginDraft {
     name: string;
+    /** Name of the preset of the options that are left out; empty for the defaults. */
+    preset: string;
     options: Record<string, any>;
     on?: boolean;
   }
@@ -161,6 +166,7 @@ declare namespace Page {
     tunablesOf: string;
     realityEngine: PluginDraft;
     realityParameters: Record<string, any>;
+    realityNoise: Record<string, any>;
     bench: BenchDraft;
     budget: { [evaluations: string]: any; preset: string; reuse_transfer: boolean };
   }

@@ -3,8 +3,7 @@
 It is NumPy: pyribs would bring pandas, numba and scikit-learn for an archive that is a sort.
 """
 
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -14,6 +13,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Genomes
 from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from gaplab.services.core.registry import Presets
 
 Count = Annotated[int, Field(strict=True, ge=1, le=10_000)]
 
@@ -41,7 +41,7 @@ class MapElites(Optimizer):
 
     name = "map_elites"
     source = "Mouret and Clune 2015; Cully et al. 2015, https://github.com/resibots/map_elites_hexapod"
-    published: ClassVar[Mapping[str, Any]] = {"first": 200, "batch": 400}
+    presets: ClassVar[Presets] = {"as_published": {"first": 200, "batch": 400}}
     objectives = True
     Options = MapElitesOptions
     options: MapElitesOptions

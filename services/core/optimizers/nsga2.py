@@ -1,7 +1,6 @@
 """NSGA-II: several objectives at once, by fronts of members that none dominates, and by their distance in a front."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -12,6 +11,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Genomes
 from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.optimizers.steady_state import insert, less_fit_of_most_similar
+from gaplab.services.core.registry import Presets
 
 Share = Annotated[float, Field(strict=True, ge=0, le=1)]
 Index = Annotated[float, Field(strict=True, ge=0, le=1_000)]
@@ -43,7 +43,7 @@ class Nsga2(Optimizer):
 
     name = "nsga2"
     source = "Deb, Pratap, Agarwal and Meyarivan 2002; constants: sferes2, by the authors of transferability"
-    published: ClassVar[Mapping[str, Any]] = {"population": 100}
+    presets: ClassVar[Presets] = {"as_published": {"population": 100}}
     objectives = True
     Options = Nsga2Options
     options: Nsga2Options

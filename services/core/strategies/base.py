@@ -1,7 +1,7 @@
 """The contract of a strategy: from beliefs to the controllers to try in reality."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Protocol, TypeAlias
 
@@ -12,7 +12,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.registry import Plugin
+from gaplab.services.core.registry import Plugin, Presets
 from gaplab.services.core.repeats import variance_of_mean
 from gaplab.services.core.scoring import NO_FLOOR, weights_of
 from gaplab.services.core.space import Space
@@ -229,7 +229,7 @@ class DiverseOptions(Frozen):
 class Diverse(Strategy):
     """A strategy that selects by a diverse ensemble of simulators, weighted by their accuracy."""
 
-    lean: ClassVar[Mapping[str, Any]] = {"weightiest": 10}
+    presets: ClassVar[Presets] = {"lean": {"weightiest": 10}}
     Options = DiverseOptions
     options: DiverseOptions
 

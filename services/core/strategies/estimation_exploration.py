@@ -1,6 +1,6 @@
 """Try a fit controller, or one on whose readings the best models disagree, and tune competing models in between."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
@@ -9,6 +9,7 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Outcomes
+from gaplab.services.core.registry import Presets
 from gaplab.services.core.scoring import moved
 from gaplab.services.core.strategies.base import Search, Strategy
 from gaplab.services.core.types import Belief
@@ -52,6 +53,9 @@ class EstimationExploration(Strategy):
 
     name = "estimation_exploration"
     source = "Bongard and Lipson 2004, 2005; Bongard, Zykov and Lipson 2006; without the bank of difficult tests"
+    presets: ClassVar[Presets] = {
+        "bongard_2005": {"models": 15, "select": "disagreement", "compared": 5, "reliability": 0.5},
+    }
     Options = EstimationExplorationOptions
     options: EstimationExplorationOptions
 

@@ -3,14 +3,14 @@
 Source: paper, section 2.
 """
 
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from numpy.random import Generator
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
+from gaplab.services.core.registry import Presets
 from gaplab.services.core.scoring import (
     deviation_of_readings,
     scaled_uniqueness_penalty,
@@ -77,7 +77,7 @@ class Informative(Diverse):
 
     name = "informative"
     source = "Paper, section 2, Informative; Estimation-Exploration"
-    published: ClassVar[Mapping[str, Any]] = {"least_error": 0.0}
+    presets: ClassVar[Presets] = {**Diverse.presets, "as_published": {"least_error": 0.0}}
     needs_fitness = False
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
@@ -123,7 +123,7 @@ class SimulatedFitAndInformative(Diverse):
 
     name = "simulated_fit_and_informative"
     source = "Paper, section 2, Simulated Fit and Informative; the weights: section 4"
-    published: ClassVar[Mapping[str, Any]] = {"least_error": 0.0}
+    presets: ClassVar[Presets] = {**Diverse.presets, "as_published": {"least_error": 0.0}}
     Options = SimulatedFitAndInformativeOptions
     options: SimulatedFitAndInformativeOptions
 
@@ -157,7 +157,7 @@ class SimulatedFitAndUnique(Strategy):
 
     name = "simulated_fit_and_unique"
     source = "Paper, section 2, Simulated Fit and Unique; scaled distances are gaplab's"
-    published: ClassVar[Mapping[str, Any]] = {"distances": "plain"}
+    presets: ClassVar[Presets] = {"as_published": {"distances": "plain"}}
     Options = SimulatedFitAndUniqueOptions
     options: SimulatedFitAndUniqueOptions
 

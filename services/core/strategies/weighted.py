@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
 from pydantic import Field
 
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Outcomes, Parameters
+from gaplab.services.core.registry import Presets
 from gaplab.services.core.scoring import (
     beside,
     fisher_information,
@@ -71,6 +72,16 @@ class Weighted(Diverse):
 
     name = "weighted"
     source = "Paper, section 4, proposes weights; Fisher information: ASID 2024; reliability: Bongard and Lipson 2005"
+    presets: ClassVar[Presets] = {
+        **Diverse.presets,
+        "asid_2024": {
+            "fit_weight": 0.0,
+            "disagreement_weight": 0.0,
+            "information_weight": 1.0,
+            "information": "trace",
+            "difference": 0.1,
+        },
+    }
     Options = WeightedOptions
     options: WeightedOptions
 

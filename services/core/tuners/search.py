@@ -1,7 +1,6 @@
 """Tuners that search: the paper's, and that of the estimation-exploration algorithm."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -10,6 +9,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.answers import nothing
 from gaplab.services.core.arrays import FloatArray, Parameters
+from gaplab.services.core.registry import Presets
 from gaplab.services.core.search import Question, maximise
 from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.types import Simulator
@@ -42,7 +42,7 @@ class SearchTuner(Tuner):
 
     name = "search"
     source = "Paper, section 2; warm starts and equal rollouts are gaplab's"
-    lean: ClassVar[Mapping[str, Any]] = {"equal_rollouts": True}
+    presets: ClassVar[Presets] = {"lean": {"equal_rollouts": True}}
     Options = SearchOptions
     options: SearchOptions
 

@@ -4,7 +4,19 @@
 import { BANDS, FITNESS } from "../../lib/curve_options.js";
 
 /** @type {Record<string, string>} */
-export const AXES = { evaluations: "Real-world evaluations", rollouts: "Rollouts", time: "Time" };
+export const AXES = { evaluations: "Real-world evaluations", rollouts: "Rollouts", time: "Time", cost: "Cost" };
+
+/**
+ * What each axis needs to know, by its name in a query.
+ * @type {Record<string, string[]>}
+ */
+const NEEDED = { evaluations: [], rollouts: [], time: ["cost_s", "rollout_s", "cores"], cost: ["cost_s", "rollout_s", "cores", "machine", "attention", "wear"] };
+
+/** The same in words; what is left out has the service's default. @type {Record<string, string>} */
+export const MODEL = {
+  cost_s: "each real evaluation costs, in s", rollout_s: "a rollout, in s; empty: as measured", cores: "on so many cores",
+  machine: "price of an hour of the machine", attention: "price of an hour of real evaluations", wear: "price of the wear of each",
+};
 
 /** @type {Record<Page.Comparison["test"], { label: string, short: string }>} */
 export const TESTS = {
@@ -32,7 +44,8 @@ export function comparisonOf(parameters) {
     experiments: ids(parameters.get("experiments")),
     studies: ids(parameters.get("studies")),
     x: among("x", AXES, "evaluations"),
-    cost_s: nonNegative(parameters.get("cost_s")) ?? COST_S,
+    model: { ...Object.fromEntries(Object.keys(MODEL).map((name) => [name, nonNegative(parameters.get(name))])), cost_s: nonNegative(parameters.get("cost_s")) ?? COST_S },
+    equal: parameters.get("equal") === "true",
     band: among("band", BANDS, ""),
     fitness: among("fitness", FITNESS, ""),
     each: parameters.get("each") === "true",
@@ -49,11 +62,12 @@ export function comparisonOf(parameters) {
  *
  * @param {Page.Comparison} comparison
  */
-export function addressOf({ experiments, x, cost_s: cost, band, fitness, each, test, from, to, margin, margin_of_direct: share }) {
+export function addressOf({ experiments, x, model, equal, band, fitness, each, test, from, to, margin, margin_of_direct: share }) {
   const parts = Object.entries({
     experiments: experiments.join(","),
     x: x === "evaluations" ? "" : x,
-    cost_s: x === "time" ? cost : "",
+    ...Object.fromEntries(NEEDED[x].map((name) => [name, model[name] ?? ""])),
+    equal: (x !== "evaluations" && equal) || "",
     band,
     fitness,
     each: each || "",
@@ -66,20 +80,26 @@ export function addressOf({ experiments, x, cost_s: cost, band, fitness, each, t
   return `#/compare${parts.length ? "?" : ""}${parts.map(([name, value]) => `${name}=${value}`).join("&")}`;
 }
 
+/** Return the part of a query that says what curves are drawn against. @param {Page.Comparison} comparison */
+export const costQuery = ({ x, model }) => ({ x: x === "evaluations" ? null : x, ...Object.fromEntries(NEEDED[x].map((name) => [name, model[name]])) });
+
+/** Return which part of the model an axis needs. @param {string} x */
+export const neededBy = (x) => NEEDED[x];
+
 /**
  * Return the query of the figure.
  *
  * @param {Page.Comparison} comparison
  */
-export const figureQuery = ({ experiments, x, cost_s: cost, band, fitness, each }) => ({
-  study: experiments, x: x === "evaluations" ? null : x, cost_s: x === "time" ? cost : null, band, fitness, each: each || null,
+export const figureQuery = ({ experiments, band, fitness, each, ...choice }) => ({
+  study: experiments, ...costQuery(/** @type {Page.Comparison} */ (choice)), band, fitness, each: each || null,
 });
 
 /** @param {string | null} text */
 const ids = (text) => [...new Set((text ?? "").split(",").filter((id) => /^[\w-]{1,64}$/.test(id)))];
 
 /** @param {string | null} text */
-const nonNegative = (text) => (text && Number.isFinite(Number(text)) && Number(text) >= 0 ? Number(text) : null);
+export const nonNegative = (text) => (text && Number.isFinite(Number(text)) && Number(text) >= 0 ? Number(text) : null);
 
 /**
  * Return the number above 0 that a text is, or null.

@@ -6,7 +6,7 @@ import { h } from "../../lib/dom.js";
 import { figureDownloads } from "../../lib/downloads.js";
 import { plot } from "../../lib/plot.js";
 import { CURVE_KINDS } from "../../lib/event_kinds.js";
-import { AXES, figureQuery } from "./address.js";
+import { AXES, figureQuery, MODEL, neededBy, nonNegative } from "./address.js";
 
 /**
  * Return the controls; each change is in the address at once.
@@ -17,22 +17,26 @@ import { AXES, figureQuery } from "./address.js";
 export function controls(view) {
   const radios = Object.keys(AXES).map((value) => h("input", { type: "radio", name: "x", value, onchange: () => view.change({ x: value }) }));
   const axes = radios.map((radio) => h("label", {}, radio, AXES[radio.value]));
-  const changeCost = () => {
-    if (cost.checkValidity() && cost.value !== "") view.change({ cost_s: Number(cost.value) });
-  };
-  const cost = h("input", { type: "number", min: 0, step: "any", class: "short", onchange: changeCost });
-  const costLabel = h("label", {}, "each real evaluation costs ", cost, " s");
+  const model = Object.entries(MODEL).map(([name, text]) => {
+    const change = () => {
+      if (input.checkValidity()) view.change({ model: { ...view.choice.model, [name]: nonNegative(input.value) } });
+    };
+    const input = h("input", { type: "number", min: 0, step: "any", class: "short", onchange: change });
+    return { name, input, label: h("label", {}, `${text} `, input) };
+  });
   const band = bandSelect({ onchange: () => view.change({ band: band.value }) });
   const fitness = fitnessSelect({ onchange: () => view.change({ fitness: fitness.value }) });
   const each = h("input", { type: "checkbox", onchange: () => view.change({ each: each.checked }) });
   const element = h("div", { class: "controls" },
-    h("fieldset", {}, h("legend", {}, "Against"), ...axes, costLabel),
+    h("fieldset", {}, h("legend", {}, "Against"), ...axes, ...model.map(({ label }) => label)),
     h("label", {}, "Fitness ", fitness), h("label", {}, "Band ", band), h("label", {}, each, " Each repetition"));
   const update = () => {
     const { choice } = view;
     for (const radio of radios) radio.checked = radio.value === choice.x;
-    costLabel.hidden = choice.x !== "time";
-    if (document.activeElement !== cost) cost.value = String(choice.cost_s);
+    for (const { name, input, label } of model) {
+      label.hidden = !neededBy(choice.x).includes(name);
+      if (document.activeElement !== input) input.value = String(choice.model[name] ?? "");
+    }
     band.value = choice.band;
     fitness.value = choice.fitness;
     each.checked = choice.each;

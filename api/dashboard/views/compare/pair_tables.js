@@ -115,11 +115,13 @@ function numbers(pair, test) {
 export function summaries({ choice: { experiments }, cache }, pairs, open) {
   const names = cache.namesOf(experiments);
   const found = new Map(pairs.flatMap((pair) => [[pair.first, pair.summary_first], [pair.second, pair.summary_second]]));
+  const counts = new Map(pairs.flatMap((pair) => [[pair.first, pair.evaluations_first], [pair.second, pair.evaluations_second]]));
+  const isAtCost = pairs[0].cost !== null;
   const rows = experiments.flatMap((id, index) => {
     const one = found.get(id);
-    return one ? [[`${letter(index)} ${names.get(id)}`, String(one.n), one.mean.text, one.interquartile_mean.text, threeDigits(one.sd)]] : [];
+    return one ? [[`${letter(index)} ${names.get(id)}`, ...(isAtCost ? [String(counts.get(id) ?? "–")] : []), String(one.n), one.mean.text, one.interquartile_mean.text, threeDigits(one.sd)]] : [];
   });
-  const head = ["Experiment", "n", "Mean [95 %]", "Interquartile mean [95 %]", "SD"];
+  const head = ["Experiment", ...(isAtCost ? ["Evaluations"] : []), "n", "Mean [95 %]", "Interquartile mean [95 %]", "SD"];
   return h("details", { open, class: "pairs each" }, h("summary", {}, "Each experiment, with intervals"), table("Each experiment", head, rows));
 }
 
@@ -137,8 +139,9 @@ export function pairsTable({ choice: { test, experiments }, cache }, results, op
   const isShared = chosen.pairs.some((pair) => pair.shared_streams);
   const hasMargin = chosen.pairs.some((pair) => pair.equivalence);
   const tests = /** @type {const} */ ([...UNPAIRED, ...(isShared ? PAIRED : []), "brown_forsythe"]);
-  const columns = ["Pair", ...sorted.map(({ range }) => `${range[0] === range[1] ? "At" : "Mean of"} ${rangeText(range)}`),
-    `Difference at ${rangeText(chosen.range)} [90 %]`, "d", "P(first > second) [95 %]", "n", ...(hasMargin ? ["Equivalence"] : []),
+  const isAtCost = chosen.pairs[0].cost !== null;
+  const columns = ["Pair", ...sorted.map(({ range }) => (isAtCost ? "At equal cost" : `${range[0] === range[1] ? "At" : "Mean of"} ${rangeText(range)}`)),
+    `Difference ${isAtCost ? chosen.pairs[0].where : `at ${rangeText(chosen.range)}`} [90 %]`, "d", "P(first > second) [95 %]", "n", ...(hasMargin ? ["Equivalence"] : []),
     ...tests.map((name) => `${TESTS[name].short}, ${AFTER_HOLM}`), "Random streams"];
   const rows = chosen.pairs.map((pair, index) => [
     label(pair), ...sorted.map(({ pairs }) => result(pairs[index][test])), pair.difference_text, pair.effect_size_text, pair.improvement.text,

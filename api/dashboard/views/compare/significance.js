@@ -5,7 +5,7 @@ import { get } from "../../lib/api.js";
 import { h, refill, refillInPlace } from "../../lib/dom.js";
 import { failed } from "../../lib/placeholders.js";
 import { CURVE_KINDS } from "../../lib/event_kinds.js";
-import { positive, TESTS, wholeNumber } from "./address.js";
+import { AXES, costQuery, positive, TESTS, wholeNumber } from "./address.js";
 import { files, foldedPairs, matrix, pairsTable, pooledTable, rangeText, summaries, UNPAIRED } from "./pair_tables.js";
 
 const MOST = 20;  // experiments in one table: 190 pairs
@@ -27,11 +27,15 @@ export function significance(view) {
   const to = h("input", { type: "number", min: 0, max: 1000, step: 1, class: "short", onchange: changeRange });
   const tests = Object.entries(TESTS).map(([value, { label }]) => h("option", { value }, label));
   const test = h("select", { onchange: () => view.change({ test: /** @type {Page.Comparison["test"]} */ (test.value) }) }, ...tests);
+  const equal = h("input", { type: "checkbox", onchange: () => view.change({ equal: equal.checked }) });
+  const equalText = h("span");
+  const equalLabel = h("label", {}, equal, equalText);
+  const range = h("span", { class: "range" }, buttons, h("label", {}, "from ", from), h("label", {}, "to ", to));
   const place = h("div");
   const margin = marginField(view);
   const element = h("section", { class: "card significance", "aria-labelledby": "differ" },
     h("div", { class: "titled" }, h("h2", { id: "differ" }, "Which differ"), h("p", { class: "options" }, h("label", {}, "Test ", test))),
-    h("div", { class: "controls" }, buttons, h("label", {}, "from ", from), h("label", {}, "to ", to), margin.element), place, h("p", { class: "note" }, NOTE));
+    h("div", { class: "controls" }, equalLabel, range, margin.element), place, h("p", { class: "note" }, NOTE));
   let [lastKey, shownKey, requests] = ["", "", 0];
   /** @type {number | null} */
   let shared = null;
@@ -51,7 +55,7 @@ export function significance(view) {
       shownKey = key;
       if (!pairs) return undefined;
       shared = pairs[0].shared_evaluations;
-      showRange(pairs[0].from_evaluations, pairs[0].to_evaluations);
+      if (!isAtCost(view)) showRange(pairs[0].from_evaluations, pairs[0].to_evaluations);
     } catch (error) {
       if (!isCurrent()) return undefined;
       if (shownKey === key) return "failed";
@@ -64,6 +68,10 @@ export function significance(view) {
   const update = () => {
     element.hidden = view.cache.known(view.choice.experiments).length < 2;
     if (element.hidden) return;
+    equalLabel.hidden = view.choice.x === "evaluations";
+    equal.checked = view.choice.equal;
+    equalText.textContent = ` at equal ${AXES[view.choice.x].toLowerCase()}: the least that all have spent`;
+    range.hidden = isAtCost(view);
     const last = view.choice.to ?? shared;
     showRange(view.choice.from ?? last, last);
     test.value = view.choice.test;
@@ -76,13 +84,20 @@ export function significance(view) {
   return { element, update };
 }
 
+/** Return whether pairs are tested at equal rollouts, time or cost. @param {Page.CompareView} view */
+const isAtCost = ({ choice: { x, equal } }) => equal && x !== "evaluations";
+
+/** Return what is equal in the pairs, as a query has it. @param {Page.CompareView} view */
+const placeOf = (view) => (isAtCost(view) ? costQuery(view.choice) : { from: view.choice.from, to: view.choice.to });
+
 /**
  * Return a key of what the reader chose.
  *
  * @param {Page.CompareView} view
  */
-function keyOf({ cache, choice: { experiments, from, to, test, fitness, margin, margin_of_direct: share } }) {
-  return JSON.stringify([cache.known(experiments), from, to, test, fitness, margin, share]);
+function keyOf(view) {
+  const { cache, choice: { experiments, test, fitness, margin, margin_of_direct: share } } = view;
+  return JSON.stringify([cache.known(experiments), placeOf(view), test, fitness, margin, share]);
 }
 
 /**
@@ -137,7 +152,7 @@ function marginField(view) {
  * @returns {Promise<Api.Comparison[] | null>}
  */
 async function fill(place, view, isCurrent, unfolded) {
-  const { experiments, from, to, margin, margin_of_direct: share, test, fitness } = view.choice;
+  const { experiments, margin, margin_of_direct: share, test, fitness } = view.choice;
   const ids = view.cache.known(experiments);
   if (ids.length < 2) return null;
   if (ids.length > MOST) {
@@ -146,15 +161,15 @@ async function fill(place, view, isCurrent, unfolded) {
   }
   const load = (/** @type {Page.Query} */ query) => get("/comparisons", { study: ids, fitness, ...query }, view.signal);
   /** @type {Api.Comparison[]} */
-  const pairs = await load({ from, to, margin, margin_of_direct: share });
+  const pairs = await load({ ...placeOf(view), margin, margin_of_direct: share });
   const { from_evaluations: first, to_evaluations: last, shared_evaluations: shared } = pairs[0];
   const isOpen = (/** @type {string} */ name) => place.querySelector(`details.${name}`)?.hasAttribute("open") ?? false;
   const hasOthers = isOpen("every");
-  const others = hasOthers ? rangesOf(shared).filter(([one, other]) => one !== first || other !== last) : [];
+  const others = hasOthers && !isAtCost(view) ? rangesOf(shared).filter(([one, other]) => one !== first || other !== last) : [];
   const results = await Promise.all(others.map(async (range) => ({ range, pairs: await load({ from: range[0], to: range[1], intervals: false }) })));
   if (!isCurrent()) return null;
   results.push({ range: [first, last], pairs });
-  const asked = { study: ids, from: first, to: last, margin, margin_of_direct: share, fitness };
+  const asked = { study: ids, ...(isAtCost(view) ? placeOf(view) : { from: first, to: last }), margin, margin_of_direct: share, fitness };
   refillInPlace(place, JSON.stringify([results, hasOthers, test, [...view.cache.namesOf(experiments)]]), () => [
     cautions(view, pairs), matrix(view, ids, pairs, isOpen("alike")), files(asked), summaries(view, pairs, isOpen("each")),
     hasOthers ? pairsTable(view, results, isOpen("every")) : foldedPairs(unfolded), pooledTable(view, pairs, isOpen("pooled"))]);

@@ -10,8 +10,8 @@ export const EVALUATIONS = ["controller_evaluations", "selection_evaluations", "
 
 /** Return a plug-in as the form has it. @param {Page.PluginName} [given] @returns {Page.PluginDraft} */
 function pluginDraft(given = "") {
-  const { name, options } = typeof given === "string" ? { name: given, options: {} } : given;
-  return { name, options: { ...options } };
+  const { name, preset, options } = typeof given === "string" ? { name: given } : given;
+  return { name, preset: preset ?? "", options: { ...options } };
 }
 
 /**
@@ -49,9 +49,10 @@ export function draftOf(spec, catalogue) {
 export const LIMITS = ["joint_speed", "torque", "tilt", "height"];
 
 /** @param {Spec} reality */
-const realityDraft = ({ kind, pool, held_out: heldOut, engine, parameters, bench, repeats, probes, samples, limits, beyond }) => ({
+const realityDraft = ({ kind, pool, held_out: heldOut, engine, parameters, noise, noise_unit: noiseUnit, bench, repeats, probes, samples, limits, beyond }) => ({
   realityEngine: pluginDraft(engine ?? ""),
   realityParameters: { ...parameters },
+  realityNoise: { noise: noise ?? "", noise_unit: noiseUnit ?? "" },
   bench: {
     isPhysical: kind === "physical", isRecorded: kind === "recorded", pool: pool?.name ?? pool ?? "", heldOut: heldOut ?? "", bench: bench ?? "", repeats: repeats ?? "", probes: probes ?? "", samples: samples ?? [],
     limits: Object.fromEntries(LIMITS.map((name) => [name, limits?.[name] ?? ""])), beyond: beyond === "refuse" ? beyond : "",
@@ -67,7 +68,7 @@ const realityDraft = ({ kind, pool, held_out: heldOut, engine, parameters, bench
 function strategyDrafts(given, catalogue) {
   const named = given.map((plugin) => ({ ...pluginDraft(plugin), on: true }));
   const others = catalogue.strategies.filter(({ name }) => !named.some((plugin) => plugin.name === name));
-  return [...named, ...others.map(({ name }) => ({ name, options: {}, on: false }))];
+  return [...named, ...others.map(({ name }) => ({ ...pluginDraft(name), on: false }))];
 }
 
 /** @param {(string | { name: string, lower?: number, upper?: number })[]} given @param {Api.Catalogue} catalogue @returns {Page.TunableDraft[]} */
@@ -145,11 +146,11 @@ export function specOf(draft) {
 }
 
 /** Return reality without what its kind does not have; the form keeps that while the reader changes the kind. @param {Page.Draft} draft */
-function realityOf({ realityEngine, realityParameters, bench: { isPhysical, isRecorded, pool, heldOut, limits, samples, repeats, ...bench } }) {
+function realityOf({ realityEngine, realityParameters, realityNoise, bench: { isPhysical, isRecorded, pool, heldOut, limits, samples, repeats, ...bench } }) {
   if (isRecorded) return withoutEmpty({ kind: "recorded", pool: pool.trim(), ...typedValues({ held_out: heldOut }) });
   if (!isPhysical) {
     const { probes } = bench;
-    return withoutEmpty({ engine: realityEngine.name ? pluginName(realityEngine) : "", parameters: withoutEmpty(typedValues(realityParameters)), probes });
+    return withoutEmpty({ engine: realityEngine.name ? pluginName(realityEngine) : "", parameters: withoutEmpty(typedValues(realityParameters)), ...typedValues(realityNoise), probes });
   }
   const words = { ...bench, bench: bench.bench.trim() };
   return withoutEmpty({ kind: "physical", ...words, ...typedValues({ repeats }), samples, limits: withoutEmpty(typedValues(limits)) });
@@ -162,7 +163,7 @@ function budgetOf({ preset, reuse_transfer: isReused, ...evaluations }) {
 }
 
 /** Return a plug-in as a spec has it. @param {Page.PluginDraft} plugin */
-export const pluginName = ({ name, options }) => shortest({ name, ...withoutEmpty({ options: withoutEmpty(typedValues(options)) }) });
+export const pluginName = ({ name, preset, options }) => shortest({ name, ...withoutEmpty({ preset, options: withoutEmpty(typedValues(options)) }) });
 
 /** @param {Spec} plugin a bare name stands for a plug-in that has nothing but its name */
 const shortest = (plugin) => (Object.keys(plugin).length === 1 ? plugin.name : plugin);

@@ -105,11 +105,14 @@ export function tickField(label, isOn, set) {
 /**
  * Return fields for the options of a plug-in, made from their JSON Schema; null if it has none.
  * @param {Api.PluginRead | undefined} plugin
- * @param {Record<string, any>} options
+ * @param {Page.PluginDraft} draft
  * @param {Pointer} pointer of the plug-in
- * @param {{ places: ErrorPlaces, changed: () => void }} form
+ * @param {Pick<Form, "places" | "changed" | "remake">} form
  */
-export function optionFields(plugin, options, pointer, { places, changed }) {
+export function optionFields(plugin, draft, pointer, { places, changed, remake }) {
+  const { options } = draft;
+  const presets = plugin?.presets ?? {};
+  const preset = presets[draft.preset] ?? {};
   const schemas = /** @type {Record<string, any>} */ (plugin?.options.properties ?? {});
   const fields = Object.entries(schemas).map(([name, schema]) => {
     const set = (/** @type {unknown} */ value) => {
@@ -117,8 +120,8 @@ export function optionFields(plugin, options, pointer, { places, changed }) {
       changed();
     };
     const label = readableName(name);
-    if (schema.type === "boolean") return h("p", { class: "field" }, tickField(`${label}: ${schema.description}`, options[name] ?? schema.default, set).element);
-    const usual = String(schema.default ?? "");
+    if (schema.type === "boolean") return h("p", { class: "field" }, tickField(`${label}: ${schema.description}`, options[name] ?? preset[name] ?? schema.default, set).element);
+    const usual = String(preset[name] ?? schema.default ?? "");
     const values = /** @type {string[] | undefined} */ (schema.enum);
     /** @type {Page.Choices | null} */
     const choices = values ? [["", `${readableName(usual)}, the default`], ...values.map((value) => /** @type {[string, string]} */ ([value, readableName(value)]))] : null;
@@ -126,6 +129,15 @@ export function optionFields(plugin, options, pointer, { places, changed }) {
     const optionPointer = () => (pointer() === null ? null : `${pointer()}/options/${name}`);
     return field({ label, hint: schema.description, value: options[name], set, places, choices, pointer: optionPointer, ...attributes });
   });
+  const choose = (/** @type {string} */ name) => {
+    Object.assign(draft, { preset: name, options: {} });
+    remake();
+  };
+  const names = Object.keys(presets);
+  if (names.length) {
+    fields.unshift(field({ label: "Preset", hint: "sets the options below, which you can change", value: draft.preset, set: choose, places,
+      pointer: () => (pointer() === null ? null : `${pointer()}/preset`), choices: [["", "The defaults"], ...names.map((name) => /** @type {[string, string]} */ ([name, readableName(name)]))] }));
+  }
   return fields.length ? h("div", { class: "fields" }, ...fields) : null;
 }
 
@@ -146,14 +158,14 @@ export function pluginField(form, label, draft, plugins, pointer, none = null) {
   /** @type {Page.Choices} */
   const choices = plugins.map(({ name, available }) => [name, `${readableName(name)}${available ? "" : ": not available"}`, !available]);
   const set = (/** @type {string} */ name) => {
-    Object.assign(draft, { name, options: {} });
+    Object.assign(draft, { name, preset: "", options: {} });
     form.remake();
   };
-  const options = optionFields(chosen, draft.options, () => pointer, form);
+  const options = optionFields(chosen, draft, () => pointer, form);
   return [
     field({ label, hint: chosen?.summary, value: draft.name, set, pointer, places: form.places, choices: none === null ? choices : [["", none], ...choices] }),
     ...plugins.map(whyUnavailable),
-    options ? folded(pointer, `Options of ${readableName(draft.name)}`, [options], Object.keys(draft.options).length > 0) : null];
+    options ? folded(pointer, `Options of ${readableName(draft.name)}`, [options], draft.preset !== "" || Object.keys(draft.options).length > 0) : null];
 }
 
 /** Return why a plug-in is unavailable; null if it is not. @param {Api.PluginRead | undefined} plugin */

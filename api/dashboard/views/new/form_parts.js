@@ -39,7 +39,7 @@ export function robotStep(form) {
 /** Return the second step: what is compared and tuned, and how it searches. @param {Form} form */
 export function searchStep(form) {
   const { draft, catalogue, places } = form;
-  const isLean = catalogue.budgets.some(({ name, lean }) => lean && name === draft.budget.preset);
+  const ofBudget = catalogue.budgets.find(({ name }) => name === draft.budget.preset)?.controller_optimizer;
   return step("2. What is compared and tuned",
     columns(strategies(form), tunables(form)),
     advanced("search", columns(
@@ -47,7 +47,7 @@ export function searchStep(form) {
         pluginField(form, "Tuning minimises", draft.discrepancy, catalogue.discrepancies, "/discrepancy"),
         numberField({ label: "Share of samples held out", hint: "no tuning sees them, simulators are tested on them; 0.2: each fifth", value: draft.held_out, set: form.setter(draft, "held_out"), pointer: "/held_out", places, placeholder: "0" })],
       [pluginField(form, "Optimizer", draft.optimizer, catalogue.optimizers, "/optimizer"),
-        pluginField(form, "Optimizer of controllers", draft.controllerOptimizer, catalogue.optimizers, "/controller_optimizer", isLean ? "That of the lean budget" : "The same")])));
+        pluginField(form, "Optimizer of controllers", draft.controllerOptimizer, catalogue.optimizers, "/controller_optimizer", ofBudget ? `That of the budget: ${readableName(ofBudget)}` : "The same")])));
 }
 
 const SEARCHES = ["Search for the transferred controller", "Search for the next sample", "Search for a simulator"];
@@ -129,10 +129,10 @@ function strategyField(form, strategy) {
     form.remake();
   };
   const add = linkButton("Add again, with other options", () =>
-    splice(strategies.indexOf(strategy) + 1, 0, { name: strategy.name, options: { ...strategy.options }, on: true }));
+    splice(strategies.indexOf(strategy) + 1, 0, { ...strategy, options: { ...strategy.options }, on: true }));
   const isRepeated = strategies.filter(({ name }) => name === strategy.name).length > 1;
   const remove = isRepeated ? linkButton("Remove", () => splice(strategies.indexOf(strategy), 1)) : null;
-  const options = optionFields(plugin, strategy.options, pointer, form);
+  const options = optionFields(plugin, strategy, pointer, form);
   const tick = (/** @type {boolean} */ on) => {
     strategy.on = on;
     form.remake();
@@ -140,7 +140,7 @@ function strategyField(form, strategy) {
   const { box, element } = tickField([readableName(strategy.name), h("small", {}, plugin?.summary)], Boolean(strategy.on), tick);
   box.disabled = !strategy.on && plugin?.available === false;
   places.add(pointer, box, room);
-  const open = Object.keys(strategy.options).length > 0;
+  const open = strategy.preset !== "" || Object.keys(strategy.options).length > 0;
   const more = options && strategy.on ? folded(String(pointer()), "Options", [options, h("p", {}, add, " ", remove)], open) : null;
   return h("div", { class: "strategy" }, element, whyUnavailable(plugin), room, more);
 }

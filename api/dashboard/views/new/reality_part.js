@@ -25,6 +25,12 @@ const LIMIT_WORDS = {
   tilt: ["Tilt of the base at most", "rad"], height: ["Height of the base at least", "m"],
 };
 
+/** @type {Record<string, [label: string, hint: string]>} */
+const NOISE_WORDS = {
+  noise: ["Noise of a measured fitness", "standard deviation as a share of about what an evolution in reality reaches; readings have their sensors’ noise then"],
+  noise_unit: ["The same in the unit of fitness", "in place of the share: equal for all strategies"],
+};
+
 /** Return the fields that say what reality is. @param {Form} form */
 export function realityFields(form) {
   const { draft: { bench, strategies }, places, catalogue } = form;
@@ -53,7 +59,7 @@ export const rareReality = (form) => (form.draft.bench.isRecorded ? [] : form.dr
 
 /** Return the engine and the hidden parameters of a simulated reality. @param {Form} form */
 function simulated(form) {
-  const { draft: { realityEngine, realityParameters, tunables }, places, catalogue } = form;
+  const { draft: { realityEngine, realityParameters, realityNoise, tunables }, places, catalogue } = form;
   const named = [...new Set([...tunables.map(({ name }) => name), ...Object.keys(realityParameters)])];
   const fields = named.flatMap((name) => {
     const plugin = catalogue.tunables.find((other) => other.name === plainName(name));
@@ -63,7 +69,10 @@ function simulated(form) {
   });
   return [
     pluginField(form, "Engine of reality", realityEngine, catalogue.engines, "/reality/engine", "The engine of the simulators"),
-    h("p", { class: "note" }, "Hidden parameters of reality"), h("div", { class: "fields" }, ...fields), probesField(form, "each")];
+    h("p", { class: "note" }, "Hidden parameters of reality"), h("div", { class: "fields" }, ...fields),
+    ...Object.entries(NOISE_WORDS).map(([name, [label, hint]]) => numberField({
+      label, hint, value: realityNoise[name], set: form.setter(realityNoise, name), pointer: `/reality/${name}`, places, placeholder: "none" })),
+    probesField(form, "each")];
 }
 
 /** Return what is measured on a bench, and what is known already. @param {Form} form */
