@@ -8,6 +8,7 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.loop import Setting
+from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
 from gaplab.services.core.registry import Plugin, Registry
 from gaplab.services.core.space import Space
@@ -58,6 +59,7 @@ def small_setting(strategy: Any = "simulated_fit", options: Any = None, **change
         reality=CountedReality(),
         strategy=chosen,
         optimizer=SteadyState(SteadyStateOptions(population=5)),
+        controller_optimizer=chosen.controller_optimizer and optimizers[chosen.controller_optimizer](),
         genomes=Space.box([0.0, 0.0], [1.0, 1.0], [True, False]),
         parameters=Space.box([0.0, 0.0], [1.0, 1.0]),
         known=np.array([0.5, 0.5]),

@@ -17,6 +17,7 @@ from gaplab.schemas.curves import Fitness
 from gaplab.schemas.figures import FigureRead
 from gaplab.schemas.replays import Replay
 from gaplab.services.core.errors import NotFound
+from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments import reading
 from gaplab.services.figures.kinds.curves import Band, curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
@@ -32,7 +33,6 @@ from gaplab.services.results import curves
 from gaplab.services.results.costs import cost_axis
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.results.tuned_simulators import setting_coordinates, simulator_coordinates, tuned_simulators
-from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.session import Store
 
@@ -46,7 +46,7 @@ NARROW_IN = 5.0
 """A file narrower than this has two panels in a row, else three."""
 
 DIRECT = "the direct baseline tunes no simulators"
-NO_SAMPLES = "a strategy without samples tunes no simulators"
+UNTUNED = "its strategy tunes no simulators"
 """The message in place of a figure of simulators that do not exist."""
 
 
@@ -225,9 +225,10 @@ def _names(store: Store, query: CoordinatesDrawing) -> str:
 def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition) -> FigureDefinition:
     """Return the figure, with an explanation if it will always be empty."""
     spec = spec_of(reading.read_experiment(store, query.experiment).spec)
-    if not figure.empty or takes_samples(spec):
+    kind = strategies.get(spec.strategy.name)
+    if not figure.empty or kind is None or (kind.takes_samples and kind.tunes):
         return figure
-    why = DIRECT if is_direct(spec) else NO_SAMPLES
+    why = DIRECT if kind.in_reality else UNTUNED
     return replace(figure, nothing=why, alt=f"Nothing: {why}.")
 
 

@@ -210,4 +210,5 @@ def _leading(store: Store, judged: Sequence[Judged]) -> tuple[Judged, TunedSimul
     if not learned:
         return None
     best = max(learned, key=lambda one: one.mean)
-    return best, tuned_simulators(store, best.curve.experiment)
+    tuned = tuned_simulators(store, best.curve.experiment)
+    return (best, tuned) if tuned.simulators else None

@@ -14,9 +14,13 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Sample, Selected, Simulator, Transferred, Tuned
 from gaplab.services.experiments import reading
 from gaplab.services.results.misfit import misfit, misfit_csv
+from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.queries import experiments
 from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.queries.replays import tuned_samples
+from gaplab.services.store.queries.results import page_of_simulators
 from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, submit_one, toy
 
@@ -105,6 +109,22 @@ def test_an_experiment_without_results_has_no_misfit_yet_and_the_direct_baseline
 
     for each in (waiting, direct):
         assert (misfit(store, each).points, misfit(store, each).remarks) == ((), ())
+
+
+def test_a_strategy_that_tunes_nothing_has_no_misfit_and_no_tuned_simulators(store: Store) -> None:
+    untuned = submit_one(store, toy(strategy="transferability", robot="quadruped", repetitions=1, held_out=0.5)).id
+    (claim,) = execution.claim(store, "me", 9)
+    run(store, claim)
+
+    found = misfit(store, untuned)
+
+    assert (found.points, found.remarks, found.verdicts) == ((), (), ())
+    assert tuned_simulators(store, untuned).simulators == ()
+    with store.reading() as session:
+        row = experiments.get_experiment(session, untuned)
+        whole = {"repetition": None, "iteration": None, "limit": 99, "cursor": None}
+        assert not tuned_samples(session, row)
+        assert {each.error for each in page_of_simulators(session, row, **whole)} == {None}
 
 
 def test_nothing_of_reality_is_shown(store: Store) -> None:

@@ -32,8 +32,9 @@ def resolved(**spec: Any) -> ResolvedSpec:
 def lean_setting(strategy: Any, **changes: Any) -> Any:
     """A small repetition with every part of `lean`."""
     options = {"simulators": 6, "weightiest": 3} if strategy in DIVERSE else {}
-    controllers = CmaEs(CmaEsOptions(members=5))
-    return small_setting(strategy, options, controller_optimizer=controllers, tuner=TUNER, **changes)
+    own = strategies[strategy].controller_optimizer is not None
+    controllers = {} if own else {"controller_optimizer": CmaEs(CmaEsOptions(members=5))}
+    return small_setting(strategy, options, tuner=TUNER, **controllers, **changes)
 
 
 class TestPreset:

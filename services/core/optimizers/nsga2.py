@@ -120,7 +120,8 @@ def fronts(fitness: FloatArray) -> NDArray[np.int64]:
 def crowding(fitness: FloatArray, ranks: NDArray[np.int64]) -> FloatArray:
     """Return the crowding distance of each member within its front, `(n,)`: inf at the ends of an objective."""
     values, found = fitness.reshape(len(fitness), -1), np.zeros(len(fitness))
-    for rank in range(int(ranks.max(initial=-1)) + 1):
+    several = values.shape[1] > 1  # of one, all in a front are equal
+    for rank in range(int(ranks.max(initial=-1)) + 1 if several else 0):
         front = np.flatnonzero(ranks == rank)
         for column in values[front].T:
             order = front[np.argsort(column, kind="stable")]
