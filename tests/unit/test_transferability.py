@@ -11,8 +11,7 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.search import Allowance, ControllerSearch
-from gaplab.services.core.strategies.transferability import Transferability
-from gaplab.services.core.types import Belief, Measured, Outcome, Probed, Sample, Selected, Transferred
+from gaplab.services.core.types import Belief, Budget, Measured, Outcome, Probed, Sample, Selected, Transferred
 from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
 from gaplab.services.store.models import StepRow
 from gaplab.services.store.queries.logs import columns_of, step_of
@@ -30,25 +29,24 @@ def walked(genomes: Any, parameters: Any) -> Any:
 
 def fallen(genome: Any) -> Any:
     fitness, *readings = walked(genome[None], np.zeros((1, 2)))[0, 0]
-    if genome[0] > EDGE:
-        fitness, readings = 0.0, [reading - 3.0 for reading in readings]
-    return Outcome(float(fitness), frozen(readings))
+    beyond = max(0.0, genome[0] - EDGE)
+    return Outcome(float(fitness - 3 * beyond), frozen(np.array(readings) - 10 * beyond))
 
 
 def walking(iterations: int = 8, **options: Any) -> Any:
     small = small_setting("transferability", options, simulate=lambda *given: walked(*given)[..., 0])
     times = {"reading_times_s": frozen([1, 1, 2, 2]), "reading_periods": frozen(np.zeros(4))}
-    return replace(small, sense=walked, reality=fallen, iterations=iterations, **times)
+    budget = Budget(controller_evaluations=100, selection_evaluations=60)
+    return replace(small, sense=walked, reality=fallen, iterations=iterations, budget=budget, **times)
 
 
-@pytest.mark.parametrize("options", [{}, dict(Transferability.published)], ids=["default", "published"])
-def test_after_some_tests_the_fittest_that_reality_repeats_is_transferred(options: Any) -> None:
-    steps = list(repetition(walking(**options)))
+def test_after_some_tests_the_fittest_that_reality_repeats_is_transferred() -> None:
+    steps = list(repetition(walking()))
 
     probes = [step.fitness for step in steps if isinstance(step, Probed)]
     tested = [step.sample.genome[0] for step in steps if isinstance(step, Measured)]
-    assert probes[0] == 0.0  # the fittest in simulation falls
-    assert probes[-1] > 0.4
+    assert probes[0] < 0.0  # the fittest in simulation falls
+    assert probes[-1] > 0.3
     assert min(tested) < EDGE < max(tested)
     transferred = [step for step in steps if isinstance(step, Transferred)]
     assert all(step.fitness == step.genome[0] for step in transferred)  # that in simulation is known
@@ -86,7 +84,7 @@ def test_the_estimate_is_the_mean_of_disparities_weighted_by_distance(exponent: 
     scale = behaviour[: len(first)].std(axis=0)
     apart = np.linalg.norm((behaviour[:, None] - behaviour[:2]) / scale, axis=2)
     weights = np.maximum(apart, 0.01) ** -exponent
-    expected = weights @ [0.0, 3.0] / (weights.sum(axis=1) if normalise else 2)
+    expected = weights @ [0.0, 10 * (0.9 - EDGE)] / (weights.sum(axis=1) if normalise else 2)
     np.testing.assert_allclose(-scores[:, 1], expected)
     np.testing.assert_allclose(scores[:, 2], apart.min(axis=1))
     np.testing.assert_array_equal(first[:2], [each.genome for each in tested])
@@ -113,7 +111,7 @@ def begun(setting: Any, samples: Any, kind: Any) -> Any:
 
 def quadruped(**changes: Any) -> ExperimentSpec:
     small = {"strategy": "transferability", "robot": "quadruped", "iterations": 3, "repetitions": 1}
-    budget = {"controller_evaluations": 40, "selection_evaluations": 30, "simulator_evaluations": 2}
+    budget = {"controller_evaluations": 100, "selection_evaluations": 60, "simulator_evaluations": 2}
     return ExperimentSpec.model_validate(small | {"budget": budget} | changes)
 
 
@@ -121,7 +119,7 @@ def test_it_costs_its_searches_alone_and_brings_its_own_optimizer() -> None:
     resolved = resolve_experiment(quadruped(held_out=0.5))
 
     costs = [step.cost for step in repetition(walking(3)) if hasattr(step, "cost")]
-    assert sum(cost.rollouts + cost.saved for cost in costs) == expected_rollouts(resolved) == 4 * 40 + 3 * 30
+    assert sum(cost.rollouts + cost.saved for cost in costs) == expected_rollouts(resolved) == 4 * 100 + 3 * 60
     assert (resolved.controller_optimizer.name, resolved.optimizer.name) == ("nsga2", "steady_state")
     assert resolve_experiment(resolved) == resolved
 

@@ -31,7 +31,7 @@ class TransferabilityOptions(Frozen):
     normalise: bool = Field(
         default=True,
         description="divide the estimate by the sum of what tests count; false: by their number, as in that "
-        "transcription; gaplab's default",
+        "transcription, so that it has another unit than the limit of a transfer; gaplab's default",
     )
     least_distance: Annotated[float, Field(strict=True, gt=0, le=100)] = Field(
         default=0.01, description="smaller distances count as this one, in standard deviations; gaplab's default"
