@@ -9,7 +9,7 @@ open otherwise. Repetitions are the unit; the interval is Welch's.
 """
 
 from argparse import ArgumentParser
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -23,10 +23,14 @@ import gaplab
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.types import Transferred
+from gaplab.services.core.optimizers.nsga2 import fronts
+from gaplab.services.core.strategies.transferability import Objectives, Transferability
+from gaplab.services.core.types import Belief, Step, Transferred
 from gaplab.services.specs.assembly import reality_of, setting, simulation_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.stored_specs import spec_of
+from gaplab.services.store.queries.experiments import repetitions_of
+from gaplab.services.store.queries.logs import logs
 from gaplab.services.world.robots.base import Robot
 
 if TYPE_CHECKING:
@@ -77,11 +81,12 @@ def _difference(first: FloatArray, second: FloatArray) -> tuple[float, float, fl
 
 @dataclass(frozen=True)
 class Arm:
-    """One experiment of a study; repetitions and genes are in the order of the tables."""
+    """One experiment of a study; repetitions and genes are in the order of the tables, logs in that of repetitions."""
 
     spec: ResolvedSpec
     samples: "pandas.DataFrame"
     simulators: "pandas.DataFrame"
+    logs: Sequence[Sequence[Step]]
 
     def measured(self, iteration: int, kind: str = "sample") -> FloatArray:
         """Return the real fitness `(r,)` of one sample, or one transferred controller ("probe")."""
@@ -144,11 +149,15 @@ def arms(label: str, spec: Spec, folder: Path) -> list[Arm]:
         result = gaplab.run(database if database.exists() else {"name": name, "seed": 2026} | spec, path=database)
         result.save(archive)
     samples, simulators = result.samples, result.simulators
+    with result._store.reading() as session:
+        ids = {each.id: [row.id for row in repetitions_of(session, each.id)] for each in result.study.experiments}
+        steps = {id_: [logs(session, [row])[row] for row in rows] for id_, rows in ids.items()}
     return [
         Arm(
             spec_of(each.spec),
             samples[samples["experiment"] == each.id],
             simulators[simulators["experiment"] == each.id],
+            steps[each.id],
         )
         for each in result.study.experiments
     ]
@@ -270,6 +279,67 @@ def _best_of_repertoire(arm: Arm) -> FloatArray:
         assert isinstance(transferred, Transferred)
         best.append(np.nanmax(reality(transferred.members, truth[None])))
     return np.array(best)
+
+
+# Transferability
+
+
+@check(
+    transferability=DESK
+    | {
+        "strategies": [
+            "transferability",
+            {"name": "transferability", "preset": "as_published"},
+            "simulated_fit",
+            "direct",
+        ],
+        "reality": {"engine": "physx"},
+    },
+    transferability_inside=DESK | {"strategies": ["transferability", "simulated_fit"]},
+)
+def transferability(transferability: list[Arm], transferability_inside: list[Arm]) -> Iterator[Claim]:
+    """Judge what Koos et al. say, and that tuning wins where reality is within the simulators' span, not beyond."""
+    plain, published, fit, direct = transferability
+    inside, inside_fit = transferability_inside
+    best = direct.measured(0, "probe")
+    margin = 0.05 * float(np.nanmean(best))
+    for says, of in (("recorded", Arm.recorded), ("transferred alone", lambda arm, at: arm.measured(at, "probe"))):
+        found = of(plain, 10)
+        yield above(f"ten tests suffice for 0.85 of direct in another engine ({says})", found, 0.85 * best)
+        yield above(f"that is more than the untuned simulator's fittest ({says})", found, plain.measured(0, "probe"))
+        yield above(f"exponent and divisor do not matter ({says})", of(published, 10), found, least=-margin)
+        yield above(f"in another engine it is fitter than simulated fit, which tunes ({says})", found, of(fit, 10))
+        yield above(f"within the span, simulated fit is fitter ({says})", of(inside_fit, 10), of(inside, 10))
+    correlations = np.array([_correlation(plain.spec, number, log) for number, log in enumerate(plain.logs)])
+    says = "estimates rank the disparities of untested members of the front, correlation above 0.5"
+    yield above(says, correlations, np.zeros(len(correlations)), least=0.5, unit="")
+
+
+def _correlation(spec: ResolvedSpec, number: int, log: Sequence[Step]) -> float:
+    """Return the rank correlation of estimated and measured disparity over untested members of the last front."""
+    found, strategy = setting(spec, number), Transferability()
+    history = found.history(log)
+    belief = Belief(
+        found.genomes,
+        found.known,
+        history.samples,
+        history.simulators,
+        found.parameters,
+        found.names,
+        members=history.members,
+        reading_times_s=found.reading_times_s,
+        reading_periods=found.reading_periods,
+    )
+    objectives = Objectives(belief, strategy.options, np.random.default_rng(0))
+    assert found.sense is not None
+    outcomes = found.sense(objectives.start, belief.parameters[:1])
+    scores, tested = objectives(objectives.start, outcomes), {sample.genome.tobytes() for sample in history.samples}
+    untested = [genome.tobytes() not in tested for genome in objectives.start]
+    front = np.flatnonzero(np.isfinite(scores).all(axis=1) & untested)
+    front = front[fronts(scores[front]) == 0]
+    real = [found.reality(genome).readings for genome in objectives.start[front]]
+    disparities = [objectives.disparity(seen, felt) for seen, felt in zip(outcomes[front, 0, 1:], real, strict=True)]
+    return float(stats.spearmanr(-scores[front, 1], disparities, nan_policy="omit").statistic)
 
 
 def main() -> None:

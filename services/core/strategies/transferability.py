@@ -1,7 +1,6 @@
 """Evolve for fitness and for what reality would repeat, and learn from each test where that is."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -10,6 +9,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Outcomes, nearest
 from gaplab.services.core.optimizers.nsga2 import fronts
+from gaplab.services.core.registry import Presets
 from gaplab.services.core.strategies.base import Search, Strategy
 from gaplab.services.core.types import Belief
 
@@ -55,7 +55,7 @@ class Transferability(Strategy):
 
     name = "transferability"
     source = "Koos, Mouret and Doncieux 2010, 2013; the constants of estimate and tests are gaplab's"
-    published: ClassVar[Mapping[str, Any]] = {"exponent": 1.0, "normalise": False}
+    presets: ClassVar[Presets] = {"as_published": {"exponent": 1.0, "normalise": False}}
     tunes = False
     continues = True
     senses = True
@@ -80,15 +80,15 @@ class Transferability(Strategy):
         chosen: Genome = search.members[best]
         return chosen
 
-    def _evolved(self, belief: Belief, search: Search, rng: Generator) -> tuple["_Objectives", FloatArray]:
+    def _evolved(self, belief: Belief, search: Search, rng: Generator) -> tuple["Objectives", FloatArray]:
         """Return the objectives of one more search, and the scores `(n, 3)` of its members, the fittest first."""
-        found = _Objectives(belief, self.options, rng)
+        found = Objectives(belief, self.options, rng)
         search(found, parameters=belief.parameters[:1], senses=True, start=found.start)
         scores = np.array([found.scores[member.tobytes()] for member in search.members])
         return found, np.where(np.isfinite(scores).all(axis=1, keepdims=True), scores, -np.inf)
 
 
-class _Objectives:
+class Objectives:
     """The score of a search: fitness, minus the estimated disparity, and novelty, `(n, 3)`.
 
     Its first call has the tested genomes, then the first population, which says what distances are usual.
@@ -135,13 +135,20 @@ class _Objectives:
             self.usual = float(np.median(apart.min(axis=1)))
         tests = []
         for simulated, sample in zip(readings, self._samples, strict=False):
-            if simulated.shape == sample.readings.shape:
-                away = nearest(simulated, sample.readings, self._belief.reading_periods) - sample.readings
-                if np.isfinite(simulated).all() and (there := away[np.isfinite(away)]).size:
-                    tests.append((simulated, float(np.sqrt(np.mean(there**2)))))
+            found = self.disparity(simulated, sample.readings)
+            if np.isfinite(simulated).all() and np.isfinite(found):
+                tests.append((simulated, found))
         if tests:
             self.fair = float(np.median([disparity for _, disparity in tests])) * (1.0 + 1e-9)  # for rounding
         return tests
+
+    def disparity(self, simulated: FloatArray, real: FloatArray) -> float:
+        """Return the root mean square difference of readings `(q,)` that both have; nan if there are none."""
+        if simulated.shape != real.shape:
+            return np.nan
+        away = nearest(simulated, real, self._belief.reading_periods) - real
+        there = away[np.isfinite(away)]
+        return float(np.sqrt(np.mean(there**2))) if there.size else np.nan
 
     def _distances(self, readings: FloatArray, test: FloatArray) -> FloatArray:
         beside = nearest(readings, test, self._belief.reading_periods)
