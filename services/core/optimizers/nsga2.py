@@ -120,13 +120,14 @@ def fronts(fitness: FloatArray) -> NDArray[np.int64]:
 def crowding(fitness: FloatArray, ranks: NDArray[np.int64]) -> FloatArray:
     """Return the crowding distance of each member within its front, `(n,)`: inf at the ends of an objective."""
     values, found = fitness.reshape(len(fitness), -1), np.zeros(len(fitness))
-    several = values.shape[1] > 1  # of one, all in a front are equal
-    for rank in range(int(ranks.max(initial=-1)) + 1 if several else 0):
-        front = np.flatnonzero(ranks == rank)
-        for column in values[front].T:
-            order = front[np.argsort(column, kind="stable")]
-            ends = np.sort(column)
-            if np.isfinite(ends).all() and ends[-1] > ends[0]:
-                found[order[[0, -1]]] = np.inf
-                found[order[1:-1]] += (ends[2:] - ends[:-2]) / (ends[-1] - ends[0])
+    for column in np.where(np.isfinite(values), values, 0.0).T:  # all of a front fail, or none
+        order = np.lexsort((column, ranks))
+        sorted_ = column[order]
+        begins = np.diff(ranks[order], prepend=-1) > 0
+        starts = np.flatnonzero(begins)
+        sizes = np.diff(starts, append=len(order))
+        extent = np.repeat(sorted_[starts + sizes - 1] - sorted_[starts], sizes)
+        ends = (begins | np.append(begins[1:], True)) & (extent > 0)
+        between = np.append(sorted_[1:], 0.0) - np.append(0.0, sorted_[:-1])
+        found[order] += np.where(ends, np.inf, np.where(extent > 0, between, 0.0) / np.where(extent > 0, extent, 1.0))
     return found

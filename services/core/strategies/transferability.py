@@ -109,7 +109,8 @@ class Objectives:
         population = belief.draw(FIRST, rng) if lacks else belief.members
         rows = [*(sample.genome for sample in self._samples), *population]
         self.start: Genomes = np.array(rows).reshape(-1, belief.space.size)
-        self._tests: list[tuple[FloatArray, float]] | None = None
+        self._tests: FloatArray | None = None
+        self._disparities: list[float] = []
         self._scale: FloatArray | float = 1.0
 
     def __call__(self, genomes: Genomes, outcomes: Outcomes) -> FloatArray:
@@ -117,14 +118,14 @@ class Objectives:
         readings = outcomes[:, 0, 1:]
         if self._tests is None:
             self._tests = self._begun(readings)
-        distances = np.array([self._distances(readings, test) for test, _ in self._tests]).reshape(-1, len(genomes)).T
+        distances = self._distances(readings, self._tests)
         novelty = distances.min(axis=1, initial=UNTESTED)
         scores = np.column_stack([outcomes[:, 0, 0], -self._estimates(distances), novelty])
         self.scores.update(zip((genome.tobytes() for genome in genomes), scores, strict=True))
         return scores
 
-    def _begun(self, readings: FloatArray) -> list[tuple[FloatArray, float]]:
-        """Return readings in simulation, and disparity, of each test that has both; learn what is usual."""
+    def _begun(self, readings: FloatArray) -> FloatArray:
+        """Return the readings in simulation `(k, q)` of the tests with a disparity; learn what is usual."""
         behaviour = self._behaviour(readings)
         behaviour = behaviour[np.isfinite(behaviour).all(axis=1)]
         if len(behaviour) > 1:
@@ -137,10 +138,11 @@ class Objectives:
         for simulated, sample in zip(readings, self._samples, strict=False):
             found = self.disparity(simulated, sample.readings)
             if np.isfinite(simulated).all() and np.isfinite(found):
-                tests.append((simulated, found))
+                tests.append(simulated)
+                self._disparities.append(found)
         if tests:
-            self.fair = float(np.median([disparity for _, disparity in tests])) * (1.0 + 1e-9)  # for rounding
-        return tests
+            self.fair = float(np.median(self._disparities)) * (1.0 + 1e-9)  # for rounding
+        return np.array(tests).reshape(-1, readings.shape[1])
 
     def disparity(self, simulated: FloatArray, real: FloatArray) -> float:
         """Return the root mean square difference of readings `(q,)` that both have; nan if there are none."""
@@ -150,22 +152,24 @@ class Objectives:
         there = away[np.isfinite(away)]
         return float(np.sqrt(np.mean(there**2))) if there.size else np.nan
 
-    def _distances(self, readings: FloatArray, test: FloatArray) -> FloatArray:
-        beside = nearest(readings, test, self._belief.reading_periods)
-        away = (self._behaviour(beside) - self._behaviour(test[None])) / self._scale
-        return np.asarray(np.linalg.norm(away, axis=1))
+    def _distances(self, readings: FloatArray, tests: FloatArray) -> FloatArray:
+        """Return the distances in behaviour `(n, k)` of readings `(n, q)` from those of tests `(k, q)`."""
+        each = np.broadcast_to(readings[:, None], (len(readings), *tests.shape))
+        beside = nearest(each, tests, self._belief.reading_periods)
+        away = (self._behaviour(beside) - self._behaviour(tests)) / self._scale
+        return np.asarray(np.sqrt((away**2).sum(axis=-1)))
 
     def _behaviour(self, readings: FloatArray) -> FloatArray:
-        """Return mean over time and last value of each of s sensors, `(n, 2 s)`, from readings `(n, q)`."""
-        times, count = self._belief.reading_times_s, readings.shape[1]
+        """Return mean over time and last value of each of s sensors, `(..., 2 s)`, from readings `(..., q)`."""
+        times, count = self._belief.reading_times_s, readings.shape[-1]
         sensors = int((times == times.max(initial=0.0)).sum()) or count
-        by_time = readings.reshape(len(readings), count // sensors if sensors else 1, sensors)
-        return np.hstack([by_time.mean(axis=1), by_time[:, -1]])
+        by_time = readings.reshape(*readings.shape[:-1], count // sensors if sensors else 1, sensors)
+        return np.concatenate([by_time.mean(axis=-2), by_time[..., -1, :]], axis=-1)
 
     def _estimates(self, distances: FloatArray) -> FloatArray:
         """Return the estimated disparity `(n,)`, Σ D d⁻ᵖ / Σ d⁻ᵖ of the distances `(n, k)` to tests; 0 without any."""
-        if not self._tests:
+        if not self._disparities:
             return np.zeros(len(distances))
         weights = np.maximum(distances, self._options.least_distance) ** -self._options.exponent
-        disparities = np.array([disparity for _, disparity in self._tests])
-        return weights @ disparities / (weights.sum(axis=1) if self._options.normalise else len(disparities))
+        total = weights @ np.array(self._disparities)
+        return np.asarray(total / (weights.sum(axis=1) if self._options.normalise else len(self._disparities)))
