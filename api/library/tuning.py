@@ -225,9 +225,10 @@ class Tuning(Result):
         """Return the best simulator; it is tuned if something was told since.
 
         Raises:
-            Conflict: nothing was told yet.
+            Conflict: nothing was told yet, or its strategy tunes nothing.
             TimeoutError: it takes longer; what is computed is kept, and the next call goes on.
         """
+        self._refuse_untuned()
         self._latest(Tuned, timeout_s)
         return TunedSimulator.of(self._best(), misfit(self._store, self.id))
 
@@ -254,6 +255,7 @@ class Tuning(Result):
         """
         from gaplab.api.library.writing import write_robot  # with SciPy and lxml, which tuning does not need
 
+        self._refuse_untuned()
         self._latest(Tuned, math.inf)
         source = Path(original) if original is not None else self._original(Path(file).suffix)
         return write_robot(self.id, self.spec, self._best(), Path(file), source, partial=partial)
@@ -298,6 +300,11 @@ class Tuning(Result):
             if found is None and not self.spec.reality.samples and self.spec.reality.kind == "physical":
                 raise Conflict("nothing was told yet, so there is nothing to tune on")
             compute(self._store, self.id, kind, until, progress=self._progress)
+
+    def _refuse_untuned(self) -> None:
+        name = self.spec.strategy.name
+        if name in strategies and not strategies[name].tunes:
+            raise Conflict(f"{name} tunes no simulators; `controller` is what it transfers")
 
     def _best(self) -> SimulatorRead:
         last = max(step.iteration for step in self._log() if isinstance(step, Tuned))

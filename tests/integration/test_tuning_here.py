@@ -285,6 +285,8 @@ def test_it_refuses_in_the_words_of_the_service(tmp_path: Path) -> None:
             call()
     with pytest.raises(Conflict, match="nothing to tune on"):
         tuning.simulator  # noqa: B018 - it is computed
+    with pytest.raises(Conflict, match="surrogate tunes no simulators"):
+        tuning_of(strategy="surrogate").simulator  # noqa: B018 - it is computed
     (tmp_path / "bad.csv").write_text("gene_0,value\n0.5,fast\n")
     with pytest.raises(InvalidSamples, match="'fast' is not a number"):
         tuning.tell(tmp_path / "bad.csv")
