@@ -330,12 +330,12 @@ def _correlation(spec: ResolvedSpec, number: int, log: Sequence[Step]) -> float:
         reading_times_s=found.reading_times_s,
         reading_periods=found.reading_periods,
     )
-    objectives = Objectives(belief, strategy.options, np.random.default_rng(0))
+    objectives = Objectives(belief, strategy.options)
     assert found.sense is not None
     outcomes = found.sense(objectives.start, belief.parameters[:1])
     scores, tested = objectives(objectives.start, outcomes), {sample.genome.tobytes() for sample in history.samples}
-    untested = [genome.tobytes() not in tested for genome in objectives.start]
-    front = np.flatnonzero(np.isfinite(scores).all(axis=1) & untested)
+    untested = np.array([genome.tobytes() not in tested for genome in objectives.start])
+    front = np.flatnonzero(untested & np.isfinite(scores).all(axis=1))
     front = front[fronts(scores[front]) == 0]
     real = [found.reality(genome).readings for genome in objectives.start[front]]
     disparities = [objectives.disparity(seen, felt) for seen, felt in zip(outcomes[front, 0, 1:], real, strict=True)]

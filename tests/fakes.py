@@ -59,7 +59,7 @@ def small_setting(strategy: Any = "simulated_fit", options: Any = None, **change
         reality=CountedReality(),
         strategy=chosen,
         optimizer=SteadyState(SteadyStateOptions(population=5)),
-        controller_optimizer=chosen.controller_optimizer and optimizers[chosen.controller_optimizer](),
+        controller_optimizer=optimizers[own]() if (own := chosen.controller_optimizer) else None,
         genomes=Space.box([0.0, 0.0], [1.0, 1.0], [True, False]),
         parameters=Space.box([0.0, 0.0], [1.0, 1.0]),
         known=np.array([0.5, 0.5]),

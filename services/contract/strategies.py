@@ -88,7 +88,7 @@ class GridSearch:
         if candidates is None and start is not None and len(start):
             grid = np.vstack([start, grid])
         scores = np.asarray(score(grid, (seen if senses else hill)(grid, simulators)))
-        sized = scores.shape[:1] == (len(grid),) and scores.ndim in ((1, 2) if self.several else (1,))
+        sized = scores.shape[:1] == (len(grid),) and scores.ndim <= 1 + self.several
         assert sized, f"its score of {len(grid)} genomes has the shape {scores.shape}"
         self.scores = scores
         first = scores.reshape(len(grid), -1)[:, 0]

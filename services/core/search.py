@@ -11,7 +11,7 @@ import numpy as np
 from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers, Following, nothing
-from gaplab.services.core.arrays import NO_GENOMES, FloatArray, Genome, Genomes, Parameters, nearest
+from gaplab.services.core.arrays import NO_GENOMES, NO_READINGS, FloatArray, Genome, Genomes, Parameters, nearest
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.space import Space
@@ -212,27 +212,19 @@ class ControllerSearch:
         self._spend()
         simulators = self._checked(parameters)
 
-        def scored(genomes: Genomes, following: Following = nothing) -> FloatArray:
-            if senses:
-                return self._scores(score(genomes, self._sensed(genomes, simulators, following)), len(genomes))
-            return self._scores(score(genomes, self.answers(genomes, simulators, following)), len(genomes))
+        def scored(asked: Question) -> FloatArray:
+            answer = self._sensed if senses else self.answers
+            return self._scores(score(asked.genomes, answer(asked.genomes, simulators, asked.following)), asked)
 
         space, evaluations = self.belief.space, self.allowance.evaluations
         if candidates is None and self.belief.candidates is not None:
             candidates = self.belief.draw(evaluations, self.rng)
         if candidates is None:
-            found = maximise(
-                self.optimizer,
-                space,
-                lambda asked: scored(asked.genomes, asked.following),
-                evaluations,
-                self.rng,
-                start,
-            )
+            found = maximise(self.optimizer, space, scored, evaluations, self.rng, start)
             self.members = found.genomes
         else:
-            scores = _finite(scored(candidates[:evaluations]))
-            found = Population(space, candidates[:evaluations], scores).ranked()
+            asked = Question(candidates[:evaluations], NO_READINGS, nothing)
+            found = Population(space, asked.genomes, _finite(scored(asked))).ranked()
         self._found = found
         best: Genome = found.genomes[0]
         return best
@@ -262,14 +254,14 @@ class ControllerSearch:
             raise PluginBroken(f"{source} searches in {len(rows)} simulators; {permitted}")
         return rows
 
-    def _scores(self, scores: FloatArray, count: int) -> FloatArray:
-        """Return the scores of so many genomes, `(n,)`, or `(n, o)` for an optimizer with several objectives.
+    def _scores(self, given: object, asked: Question) -> FloatArray:
+        """Return the scores of a question, `(n,)`, or `(n, o)` for an optimizer with several objectives.
 
         Raises:
             PluginBroken: they are not such an array.
         """
-        scores, several = np.asarray(scores, dtype=np.float64), self.optimizer.objectives
-        if scores.shape[:1] != (count,) or scores.ndim not in ((1, 2) if several else (1,)):
+        scores, count, several = np.asarray(given, dtype=np.float64), len(asked.genomes), self.optimizer.objectives
+        if scores.shape[:1] != (count,) or scores.ndim > 1 + several:
             msg = f"scores {count} genomes with an array of shape {scores.shape}; permitted: (n,)"
             more = ", or (n, o)" if several else f", as the optimizer {self.optimizer.name!r} has one objective"
             raise PluginBroken(f"strategy {self.strategy!r} {msg}{more}")

@@ -95,7 +95,7 @@ def recorded_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Vi
         tuning = {name: each for name, each in strategies.items() if each.tunes}
         able = [name for name, each in tuning.items() if each.in_reality or not each().needs_fitness]
         message = f"{strategy.name} selects by fitness with these options, and recordings have none"
-        message = message if strategy.tunes else f"{strategy.name} tunes nothing, which recordings are for"
+        message = message if strategy.needs_fitness else f"{strategy.name} tunes nothing"
         permitted = f"{', '.join(able)}, {WITH_OPTIONS}"
         yield Violation("/strategy", strategy.name, message, permitted)
     most = selectable(spec)

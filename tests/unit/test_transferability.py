@@ -101,6 +101,7 @@ def begun(setting: Any, samples: Any, kind: Any) -> Any:
         drawn,
         setting.parameters,
         setting.names,
+        members=setting.genomes.draw(18, np.random.default_rng(2)),
         reading_times_s=setting.reading_times_s,
         reading_periods=setting.reading_periods,
     )
@@ -127,7 +128,7 @@ def test_it_costs_its_searches_alone_and_brings_its_own_optimizer() -> None:
 def test_as_published_has_the_authors_constants() -> None:
     resolved = resolve_experiment(quadruped(budget={"preset": "as_published"}))
 
-    assert resolved.strategy.options == {"exponent": 1.0, "normalise": False, "least_distance": 0.01}
+    assert resolved.strategy.options == {"exponent": 1.0, "normalise": False}
     assert resolved.controller_optimizer.options["population"] == 100
 
 

@@ -107,7 +107,7 @@ def fronts(fitness: FloatArray) -> NDArray[np.int64]:
     without the fronts before.
     """
     values = fitness.reshape(len(fitness), -1)
-    least = (values[:, None] >= values).all(axis=2)
+    least = np.asarray((values[:, None] >= values).all(axis=2))
     dominates = least & ~least.T
     ranks, left, front = np.zeros(len(values), dtype=np.int64), np.ones(len(values), dtype=bool), 0
     while left.any():

@@ -13,11 +13,11 @@ from gaplab.services.core.registry import Presets
 from gaplab.services.core.strategies.base import Search, Strategy
 from gaplab.services.core.types import Belief
 
-FIRST = 20
-"""Controllers to draw beside samples from before the experiment."""
+CLOSEST = 0.01
+"""Smaller distances count as this one."""
 
-UNTESTED = 1e6
-"""Novelty before any test, larger than every distance."""
+FARTHEST = 1e6
+"""Novelty before any test."""
 
 
 class TransferabilityOptions(Frozen):
@@ -32,9 +32,6 @@ class TransferabilityOptions(Frozen):
         default=True,
         description="divide the estimate by the sum of what tests count; false: by their number, as in that "
         "transcription, so that it has another unit than the limit of a transfer; gaplab's default",
-    )
-    least_distance: Annotated[float, Field(strict=True, gt=0, le=100)] = Field(
-        default=0.01, description="smaller distances count as this one, in standard deviations; gaplab's default"
     )
 
 
@@ -65,24 +62,23 @@ class Transferability(Strategy):
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:
         """Return a member that is new enough, drawn uniformly; the newest one if none is."""
-        found, scores = self._evolved(belief, search, rng)
-        novelty = scores[:, 2]
-        new = np.flatnonzero(novelty > found.usual)
-        chosen: Genome = search.members[rng.choice(new) if len(new) else int(np.argmax(novelty))]
+        found, scores = self._evolved(belief, search)
+        new = np.flatnonzero(scores[:, 2] > found.usual)
+        chosen: Genome = search.members[rng.choice(new) if len(new) else int(np.argmax(scores[:, 2]))]
         return chosen
 
-    def transfer(self, belief: Belief, search: Search, rng: Generator) -> Genome:
+    def transfer(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the fittest of the front that is estimated to transfer; the one with the best estimate if none is."""
-        found, scores = self._evolved(belief, search, rng)
+        found, scores = self._evolved(belief, search)
         front, estimates = fronts(scores) == 0, -scores[:, 1]
         fair = np.flatnonzero(front & (estimates <= found.fair))
         best = fair[0] if len(fair) else int(np.argmin(np.where(front, estimates, np.inf)))
         chosen: Genome = search.members[best]
         return chosen
 
-    def _evolved(self, belief: Belief, search: Search, rng: Generator) -> tuple["Objectives", FloatArray]:
+    def _evolved(self, belief: Belief, search: Search) -> tuple["Objectives", FloatArray]:
         """Return the objectives of one more search, and the scores `(n, 3)` of its members, the fittest first."""
-        found = Objectives(belief, self.options, rng)
+        found = Objectives(belief, self.options)
         search(found, parameters=belief.parameters[:1], senses=True, start=found.start)
         scores = np.array([found.scores[member.tobytes()] for member in search.members])
         return found, np.where(np.isfinite(scores).all(axis=1, keepdims=True), scores, -np.inf)
@@ -100,15 +96,11 @@ class Objectives:
         fair: median disparity of the tests; inf without any.
     """
 
-    def __init__(self, belief: Belief, options: TransferabilityOptions, rng: Generator) -> None:
+    def __init__(self, belief: Belief, options: TransferabilityOptions) -> None:
         self.scores: dict[bytes, FloatArray] = {}
-        self.usual, self.fair = 0.0, np.inf
-        self._belief, self._options = belief, options
-        self._samples = belief.learnable
-        lacks = self._samples and not len(belief.members)
-        population = belief.draw(FIRST, rng) if lacks else belief.members
-        rows = [*(sample.genome for sample in self._samples), *population]
-        self.start: Genomes = np.array(rows).reshape(-1, belief.space.size)
+        self.usual, self.fair, self._belief, self._options = 0.0, np.inf, belief, options
+        self._samples = belief.learnable if len(belief.members) else ()  # alone, they are not a population
+        self.start: Genomes = np.array([*(each.genome for each in self._samples), *belief.members])
         self._tests: FloatArray | None = None
         self._disparities: list[float] = []
         self._scale: FloatArray | float = 1.0
@@ -119,7 +111,7 @@ class Objectives:
         if self._tests is None:
             self._tests = self._begun(readings)
         distances = self._distances(readings, self._tests)
-        novelty = distances.min(axis=1, initial=UNTESTED)
+        novelty = distances.min(axis=1, initial=FARTHEST)
         scores = np.column_stack([outcomes[:, 0, 0], -self._estimates(distances), novelty])
         self.scores.update(zip((genome.tobytes() for genome in genomes), scores, strict=True))
         return scores
@@ -129,8 +121,7 @@ class Objectives:
         behaviour = self._behaviour(readings)
         behaviour = behaviour[np.isfinite(behaviour).all(axis=1)]
         if len(behaviour) > 1:
-            deviations = behaviour.std(axis=0)
-            self._scale = np.where(deviations > 0, deviations, 1.0)
+            self._scale = np.where(behaviour.std(axis=0) > 0, behaviour.std(axis=0), 1.0)
             apart = np.linalg.norm((behaviour[:, None] - behaviour) / self._scale, axis=2)
             np.fill_diagonal(apart, np.inf)
             self.usual = float(np.median(apart.min(axis=1)))
@@ -146,9 +137,8 @@ class Objectives:
 
     def disparity(self, simulated: FloatArray, real: FloatArray) -> float:
         """Return the root mean square difference of readings `(q,)` that both have; nan if there are none."""
-        if simulated.shape != real.shape:
-            return np.nan
-        away = nearest(simulated, real, self._belief.reading_periods) - real
+        same = simulated.shape == real.shape
+        away = nearest(simulated, real, self._belief.reading_periods) - real if same else simulated[:0]
         there = away[np.isfinite(away)]
         return float(np.sqrt(np.mean(there**2))) if there.size else np.nan
 
@@ -170,6 +160,6 @@ class Objectives:
         """Return the estimated disparity `(n,)`, Σ D d⁻ᵖ / Σ d⁻ᵖ of the distances `(n, k)` to tests; 0 without any."""
         if not self._disparities:
             return np.zeros(len(distances))
-        weights = np.maximum(distances, self._options.least_distance) ** -self._options.exponent
+        weights = np.maximum(distances, CLOSEST) ** -self._options.exponent
         total = weights @ np.array(self._disparities)
         return np.asarray(total / (weights.sum(axis=1) if self._options.normalise else len(self._disparities)))
