@@ -102,13 +102,13 @@ class Arm:
         """Return the samples of these iterations, `(r, k, g)`."""
         rows = self.samples[(self.samples["kind"] == "sample") & self.samples["iteration"].isin(iterations)]
         genes = rows.sort_values(["repetition", "iteration"]).filter(regex="^gene_").to_numpy(dtype=np.float64)
-        return genes.reshape(-1, len(iterations), genes.shape[1])
+        return np.asarray(genes.reshape(-1, len(iterations), genes.shape[1]))
 
     def simulator(self, iteration: int) -> FloatArray:
         """Return the best simulator of each repetition after an iteration, `(r, p)`."""
         rows = self.simulators[(self.simulators["iteration"] == iteration) & (self.simulators["rank"] == 0)]
         names = [each.name for each in self.spec.tunables]
-        return rows.sort_values("repetition")[names].to_numpy(dtype=np.float64)
+        return np.asarray(rows.sort_values("repetition")[names], dtype=np.float64)
 
     @cached_property
     def robot(self) -> Robot:
@@ -227,8 +227,8 @@ def surrogate(surrogate_toy: list[Arm], surrogate: list[Arm]) -> Iterator[Claim]
     yield above("of one gene, surrogate reaches 0.95 of direct within ten evaluations", toy.recorded(10), best)
     kriging, known, fit, unless_near, residual, direct = surrogate
     yield not_above("of 24 genes, surrogate does not beat known fit", kriging.recorded(10), known.recorded(10))
-    spreads = [_spread(arm) for arm in (unless_near, fit)]
-    yield above("fit unless near spreads its samples more than simulated fit", *spreads, unit="extents")
+    says = "fit unless near spreads its samples more than simulated fit"
+    yield above(says, _spread(unless_near), _spread(fit), unit="extents")
     margin = 0.05 * float(np.nanmean(direct.measured(0, "probe")))
     for name, arm in (("fit unless near", unless_near), ("residual", residual)):
         says = f"{name} is less fit than simulated fit by less than 0.05 of direct"

@@ -105,8 +105,9 @@ class GaussianProcess:
             varies = spread > (ROUNDING * np.abs(values).max()) ** 2
             variance = self.variance or (spread if varies else 1.0)
             unlikely = left @ left / variance + size * np.log(variance) + 2 * np.log(np.diag(factor)).sum()
-            rest = (mean, variance, factor, left, ones if self.mean is None else ones[:0])
-            found.append((float(unlikely), Posterior(space, places, self.kernel, length_scale, *rest)))
+            estimated = ones if self.mean is None else ones[:0]
+            model = Posterior(space, places, self.kernel, length_scale, mean, variance, factor, left, estimated)
+            found.append((float(unlikely), model))
         return min(found, key=lambda each: each[0])[1]
 
 

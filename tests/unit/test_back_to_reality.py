@@ -1,6 +1,7 @@
 """What Back-to-Reality promises beside the contract."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,10 +35,11 @@ class Asked:
 
 def test_a_round_is_a_search_and_trials_that_cost_no_rollout_and_teach_no_simulator() -> None:
     steps = list(repetition(replace(small_setting(iterations=6), strategy=btr(trials=2))))
-    selected, tuned = ([step for step in steps if isinstance(step, kind)] for kind in (Selected, Tuned))
+    selected = [step for step in steps if isinstance(step, Selected)]
+    tuned = [step for step in steps if isinstance(step, Tuned)]
 
     assert [step.iteration for step in selected if step.cost.rollouts] == [1, 4]
-    for before, after in zip(tuned, tuned[1:], strict=False):
+    for before, after in pairwise(tuned):
         taught = after.iteration in (1, 4)
         assert (flat(before.simulators) != flat(after.simulators)) == taught
         assert bool(after.cost.rollouts) == taught
@@ -67,16 +69,16 @@ def test_a_trial_mutates_the_fittest_of_its_round_by_a_step_that_success_widens(
 
 
 def test_a_search_begins_with_the_best_measured_controller_and_its_mutants() -> None:
-    search, strategy = Asked(), btr(trials=1, mutants=30)
-    strategy.select(belief(strategy), search, np.random.default_rng(0))
-    assert search.start is None
-
+    first, second, strategy = Asked(), Asked(), btr(trials=1, mutants=30)
     known = belief(strategy, [sample(0.5, 0.5, 2.0), sample(0.1, 0.1, 1.0)])
-    strategy.select(known, search, np.random.default_rng(0))
 
-    np.testing.assert_array_equal(search.start[0], [0.5, 0.5])
-    assert search.start.shape == (31, 2)
-    assert 0.05 < SPACE.apart(search.start[1:], search.start[0]).std() < 0.15
+    strategy.select(belief(strategy), first, np.random.default_rng(0))
+    strategy.select(known, second, np.random.default_rng(0))
+
+    assert first.start is None
+    np.testing.assert_array_equal(second.start[0], [0.5, 0.5])
+    assert second.start.shape == (31, 2)
+    assert 0.05 < SPACE.apart(second.start[1:], second.start[0]).std() < 0.15
 
 
 def test_only_the_first_sample_of_a_round_is_a_lesson_unless_trials_are() -> None:

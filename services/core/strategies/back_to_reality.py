@@ -71,7 +71,8 @@ class BackToReality(Strategy):
         begun = len(belief.samples) % (self.options.trials + 1)
         if begun:
             parent, step = self._learned(belief.samples[-begun:])
-            return _mutated(parent[None, :], step, belief.space, rng)[0]
+            trial: Genome = _mutated(parent[None, :], step, belief.space, rng)[0]
+            return trial
         seed = _fittest(belief)
         start = None if seed is None else self._first(seed, belief.space, rng)
         return search(lambda _, fitnesses: fitnesses[:, 0], parameters=belief.parameters[:1], start=start)

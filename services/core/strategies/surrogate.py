@@ -179,7 +179,8 @@ def _summit(posterior: Posterior, which: int, belief: Belief, rng: Generator) ->
     space, unit = belief.space, posterior.variance**0.5
 
     def height(shares: FloatArray) -> FloatArray:
-        return posterior.predict(space.contain(space.lower + space.extent * np.atleast_2d(shares)))[which] / unit
+        points = space.contain(space.lower + space.extent * np.atleast_2d(shares))
+        return np.asarray(posterior.predict(points)[which] / unit)
 
     def slope(shares: FloatArray) -> FloatArray:
         return (height(shares + STEP * np.eye(space.size)) - height(shares)) / STEP
