@@ -38,6 +38,7 @@ OTHERS: dict[str, tuple[str, Dash, Marker]] = {
     "residual": ("#6F9A37", "long", "circle"),
     "back_to_reality": ("#C0504D", "dashdot", "diamond"),
     "intelligent_trial_and_error": ("#A8479B", "long", "star"),
+    "transferability": ("#2F8F5B", "dashdot", "cross"),
 }
 """Colour, dash and marker of gaplab's other strategies; the colours are legible on white and on dark pages."""
 

@@ -89,9 +89,8 @@ def compare(  # noqa: PLR0913 - each is a parameter of the operation
     compared = equal.applied(compared) if equal else compared
     with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
     pairs = compare_all(compared, first, final, margin=within, intervals=with_intervals)
-    where = (
-        equal.where if equal else sentences.where(first, final, *(row.known for row in rows if row.tunes or row.known))
-    )
+    known = (row.known for row in rows if row.tunes or row.known)
+    where = equal.where if equal else sentences.where(first, final, *known)
     told = {"fitness": fitness, "unit": unit(spec_of(rows[0].spec)), "where": where, "shared_evaluations": shared}
     told_pairs = (pair.model_copy(update=told) for pair in (equal.told(pairs) if equal else pairs))
     return tuple(pair.model_copy(update=_warned(settings, pair)) for pair in told_pairs)
