@@ -133,7 +133,7 @@ class Objectives:
                 self._disparities.append(found)
         if tests:
             self.fair = float(np.median(self._disparities)) * (1.0 + 1e-9)  # for rounding
-        return np.array(tests).reshape(-1, readings.shape[1])
+        return np.array(tests).reshape(len(tests), readings.shape[1])
 
     def disparity(self, simulated: FloatArray, real: FloatArray) -> float:
         """Return the root mean square difference of readings `(q,)` that both have; nan if there are none."""
