@@ -97,7 +97,8 @@ class GaussianProcess:
         apart, size, found = _apart(places, places), len(values), list[tuple[float, Posterior]]()
         for length_scale, noise in product(_candidates(self.length_scale), _candidates(self.noise)):
             correlations = KERNELS[self.kernel](apart / length_scale)
-            factor = np.linalg.cholesky(correlations + (noise + NUGGET) * np.eye(size))
+            noisy = correlations + (noise + NUGGET) * np.eye(size)
+            factor = np.asarray(np.linalg.cholesky(noisy), dtype=np.float64)
             ones, scaled = np.linalg.solve(factor, np.column_stack([np.ones(size), values])).T
             mean = float(ones @ scaled / (ones @ ones)) if self.mean is None else self.mean
             left = scaled - mean * ones
