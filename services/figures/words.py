@@ -17,7 +17,7 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 PROPER = {"cma_es": "CMA-ES", "abc_smc": "ABC-SMC", "gauss_newton": "Gauss-Newton", "cpg": "CPG", "mlp": "MLP"}
-PROPER |= {"mujoco": "MuJoCo", "pybullet": "PyBullet", "physx": "PhysX"}
+PROPER |= {"simopt": "SimOpt", "bayrn": "BayRn", "mujoco": "MuJoCo", "pybullet": "PyBullet", "physx": "PhysX"}
 
 
 def spoken(name: str, longest: int = LONGEST) -> str:

@@ -112,7 +112,7 @@ def test_a_preset_of_a_strategy_sets_what_a_spec_leaves_out_and_is_in_the_name()
     assert refused(strategy=named | {"preset": "bongard"})["/strategy/preset"].permitted == ("bongard_2005",)
 
 
-@pytest.mark.parametrize(("tuner", "least"), [("search", 20), ("gauss_newton", 2), ("abc_smc", 2)])
+@pytest.mark.parametrize(("tuner", "least"), [("search", 20), ("gauss_newton", 2), ("abc_smc", 2), ("simopt", 11)])
 def test_a_tuner_states_its_least_budget(tuner: str, least: int) -> None:
     def few(evaluations: int) -> ExperimentSpec:
         return experiment(tuner=tuner, budget={"preset": "smoke", "simulator_evaluations": evaluations})

@@ -31,6 +31,7 @@ OPTIONS: list[tuple[str, dict[str, Any]]] = [
     ("abc_smc", {"rounds": 1}),
     ("abc_smc", {"rounds": 100}),
     ("abc_smc", {"rounds": 100, "kept": 0.9}),
+    ("simopt", {"draws": 10, "updates": 100}),
 ]
 
 

@@ -61,6 +61,11 @@ class WeightedOptions(DiverseOptions):
     difference: Annotated[float, Field(strict=True, gt=0, lt=0.5)] = Field(
         default=0.1, description="change of the tunables for the slopes, as a share of their bounds; ASID's: 0.1"
     )
+    transfer: Literal["best", "mean"] = Field(
+        default="best",
+        description="the fittest in the best simulator; or the highest mean fitness over the ensemble, weighted by "
+        "accuracy, as SimOpt does with draws: as many rollouts an evaluation as simulators",
+    )
 
 
 class Weighted(Diverse):
@@ -81,6 +86,7 @@ class Weighted(Diverse):
             "information": "trace",
             "difference": 0.1,
         },
+        "chebotar_2019": {"disagreement_weight": 0.0, "normalise": False, "transfer": "mean"},
     }
     Options = WeightedOptions
     options: WeightedOptions
@@ -95,6 +101,17 @@ class Weighted(Diverse):
         compared = self._compared(super().selection_simulators(tunables, learned=learned))
         nearby = compared if self.options.reliability_weight else 0
         return compared + nearby + (tunables if self.options.information_weight else 0)
+
+    def transfer_simulators(self, tunables: int) -> int:  # noqa: ARG002 - the port's signature
+        """Return one, or the ensemble if its mean counts."""
+        return self.ensemble if self.options.transfer == "mean" else 1
+
+    def transfer(self, belief: Belief, search: Search, rng: Generator) -> Genome:
+        """Return the fittest controller found in the best simulator, or that of the highest weighted mean fitness."""
+        if self.options.transfer == "best":
+            return super().transfer(belief, search, rng)
+        weights = weights_of(belief.simulators, self.options.floor(belief))
+        return search(lambda _, fitnesses: weighted_mean(fitnesses, weights))
 
     def _compared(self, simulators: int) -> int:
         """Return how many of these simulators count: all, or the best alone."""
