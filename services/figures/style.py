@@ -39,6 +39,8 @@ OTHERS: dict[str, tuple[str, Dash, Marker]] = {
     "back_to_reality": ("#C0504D", "dashdot", "diamond"),
     "intelligent_trial_and_error": ("#A8479B", "long", "star"),
     "transferability": ("#2F8F5B", "dashdot", "cross"),
+    "interleaved": ("#4C9AA8", "longdot", "triangle"),
+    "bayrn": ("#B0746B", "dotted", "square"),
 }
 """Colour, dash and marker of gaplab's other strategies; the colours are legible on white and on dark pages."""
 
