@@ -246,7 +246,7 @@ def _spread(arm: Arm) -> FloatArray:
 # Intelligent trial and error
 
 CONTACTS: Spec = {"name": "walk", "options": {"sensors": "contacts", "every_s": 0.02}}
-BY_CONTACTS: Spec = {"name": "intelligent_trial_and_error", "options": {"described": 4}}
+BY_CONTACTS: Spec = {"name": "intelligent_trial_and_error", "preset": "cully_2015"}
 BY_TILT = "intelligent_trial_and_error"
 REPERTOIRE: Spec = {"preset": "desk", "controller_evaluations": 2_000, "selection_evaluations": 700}
 """A repertoire is made once, so that it may cost as much as four searches at desk scale."""

@@ -15,8 +15,6 @@ from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
 from gaplab.services.core.registry import Presets
 
-Count = Annotated[int, Field(strict=True, ge=1, le=10_000)]
-
 
 class MapElitesOptions(Frozen):
     """Options of the optimizer `map_elites`."""
@@ -24,8 +22,10 @@ class MapElitesOptions(Frozen):
     bins: Annotated[int, Field(strict=True, ge=2, le=1_000)] = Field(
         default=5, description="cells along each number of a descriptor; the authors': 5"
     )
-    first: Count = Field(default=20, description="genomes drawn uniformly at first; gaplab's default; published: 200")
-    batch: Count = Field(default=20, description="newcomers evaluated at once; gaplab's default; published: 400")
+    population: Annotated[int, Field(strict=True, ge=1, le=10_000)] = Field(
+        default=20,
+        description="genomes drawn uniformly at first, and newcomers at once; gaplab's: 20; published: 200, and 400",
+    )
 
 
 class MapElites(Optimizer):
@@ -41,7 +41,7 @@ class MapElites(Optimizer):
 
     name = "map_elites"
     source = "Mouret and Clune 2015; Cully et al. 2015, https://github.com/resibots/map_elites_hexapod"
-    presets: ClassVar[Presets] = {"as_published": {"first": 200, "batch": 400}}
+    presets: ClassVar[Presets] = {"as_published": {"population": 200}}
     objectives = True
     Options = MapElitesOptions
     options: MapElitesOptions
@@ -49,13 +49,13 @@ class MapElites(Optimizer):
     @property
     def least_evaluations(self) -> int:
         """Return the number of first genomes."""
-        return self.options.first
+        return self.options.population
 
     def ask(self, state: Population, rng: Generator) -> Genomes:
         """Return the first genomes, drawn uniformly; later, mutants of elites."""
         if not state.size:
-            return state.space.draw(self.options.first, rng)
-        variation = SteadyStateOptions(population=2, tournament=1, crossover=0.0, offspring=self.options.batch)
+            return state.space.draw(self.options.population, rng)
+        variation = SteadyStateOptions(population=2, tournament=1, crossover=0.0, offspring=self.options.population)
         return SteadyState(variation).ask(Population(state.space, state.genomes, state.first), rng)
 
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:

@@ -1,6 +1,6 @@
 """Try what a repertoire promises, and learn on the way how far each kind of behaviour keeps its promise."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -9,6 +9,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Outcomes
 from gaplab.services.core.gaussian_process import GaussianProcess
+from gaplab.services.core.registry import Presets
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Score, Search, Strategy
 from gaplab.services.core.types import Belief
@@ -57,6 +58,9 @@ class IntelligentTrialAndError(Strategy):
 
     name = "intelligent_trial_and_error"
     source = "Cully et al. 2015; constants: their release of 2015, https://github.com/resibots/ITE"
+    presets: ClassVar[Presets] = {
+        "cully_2015": {"length_scale": 0.4, "noise": 0.001, "alpha": 0.05, "stop_ratio": 0.9, "described": 4},
+    }
     tunes = False
     continues = True
     controller_optimizer = "map_elites"
