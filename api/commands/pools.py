@@ -40,7 +40,7 @@ def import_(  # noqa: PLR0913, PLR0917 - each is an option of the command
     seconds: Annotated[float | None, typer.Option(help="longest part of a recording, from its beginning")] = None,
     every: Annotated[float | None, typer.Option(help="seconds between readings; left out: those of the lines")] = None,
     sensors: Annotated[
-        str, typer.Option(help="what is read: base (or its place, direction), angle, speed, torque")
+        str, typer.Option(help="read: base, or of it place, direction; angle, speed, torque")
     ] = "base,angle",
     noises: Annotated[
         list[str] | None,

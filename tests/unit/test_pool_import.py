@@ -119,7 +119,7 @@ def test_what_is_wrong_is_told_with_its_line(case: str, read: Callable[..., Pool
     [
         ({"every_s": -1.0}, "/every_s: must be a number above 0, not -1"),
         ({"seconds": float("nan")}, "/seconds: must be a number above 0, not nan"),
-        ({"sensors": ("base", "angles")}, "unknown 'angles'; permitted: base, angle, speed, torque"),
+        ({"sensors": ("base", "angles")}, "unknown 'angles'; permitted: base, place, direction, angle, speed, torque"),
     ],
 )
 def test_options_that_cannot_be_are_refused(options: Any, words: str, read: Callable[..., Pool]) -> None:
@@ -178,3 +178,5 @@ def test_a_thrown_body_begins_moving_and_its_directions_are_read(tmp_path: Path)
     assert toss.start.turning_rad_s == (0.0, 0.0, 2.0)
     assert toss.readings[0] == pytest.approx((0.1, 0, 0.3, 0, 1, 0, -1, 0, 0), abs=1e-6)  # a quarter turn about z
     assert [each.noise for each in pool.sensors[:4]] == [0.001, 0.001, 0.001, 0.02]
+    places = import_pool(table, str(cube), "tosses", PoolOptions(recording="toss", every_s=0.1, sensors=["place"]))
+    assert [each.name for each in places.sensors] == ["x", "y", "z"]
