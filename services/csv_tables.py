@@ -7,7 +7,7 @@ import csv
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from math import isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 SEPARATORS = ",;\t"
 
@@ -38,21 +38,26 @@ def _cell(text: str) -> str:
     return f"'{lines}" if _FORMULA.match(text) else lines
 
 
-class CsvRow(NamedTuple):
+class Row(NamedTuple):
     """A row of a table.
 
     Attributes:
         line: its last line in the file, from 1.
-        cells: without spaces around them, and without the apostrophe before what looks like a formula.
+        cells: texts without spaces around them, and without the apostrophe before what looks like a formula; numbers
+            or None where the file has values.
         error: why the file cannot be read beyond the lines before; "" if it can.
     """
 
     line: int
-    cells: list[str]
+    cells: Sequence[Any]
     error: str = ""
 
+    def cell(self, place: int) -> Any:  # noqa: ANN401 - as of the file
+        """Return the cell at a place; "" beyond the end of the row."""
+        return self.cells[place] if place < len(self.cells) else ""
 
-class CsvTable(NamedTuple):
+
+class Table(NamedTuple):
     """A table as it is read; blank rows are left out.
 
     Attributes:
@@ -61,28 +66,37 @@ class CsvTable(NamedTuple):
         lines: number of lines of the file.
     """
 
-    header: CsvRow
-    rows: Iterator[CsvRow]
+    header: Row
+    rows: Iterable[Row]
     lines: int
 
+    @classmethod
+    def of(cls, headings: Sequence[str], rows: Sequence[Sequence[object]]) -> "Table":
+        """Return the table of values that a file has without lines; they are counted as in CSV."""
+        return cls(Row(1, headings), [Row(line, row) for line, row in enumerate(rows, start=2)], len(rows) + 1)
 
-def read_csv(text: str) -> CsvTable:
+    def csv(self) -> str:
+        """Return the table as CSV."""
+        return csv_text(self.header.cells, (row.cells for row in self.rows))
+
+
+def read_csv(text: str) -> Table:
     """Return the table in a file; its separator is the one that its first line has most of."""
     lines = text.removeprefix("\ufeff").splitlines()
     rows = _rows(lines)
-    return CsvTable(next(rows, CsvRow(1, [])), rows, len(lines))
+    return Table(next(rows, Row(1, [])), rows, len(lines))
 
 
-def finite(cell: str) -> float | None:
+def finite(cell: str | float | None) -> float | None:
     """Return the finite number of a cell; None if it has none. Decimals have a point, and digits have no groups."""
     try:
-        number = float(cell)
+        number = float("" if cell is None else cell)
     except ValueError:
         return None
-    return number if isfinite(number) and "_" not in cell else None
+    return number if isfinite(number) and not (isinstance(cell, str) and "_" in cell) else None
 
 
-def _rows(lines: Sequence[str]) -> Iterator[CsvRow]:
+def _rows(lines: Sequence[str]) -> Iterator[Row]:
     first = next(filter(str.strip, lines), "")
     rows = csv.reader(lines, delimiter=max(SEPARATORS, key=first.count), skipinitialspace=True)
     try:
@@ -91,6 +105,6 @@ def _rows(lines: Sequence[str]) -> Iterator[CsvRow]:
                 cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell for cell in map(str.strip, row)
             ]
             if any(cells):
-                yield CsvRow(rows.line_num, cells)
+                yield Row(rows.line_num, cells)
     except csv.Error as error:
-        yield CsvRow(rows.line_num, [], f"the line is not CSV: {error}")
+        yield Row(rows.line_num, [], f"the line is not CSV: {error}")

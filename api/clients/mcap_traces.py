@@ -8,7 +8,7 @@ from typing import Any
 
 from gaplab.api.clients.errors import library
 from gaplab.schemas.traces import TRACE_COLUMNS
-from gaplab.services.csv_tables import csv_text
+from gaplab.services.csv_tables import Table
 
 POSES = {
     "geometry_msgs/msg/PoseStamped",
@@ -27,8 +27,8 @@ _PLACES, _TURNS = ("position", "translation"), ("orientation", "rotation")
 _STAMPS, _NANOSECONDS = ("timestamp", "stamp"), ("nsec", "nanosec")
 
 
-def mcap_to_csv(file: Path, topic: str | None = None, body: str | None = None) -> str:
-    """Return the trace of an MCAP file as CSV; see `Bench.attach_trace`."""
+def mcap_table(file: Path, topic: str | None = None, body: str | None = None) -> Table:
+    """Return the trace of an MCAP file as a table; see `Bench.attach_trace`."""
     mcap, ros = library("mcap.reader", "mcap"), library("mcap_ros2.decoder", "mcap")
     errors = library("mcap.exceptions", "mcap")
     try:
@@ -43,7 +43,7 @@ def mcap_to_csv(file: Path, topic: str | None = None, body: str | None = None) -
             for _, _, message, decoded in messages:
                 name = getattr(decoded, "child_frame_id", "")
                 poses.setdefault(name, []).append(_pose(decoded, message.log_time))
-            return csv_text(TRACE_COLUMNS, _of_body(poses, body, f"{file.name} has {{}} on {chosen!r}"))
+            return Table.of(TRACE_COLUMNS, _of_body(poses, body, f"{file.name} has {{}} on {chosen!r}"))
     except errors.McapError as error:
         raise ValueError(f"{file.name} is not an MCAP file that can be read: {error}") from error
 
@@ -78,7 +78,7 @@ def _chosen(summary: Any, topic: str | None, file: Path) -> tuple[str, str]:  # 
     )
 
 
-def _joints(messages: Iterator[tuple[float, Any]]) -> str:
+def _joints(messages: Iterator[tuple[float, Any]]) -> Table:
     """Return the trace of states of joints, whose order may change from one message to the next."""
     rows = []
     for time_s, message in messages:
@@ -86,7 +86,7 @@ def _joints(messages: Iterator[tuple[float, Any]]) -> str:
         said = ((f"{what} {name}", value) for what, values in told for name, value in zip(message.name, values))  # noqa: B905 - lists may be empty
         rows.append({"time_s": time_s, **dict(said)})
     headings = list(dict.fromkeys(name for row in rows for name in row)) or ["time_s"]
-    return csv_text(headings, ([row.get(name) for name in headings] for row in rows))
+    return Table.of(headings, [[row.get(name) for name in headings] for row in rows])
 
 
 def _of_body(poses: Mapping[str, list[list[float]]], body: str | None, problem: str) -> list[list[float]]:

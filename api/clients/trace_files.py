@@ -1,17 +1,19 @@
-"""Recordings as traces in CSV: mapped to the joints of a robot, and read from LeRobot data sets and MCAP.
+"""Recordings as tables: read from CSV, Parquet, LeRobot data sets and MCAP, and mapped to the joints of a robot.
 
 They are read here, so that the service parses CSV alone.
 """
 
 import json
 from collections.abc import Mapping, Sequence
+from itertools import chain, groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
 from gaplab.api.clients.errors import library
-from gaplab.api.clients.mcap_traces import mcap_to_csv
+from gaplab.api.clients.mcap_traces import mcap_table
 from gaplab.schemas.traces import TRACE_COLUMNS, heading_parts, how_parts, said_of
-from gaplab.services.csv_tables import csv_text, read_csv
+from gaplab.services.csv_tables import Table, read_csv
 
 COLUMNS = {
     "observation.state": "angle",
@@ -35,49 +37,59 @@ class Chosen(TypedDict, total=False):
 
 def trace_csv(file: str | Path, columns: Mapping[str, str] | None = None, **chosen: Unpack[Chosen]) -> bytes:
     """Return a recording as CSV; see `Bench.attach_trace`."""
-    path, suffix = Path(file), Path(file).suffix.lower()
-    if suffix == ".mcap":
-        text = mcap_to_csv(path, chosen.get("topic"), chosen.get("body"))
-    elif path.is_dir() or suffix == ".parquet":
-        text = lerobot_to_csv(path, chosen.get("episode"))
-    elif not columns:
+    path = Path(file)
+    if path.is_file() and path.suffix.lower() not in {".mcap", ".parquet"} and not columns:
         return path.read_bytes()
-    else:
-        text = path.read_text("utf-8", "replace")
-    return (mapped(text, columns) if columns else text).encode()
+    table = recording(path, **chosen)
+    return (mapped(table, columns) if columns else table).csv().encode()
 
 
-def mapped(text: str, columns: Mapping[str, str]) -> str:
-    """Return a table in CSV whose headings name the joints of a robot.
+def recording(path: Path, **chosen: Unpack[Chosen]) -> Table:
+    """Return the table of a recording, in whatever format it is; see `Bench.attach_trace`."""
+    suffix, episode = path.suffix.lower(), chosen.get("episode")
+    if suffix == ".mcap":
+        return mcap_table(path, chosen.get("topic"), chosen.get("body"))
+    if suffix == ".parquet" and _root(path) is None:
+        return _plain(library("pyarrow.parquet", "lerobot").read_table(path))
+    if suffix != ".parquet" and not path.is_dir():
+        return read_csv(path.read_text("utf-8", "replace"))
+    found = lerobot_tables(path, episode)
+    if len(found) > 1:
+        raise ValueError(f"{path.name} has {len(found)} episodes; permitted: {min(found)} to {max(found)}")
+    return found.popitem()[1]
+
+
+def mapped(table: Table, columns: Mapping[str, str]) -> Table:
+    """Return a table whose headings name the joints of a robot.
 
     Args:
-        text: the table.
+        table: the table.
         columns: by joint, its name in the table, and in brackets how its columns count; by `*`, how all others count:
             `{"elbow": "Elbow [-deg @ 90]", "command elbow": "goal", "*": "[deg]"}`.
 
     Raises:
         ValueError: the table has no such column.
     """
-    table, met = read_csv(text), set[str]()
+    met, there = set[str](), table.header.cells
     said = {joint: heading_parts(column) for joint, column in columns.items()}
     _, usual = said.pop(ALL, ("", ""))
     named = {name: (joint, how) for joint, (name, how) in said.items()}
     headings = list[str]()
-    for heading in table.header.cells:
+    for heading in there:
         name, how = heading_parts(heading)
         quantity, rest = said_of(name)
         key = name if name in named else rest
         met.add(key)
-        if name not in TRACE_COLUMNS and (key in named or usual):
+        if name and name not in TRACE_COLUMNS and (key in named or usual):
             joint, wanted = named.get(key, (rest, ""))
             what, joint = said_of(joint)
             counted = _counted(wanted or how or usual, what or quantity)
             heading = f"{what or quantity or 'angle'} {joint}{f' [{counted}]' if counted else ''}"
         headings.append(heading)
     for name in named.keys() - met:
-        found = ", ".join(table.header.cells)[:500]
+        found = ", ".join(filter(None, there))[:500]
         raise ValueError(f"the recording has no column of {name!r} for {named[name][0]}; it has {found}")
-    return csv_text(headings, (row.cells for row in table.rows))
+    return table._replace(header=table.header._replace(cells=headings))
 
 
 def _counted(how: str, quantity: str) -> str:
@@ -88,26 +100,34 @@ def _counted(how: str, quantity: str) -> str:
     return f"{sign}{unit}{'/s' if unit and not unit.endswith('/s') else ''}" if quantity == "speed" else how
 
 
-def lerobot_to_csv(path: Path, episode: int | None = None) -> str:
-    """Return an episode of a LeRobot data set as CSV, of version 2.1 or 3.
+def _plain(table: Any) -> Table:  # noqa: ANN401 - of pyarrow
+    return Table.of(table.column_names, [*zip(*(each.to_pylist() for each in table.columns), strict=True)])
+
+
+def _root(path: Path) -> Path | None:
+    """Return the folder of the LeRobot data set that something is in."""
+    return next((each for each in (path, *path.parents) if (each / "meta" / "info.json").is_file()), None)
+
+
+def lerobot_tables(path: Path, episode: int | None = None) -> dict[int, Table]:
+    """Return the episodes of a LeRobot data set by their numbers, of version 2.1 or 3.
 
     Args:
         path: its folder, which has `meta/info.json`, or one of the Parquet files in it.
-        episode: number of the episode; None: the only one.
+        episode: number of the only one that is read; None: all.
 
     Raises:
         ExtraMissing: pyarrow is not installed.
         ValueError: it is not such a data set, or does not have this episode.
     """
-    root = next((each for each in (path, *path.parents) if (each / "meta" / "info.json").is_file()), None)
-    if root is None:
+    if (root := _root(path)) is None:
         raise ValueError(f"{path.name} is not of a LeRobot data set: there is no meta/info.json at or above it")
     info = json.loads((root / "meta" / "info.json").read_text("utf-8"))
-    rows = _rows([path] if path.is_file() else sorted((root / "data").rglob("*.parquet")), episode)
-    if (count := len({row["episode_index"] for row in rows})) != 1:
-        found = f"{count} episodes" if episode is None else f"no episode {episode}"
+    rows = _frames([path] if path.is_file() else sorted((root / "data").rglob("*.parquet")), episode)
+    if not rows:
+        found = "0 episodes" if episode is None else f"no episode {episode}"
         raise ValueError(f"{path.name} has {found}; permitted: 0 to {info['total_episodes'] - 1}")
-    rows.sort(key=lambda row: row["frame_index"])
+    rows.sort(key=itemgetter("episode_index", "frame_index"))
     try:
         names = {column: _names(info["features"][column]) for column in COLUMNS if column in rows[0]}
         times_s = [row["timestamp"] if "timestamp" in row else row["frame_index"] / info["fps"] for row in rows]
@@ -116,12 +136,14 @@ def lerobot_to_csv(path: Path, episode: int | None = None) -> str:
     for column, joints in names.items():
         if len(rows[0][column]) != len(joints):
             raise ValueError(f"{column} has {len(rows[0][column])} numbers, and its names are {', '.join(joints)}")
-    headings = [f"{COLUMNS[column]} {joint}" for column, joints in names.items() for joint in joints]
-    values = ([number for column in names for number in row[column]] for row in rows)
-    return csv_text(["time_s", *headings], ([time_s, *row] for time_s, row in zip(times_s, values, strict=True)))
+    headings = ["time_s", *(f"{COLUMNS[column]} {joint}" for column, joints in names.items() for joint in joints)]
+    return {
+        number: Table.of(headings, [[time_s, *chain(*(row[column] for column in names))] for time_s, row in some])
+        for number, some in groupby(zip(times_s, rows, strict=True), key=lambda each: each[1]["episode_index"])
+    }
 
 
-def _rows(files: Sequence[Path], episode: int | None) -> list[dict[str, Any]]:
+def _frames(files: Sequence[Path], episode: int | None) -> list[dict[str, Any]]:
     """Return the frames of an episode, or of all."""
     parquet, arrow = library("pyarrow.parquet", "lerobot"), library("pyarrow", "lerobot")
     rows = list[dict[str, Any]]()

@@ -1,6 +1,5 @@
 """Import of pools: tables and files that a robot's sensors filled are checked line by line, and become recordings."""
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,13 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gaplab.api.clients.errors import library
-from gaplab.api.clients.trace_files import lerobot_to_csv, mapped, trace_csv
+from gaplab.api.clients.trace_files import lerobot_tables, mapped, recording
 from gaplab.api.library.robots import AnyRobot, read_robot
 from gaplab.schemas.traces import TRACE_COLUMNS
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.csv_tables import CsvRow, csv_text, finite, read_csv
+from gaplab.services.csv_tables import Row, Table, finite
 from gaplab.services.world.logs import Trace, read_trace
 from gaplab.services.world.motions import Start
 from gaplab.services.world.pools import DIRECTIONS, JOINTS, PLACES, Channel, Pool, Recorded, said
@@ -64,20 +62,12 @@ class PoolOptions:
     skip: bool = False
 
 
-class _Part(NamedTuple):
-    """The lines of one recording: its name, its table, and how many lines of the file are before them."""
-
-    name: str
-    text: str
-    before: int
-
-
 class _Read(NamedTuple):
     """A recording that was read, and its first row by heading."""
 
     name: str
     trace: Trace
-    first: Mapping[str, str]
+    first: Mapping[str, Any]
 
 
 def import_pool(source: str | Path, robot: AnyRobot, name: str, options: PoolOptions | None = None) -> Pool:
@@ -93,23 +83,21 @@ def import_pool(source: str | Path, robot: AnyRobot, name: str, options: PoolOpt
     chosen, world, path = options or PoolOptions(), read_robot(robot).world, Path(source)
     if unfit := list(_unfit(chosen)):
         raise InvalidSpec(unfit)
-    found, errors, lost = list[_Read](), list[Violation](), list[str]()
-    names = set[str]()
-    for part in _parts(path, chosen):
+    found, errors, names = list[_Read](), list[Violation](), set[str]()
+    for part, table in _recordings(path, chosen.recording):
         try:
-            read = _read(part, chosen, world)
+            read = _read(part, table, chosen, world)
             told = [] if chosen.confirmed else list(unlikely_joints(read.trace, world))
-            told += [f"two motions are named {part.name}"] * (part.name in names)
+            told += [f"two motions are named {part}"] * (part in names)
             told += _unlike(read.trace, found[0] if found else read, chosen)
-            wrong = [Violation(f"/{part.name}", None, each) for each in told]
-            found += [] if wrong else [read]
+            found += [] if told else [read]
+            errors += (Violation(f"/{part}", None, each) for each in told)
         except InvalidSpec as error:
-            wrong = list(error.violations)
-        names.add(part.name)
-        errors += [_moved(each, part.before) for each in wrong]
+            errors += error.violations
+        names.add(part)
     if errors and not (chosen.skip and found):
         raise InvalidSpec([*{each.message: each for each in reversed(errors)}.values()][::-1])
-    lost += sorted({f"{each.pointer[1:]} is left out: {each.message}"[:900] for each in errors})
+    lost = sorted({f"{each.pointer[1:]} is left out: {each.message}"[:900] for each in errors})
     return _pool(found, world, chosen, name, path.name, lost)
 
 
@@ -130,66 +118,46 @@ def _unlike(trace: Trace, first: _Read, options: PoolOptions) -> Iterator[str]:
         yield f"it lasts {lasts:g} s, and the interval of readings, {options.every_s:g} s, is longer"
 
 
-def _parts(path: Path, options: PoolOptions) -> Iterator[_Part]:
-    if path.is_dir() and (path / "meta" / "info.json").is_file():
-        for episode in range(json.loads((path / "meta" / "info.json").read_text("utf-8"))["total_episodes"]):
-            yield _Part(f"episode {episode}", lerobot_to_csv(path, episode), 0)
+def _recordings(path: Path, column: str) -> Iterator[tuple[str, Table]]:
+    """Yield each recording by its name: an episode, a file of a folder, or the lines of a table with this name."""
+    if (path / "meta" / "info.json").is_file():
+        yield from ((f"episode {number}", table) for number, table in lerobot_tables(path).items())
     elif path.is_dir():
-        for file in sorted(each for each in path.iterdir() if each.suffix.lower() in {".csv", ".mcap"}):
-            yield _Part(file.stem, trace_csv(file).decode(), 0)
+        files = sorted(each for each in path.iterdir() if each.suffix.lower() in {".csv", ".mcap"})
+        yield from ((file.stem, recording(file)) for file in files)
     else:
-        yield from _of_table(path, options.recording)
+        header, rows, _ = recording(path)
+        if column not in header.cells:
+            columns = ", ".join(header.cells)[:500]
+            raise InvalidSpec([Violation("/", column, f"line 1: no column {column!r} names the recordings", columns)])
+        place = header.cells.index(column)
+        others = header._replace(cells=["" if each == column else each for each in header.cells])
+        for name, lines in groupby(rows, key=lambda row: str(row.cell(place))):
+            some = [*lines]
+            yield name, Table(others, some, len(some) + 1)
 
 
-def _of_table(path: Path, column: str) -> Iterator[_Part]:
-    header, rows, _ = read_csv(_parquet_csv(path) if path.suffix.lower() == ".parquet" else path.read_text("utf-8"))
-    if column not in header.cells:
-        columns = ", ".join(header.cells)[:500]
-        raise InvalidSpec([Violation("/", column, f"line 1: no column {column!r} names the recordings", columns)])
-    place = header.cells.index(column)
-
-    def named(row: CsvRow) -> str:
-        return row.cells[place] if place < len(row.cells) else ""
-
-    for name, lines in groupby(rows, key=named):
-        some = list(lines)
-        cells = ([*row.cells[:place], *row.cells[place + 1 :]] for row in some)
-        yield _Part(name, csv_text([*header.cells[:place], *header.cells[place + 1 :]], cells), some[0].line - 2)
-
-
-def _parquet_csv(path: Path) -> str:
-    table = library("pyarrow.parquet", "lerobot").read_table(path)
-    return csv_text(table.column_names, zip(*(each.to_pylist() for each in table.columns), strict=True))
-
-
-def _read(part: _Part, options: PoolOptions, world: World) -> _Read:
+def _read(name: str, table: Table, options: PoolOptions, world: World) -> _Read:
     """Return a recording; its base is read only if it moves."""
-    header, rows, _ = read_csv(part.text)
-    bare = [match[1] if (match := _BASE.fullmatch(each)) else each for each in header.cells]
-    kept = [place for place, each in enumerate(bare) if not world.fixed or each not in TRACE_COLUMNS[1:]]
-    cells = [[row.cells[place] if place < len(row.cells) else "" for place in kept] for row in rows]
+    bare = [match[1] if (match := _BASE.fullmatch(each)) else each for each in table.header.cells]
+    unread = {*_VELOCITIES, *_TURNING, *(TRACE_COLUMNS[1:] if world.fixed else ())}
+    header = table.header._replace(cells=["" if each in unread else each for each in bare])
+    rows = [*table.rows]
     if options.seconds is not None and "time_s" in bare:
-        cells = list(_until(cells, kept.index(bare.index("time_s")), options.seconds))
-    text = csv_text([bare[place] for place in kept], cells)
-    columns = {joint: each for joint, each in options.columns.items() if joint}
-    first = dict(zip((bare[place] for place in kept), cells[0] if cells else (), strict=False))
-    return _Read(part.name, read_trace(mapped(text, columns) if columns else text, f"/{part.name}", world), first)
+        rows = [*_until(rows, bare.index("time_s"), options.seconds)]
+    first = dict(zip(bare, rows[0].cells if rows else (), strict=False))
+    found = mapped(Table(header, rows, len(rows) + 1), options.columns)
+    return _Read(name, read_trace(found, f"/{name}", world), first)
 
 
-def _until(cells: Sequence[list[str]], column: int, seconds: float) -> Iterator[list[str]]:
+def _until(rows: Sequence[Row], place: int, seconds: float) -> Iterator[Row]:
     """Yield the rows up to the first one after so many seconds, which readings are interpolated to."""
-    begun = finite(cells[0][column]) if cells else None
-    for row in cells:
+    begun = finite(rows[0].cell(place)) if rows else None
+    for row in rows:
         yield row
-        at = finite(row[column])
+        at = finite(row.cell(place))
         if begun is not None and at is not None and at - begun > seconds:
             return
-
-
-def _moved(violation: Violation, lines: int) -> Violation:
-    """Return a violation whose lines are those of the whole file, of which the first is the header."""
-    shifted = re.sub(r"\bline (?!1\b)(\d+)", lambda found: f"line {int(found[1]) + lines}", violation.message)
-    return Violation(violation.pointer, violation.value, shifted, violation.permitted)
 
 
 def _pool(found: Sequence[_Read], world: World, options: PoolOptions, name: str, source: str, lost: list[str]) -> Pool:
@@ -279,6 +247,6 @@ def _row(values: FloatArray | None, places: Any = slice(None)) -> Any:  # noqa: 
     return None if values is None else tuple(_rounded(np.nan_to_num(values[0, places])))
 
 
-def _first(row: Mapping[str, str], names: Sequence[str]) -> Any:  # noqa: ANN401 - a tuple of three numbers, or None
-    found = [finite(row.get(name, "")) for name in names]
+def _first(row: Mapping[str, Any], names: Sequence[str]) -> Any:  # noqa: ANN401 - a tuple of three numbers, or None
+    found = [finite(row.get(name)) for name in names]
     return None if None in found else tuple(found)

@@ -15,7 +15,7 @@ from math import isclose
 
 from gaplab.schemas.measurements import MOST_VALUES, KnownSample
 from gaplab.schemas.samples import CellError, SamplesRead
-from gaplab.services.csv_tables import CsvRow, finite, read_csv
+from gaplab.services.csv_tables import Row, finite, read_csv
 from gaplab.services.specs.measured import sample_violations
 from gaplab.services.world.robots.base import Robot
 
@@ -86,7 +86,7 @@ def checked(line: int, sample: KnownSample, robot: Robot) -> list[KnownSample | 
     return errors or [sample]
 
 
-def _found(header: CsvRow, rows: Iterable[CsvRow], robot: Robot) -> Iterator[KnownSample | CellError]:
+def _found(header: Row, rows: Iterable[Row], robot: Robot) -> Iterator[KnownSample | CellError]:
     """Yield what is wrong with the header, and the sample of each line or what is wrong with it."""
     if header.error:
         yield CellError(line=header.line, message=header.error)
@@ -108,7 +108,7 @@ def _found(header: CsvRow, rows: Iterable[CsvRow], robot: Robot) -> Iterator[Kno
 
 
 def _of_header(
-    header: CsvRow, columns: Sequence[SampleColumn | None], units: Sequence[str | None], robot: Robot
+    header: Row, columns: Sequence[SampleColumn | None], units: Sequence[str | None], robot: Robot
 ) -> Iterator[CellError]:
     """Yield the columns that are unknown, in another unit, twice there, or absent."""
     line, unknown = header.line, 0
@@ -155,7 +155,7 @@ def _absent(columns: Sequence[SampleColumn], robot: Robot) -> Iterator[str]:
     yield from (f"value_{place + 1}" if len(wanted) > 1 else "value" for place in absent)
 
 
-def _numbers(row: CsvRow, columns: Sequence[SampleColumn | None]) -> tuple[Numbers, list[CellError]]:
+def _numbers(row: Row, columns: Sequence[SampleColumn | None]) -> tuple[Numbers, list[CellError]]:
     """Return the numbers of a line, and what is wrong with its cells."""
     line, count = row.line, len(columns)
     if row.error:

@@ -1,4 +1,4 @@
-"""Traces: what sensors of a physical robot said during a motion, read from CSV.
+"""Traces: what sensors of a physical robot said during a motion, read from a table.
 
 A line is a moment, a column the pose of the base or one quantity of one joint: `elbow` or `angle elbow`, `speed elbow`,
 `torque elbow`, `command elbow`. In brackets, a heading may say how the column relates to the joint:
@@ -19,7 +19,7 @@ import scipy
 from gaplab.schemas.traces import QUANTITIES, TRACE_COLUMNS, heading_parts, how_parts, said_of
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.csv_tables import CsvRow, finite, read_csv
+from gaplab.services.csv_tables import Row, Table, finite
 from gaplab.services.world.motions import Trajectory
 from gaplab.services.world.world import Joint, World
 
@@ -104,15 +104,15 @@ class _Column(NamedTuple):
     wrong: str = ""
 
 
-def read_trace(text: str, pointer: str, world: World) -> Trace:
-    """Return the trace of a robot from a CSV file; further columns do not matter.
+def read_trace(table: Table, pointer: str, world: World) -> Trace:
+    """Return the trace of a robot from a table; further columns do not matter.
 
     It has the pose of the base, all joints that have a motor, or both.
 
     Raises:
         InvalidSpec: with every error, each with its line and column, at the pointer.
     """
-    header, rows, lines = read_csv(text)
+    header, rows, lines = table
     columns = list(_columns(header.cells or [""], world))
     if lines > MOST_LINES or lines * len(columns) > MOST_NUMBERS:
         message, most = f"the trace has {lines:,} lines", min(MOST_LINES, MOST_NUMBERS // max(1, len(columns)))
@@ -125,8 +125,8 @@ def read_trace(text: str, pointer: str, world: World) -> Trace:
     errors = [*(f"line {header.line}, {each.name}: {each.wrong}" for each in columns if each.wrong), *errors]
     if not errors:
         zeros, shares, bases = np.array([(each.zero, each.share, each.base) for each in columns]).T
-        table = (np.array(numbers).reshape(-1, len(columns)) - zeros) / shares + bases
-        by_name = {each.what: table[:, place] for place, each in enumerate(columns)}
+        values = (np.array(numbers).reshape(-1, len(columns)) - zeros) / shares + bases
+        by_name = {each.what: values[:, place] for place, each in enumerate(columns)}
         errors = list(islice(_nonsense(by_name, places, world), MOST_ERRORS))
     if errors:
         raise InvalidSpec([Violation(pointer, None, message) for message in errors[:MOST_ERRORS]])
@@ -208,21 +208,21 @@ def _lacking(columns: Sequence[_Column], world: World) -> tuple[str, str] | None
     return f"the trace needs one column each of {', '.join(missing)}", "; or ".join(ways)
 
 
-def _table(rows: Iterable[CsvRow], columns: Sequence[_Column]) -> tuple[list[list[float]], list[int], list[str]]:
+def _table(rows: Iterable[Row], columns: Sequence[_Column]) -> tuple[list[list[float]], list[int], list[str]]:
     """Return the numbers of all rows, their lines, and what is wrong; nothing is read after `MOST_ERRORS`."""
     numbers, lines, errors = list[list[float]](), list[int](), list[str]()
-    for line, cells, error in rows:
-        found = [finite(cells[each.place]) if each.place < len(cells) else None for each in columns]
+    for row in rows:
+        found = [finite(row.cell(each.place)) for each in columns]
         known = [number for number in found if number is not None]
-        if error:
-            errors.append(f"line {line}: {error}")
+        if row.error:
+            errors.append(f"line {row.line}: {row.error}")
         elif len(known) == len(found):
             numbers.append(known)
-            lines.append(line)
+            lines.append(row.line)
         else:
-            wrong = (each for each, number in zip(columns, found, strict=True) if number is None)
-            shown = ((each.name, "".join(cells[each.place : each.place + 1])[:50]) for each in wrong)
-            errors += [f"line {line}, {name}: {cell!r} is not a finite number" for name, cell in shown]
+            wrong = ((each.name, row.cell(each.place)) for each in columns if finite(row.cell(each.place)) is None)
+            shown = ((name, "" if cell is None else str(cell)[:50]) for name, cell in wrong)
+            errors += [f"line {row.line}, {name}: {cell!r} is not a finite number" for name, cell in shown]
         if len(errors) >= MOST_ERRORS:
             break
     return numbers, lines, errors

@@ -11,7 +11,7 @@ from mcap.writer import Writer
 from mcap_ros2.writer import Writer as RosWriter
 
 from gaplab import ExtraMissing
-from gaplab.api.clients.mcap_traces import mcap_to_csv
+from gaplab.api.clients.mcap_traces import mcap_table
 from gaplab.services.world.logs import read_trace
 from gaplab.services.world.world import World
 
@@ -75,44 +75,44 @@ def foxglove(
 
 
 def test_poses_of_ros_2_are_a_trace(tmp_path: Path) -> None:
-    trace = read_trace(mcap_to_csv(ros(tmp_path / "run.mcap")), "/traces/0", World())
+    trace = read_trace(mcap_table(ros(tmp_path / "run.mcap")), "/traces/0", World())
 
     assert trace.times_s.tolist() == [1_700_000_000.5, 1_700_000_001.5, 1_700_000_002.5]
     assert trace.positions_m.tolist() == [[0, 2, 3], [1, 2, 3], [2, 2, 3]]
     assert trace.orientations.tolist() == [[0, 0, 0, 1]] * 3
-    without = read_trace(mcap_to_csv(ros(tmp_path / "bare.mcap", stamped=False)), "/traces/0", World())
+    without = read_trace(mcap_table(ros(tmp_path / "bare.mcap", stamped=False)), "/traces/0", World())
     assert without.times_s.tolist() == [0, 1, 2]
 
 
 def test_poses_of_foxglove_are_a_trace_of_the_named_topic(tmp_path: Path) -> None:
     file = foxglove(tmp_path / "run.mcap", "/base", "/camera")
 
-    assert read_trace(mcap_to_csv(file, "/base"), "/traces/0", World()).times_s.tolist() == [0.25, 1.25]
+    assert read_trace(mcap_table(file, "/base"), "/traces/0", World()).times_s.tolist() == [0.25, 1.25]
     with pytest.raises(ValueError, match="has several topics of poses; permitted: /base, /camera"):
-        mcap_to_csv(file)
+        mcap_table(file)
     with pytest.raises(ValueError, match="has no poses on '/bse'; permitted: /base, /camera"):
-        mcap_to_csv(file, "/bse")
+        mcap_table(file, "/bse")
 
 
 def test_of_several_bodies_on_a_topic_one_is_chosen(tmp_path: Path) -> None:
     file = foxglove(tmp_path / "run.mcap", "/mocap", bodies=("wand", "base"))
 
-    assert read_trace(mcap_to_csv(file, body="base"), "/traces/0", World()).positions_m[:, 0].tolist() == [1.0, 1.0]
+    assert read_trace(mcap_table(file, body="base"), "/traces/0", World()).positions_m[:, 0].tolist() == [1.0, 1.0]
     with pytest.raises(ValueError, match=r"several bodies on '/mocap'; choose one by its child_frame_id: base, wand"):
-        mcap_to_csv(file)
+        mcap_table(file)
     with pytest.raises(ValueError, match=r"no body 'bse' on '/mocap'; choose one by its child_frame_id: base, wand"):
-        mcap_to_csv(file, body="bse")
+        mcap_table(file, body="bse")
 
 
 def test_what_has_no_poses_is_told(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="has no topics of poses"):
-        mcap_to_csv(foxglove(tmp_path / "log.mcap", "/log", schema="foxglove.Log"))
+        mcap_table(foxglove(tmp_path / "log.mcap", "/log", schema="foxglove.Log"))
     (tmp_path / "no.mcap").write_bytes(b"time_s,x\n0,0\n" * 20)
     with pytest.raises(ValueError, match=r"no\.mcap is not an MCAP file that can be read"):
-        mcap_to_csv(tmp_path / "no.mcap")
+        mcap_table(tmp_path / "no.mcap")
 
 
 def test_without_the_extra_its_command_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mcap.reader", None)
     with pytest.raises(ExtraMissing, match=r"pip install 'gaplab\[mcap\]'"):
-        mcap_to_csv(ros(tmp_path / "run.mcap"))
+        mcap_table(ros(tmp_path / "run.mcap"))

@@ -5,13 +5,17 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from mcap.writer import Writer
 
 from gaplab import ExtraMissing
-from gaplab.api.clients.trace_files import lerobot_to_csv, trace_csv
+from gaplab.api.clients.trace_files import trace_csv
+from gaplab.api.library.pools import PoolOptions, import_pool
+from gaplab.services.core.errors import InvalidSpec
+from tests.drawn_arm import imported
 
 NAMES = ["shoulder_pan.pos", "gripper.pos"]
 
@@ -47,10 +51,10 @@ HEAD = "time_s,angle shoulder_pan,angle gripper,command shoulder_pan,command gri
 def test_an_episode_of_a_lerobot_data_set_is_a_trace(tmp_path: Path) -> None:
     new, old = data_set(tmp_path / "new", version="v3.0"), data_set(tmp_path / "old", version="v2.1")
 
-    assert lerobot_to_csv(new, 0).splitlines() == [HEAD, "0.0,1.0,50.0,1.5,50.0", "0.25,2.0,51.0,1.5,50.0"]
-    assert [line.split(",")[1] for line in lerobot_to_csv(old, 1).splitlines()[1:]] == ["3.0", "4.0", "5.0"]
+    assert trace_csv(new, episode=0).decode().splitlines() == [HEAD, "0.0,1.0,50.0,1.5,50.0", "0.25,2.0,51.0,1.5,50.0"]
+    assert [line.split(",")[1] for line in trace_csv(old, episode=1).decode().splitlines()[1:]] == ["3.0", "4.0", "5.0"]
     (alone,) = (old / "data").rglob("*000001.parquet")
-    assert lerobot_to_csv(alone) == lerobot_to_csv(old, 1)
+    assert trace_csv(alone) == trace_csv(old, episode=1)
     by_kind = data_set(tmp_path / "motors", version="v3.0", names={"motors": NAMES})
     text = trace_csv(by_kind, {"*": "[deg]", "gripper": "gripper [%]"}, episode=0).decode()
     assert text.splitlines()[0] == (
@@ -61,23 +65,23 @@ def test_an_episode_of_a_lerobot_data_set_is_a_trace(tmp_path: Path) -> None:
 def test_what_is_no_episode_of_a_data_set_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = data_set(tmp_path / "set", version="v3.0")
     with pytest.raises(ValueError, match="set has 2 episodes; permitted: 0 to 1"):
-        lerobot_to_csv(folder)
+        trace_csv(folder)
     with pytest.raises(ValueError, match="set has no episode 7; permitted: 0 to 1"):
-        lerobot_to_csv(folder, 7)
+        trace_csv(folder, episode=7)
     with pytest.raises(ValueError, match=r"there is no meta/info\.json at or above it"):
-        lerobot_to_csv(tmp_path)
+        trace_csv(tmp_path)
     few = data_set(tmp_path / "few", version="v3.0", names=NAMES[:1])
     with pytest.raises(ValueError, match=r"observation\.state has 2 numbers, and its names are shoulder_pan"):
-        lerobot_to_csv(few, 0)
+        trace_csv(few, episode=0)
     (folder / "meta" / "info.json").write_text("{}")
     with pytest.raises(ValueError, match=r"meta/info\.json of set lacks 'features'"):
-        lerobot_to_csv(folder, 0)
+        trace_csv(folder, episode=0)
     (tmp_path / "few" / "data" / "chunk-000" / "file-000.parquet").write_bytes(b"PAR1")
     with pytest.raises(ValueError, match=r"file-000\.parquet cannot be read"):
-        lerobot_to_csv(few, 0)
+        trace_csv(few, episode=0)
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     with pytest.raises(ExtraMissing, match=r"pip install 'gaplab\[lerobot\]'"):
-        lerobot_to_csv(few, 0)
+        trace_csv(few, episode=0)
 
 
 def states(file: Path, *topics: str) -> Path:
@@ -106,3 +110,47 @@ def test_states_of_joints_are_a_trace_whatever_their_order(tmp_path: Path) -> No
         trace_csv(both)
     head = trace_csv(both, topic="/all").decode().splitlines()[0]
     assert head == "time_s,angle pan,angle elbow,speed pan,speed elbow,torque pan,torque elbow"
+
+
+@pytest.mark.parametrize(("version", "every_s", "last"), [("v2.1", 0.03, [4.8, 53.8]), ("v3.0", 0.25, [5.0, 54.0])])
+def test_episodes_of_a_lerobot_data_set_are_the_recordings_of_a_pool(
+    tmp_path: Path, version: str, every_s: float, last: list[float]
+) -> None:
+    arm = imported(tmp_path, shoulder="shoulder_pan", elbow="gripper")
+    folder = data_set(tmp_path / "set", version=version)
+
+    pool = import_pool(folder, str(arm), "episodes", PoolOptions(columns={"*": "[deg]"}, every_s=every_s))
+
+    first, second = pool.recordings
+    assert (first.name, second.name) == ("episode 0", "episode 1")
+    assert pool.actuators == pool.joints == ("shoulder_pan", "gripper")
+    assert (len(first.readings), len(second.readings)) == (1, 2)
+    assert second.start.angles_rad == pytest.approx(np.deg2rad([3.0, 52.0]), abs=1e-6)
+    assert second.commands == (pytest.approx(np.deg2rad([1.5, 50.0]), abs=1e-6),)
+    assert second.readings[1] == pytest.approx(np.deg2rad(last), abs=1e-6)
+
+
+def test_files_of_mcap_in_a_folder_are_the_recordings_of_a_pool(tmp_path: Path) -> None:
+    arm, folder = imported(tmp_path, shoulder="pan"), tmp_path / "runs"
+    folder.mkdir()
+    for name in ("b", "a"):
+        states(folder / f"{name}.mcap", "/joints")
+
+    pool = import_pool(folder, str(arm), "runs", PoolOptions(confirmed=True))
+
+    assert [each.name for each in pool.recordings] == ["a", "b"]
+    assert (pool.joints, pool.actuators) == (("pan", "elbow"), ())
+    assert pool.recordings[0].start.angles_rad == (1.0, 2.0)
+    assert pool.recordings[0].readings == ((2.0, 1.0),)
+
+
+def test_a_plain_table_in_parquet_is_a_pool_whose_errors_have_lines_as_in_csv(tmp_path: Path) -> None:
+    arm, file = imported(tmp_path), tmp_path / "runs.parquet"
+    columns = {"recording": [3, 3, 4, 4], "time_s": [0.0, 0.1, 0.0, 0.1], "shoulder": [0.0, 0.1, 0.2, 0.3]}
+    pq.write_table(pa.table(columns | {"elbow": [0.0, 0.1, 0.2, None]}), file)
+
+    with pytest.raises(InvalidSpec, match="/4: line 5, elbow: '' is not a finite number"):
+        import_pool(file, str(arm), "runs")
+
+    pool = import_pool(file, str(arm), "runs", PoolOptions(skip=True))
+    assert [each.name for each in pool.recordings] == ["3"]
