@@ -21,7 +21,7 @@ from gaplab.api.process.local_service import start_service
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import import_archive
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments.stored_files import add_robot
+from gaplab.services.experiments.stored_files import ROBOTS
 from gaplab.services.experiments.submission import submit
 from gaplab.services.figures.words import spoken
 from gaplab.services.running.execution import claim, record_all
@@ -106,7 +106,7 @@ def prepared() -> Iterator[tuple[str, dict[str, str]]]:
         ids["toy"] = toy(store)
         ask_for_a_measurement(store)
         for name in real_robots.FILES:
-            add_robot(store, real_robots.imported(name).robot.text)
+            ROBOTS.add(store, real_robots.imported(name).robot.text)
         store.dispose()
         with start_service(database_url, Path(folder) / "api.log", workers=False) as client:
             yield client.url, ids

@@ -1,4 +1,4 @@
-"""Robots that come from a file: where they come from."""
+"""Files that specs name, robots and pools: where they come from, and what lists say of them."""
 
 from enum import StrEnum
 from typing import Any
@@ -58,28 +58,31 @@ class RobotSource(Frozen):
     )
 
 
-class RobotRead(Read):
-    """A robot from a file, as it is stored."""
+class FileRead(Read):
+    """A file, as it is stored."""
 
     sha256: str = Field(description="hash of the file, which specs have", examples=["5f2c…"])
-    name: str = Field(description="a spec means the newest robot of this name", examples=["a1"])
+    name: str = Field(description="a spec means the newest file of this name", examples=["a1"])
+    lost: tuple[str, ...] = Field(
+        description="what its import lost, left out or changed", examples=[("transmission: hip",)]
+    )
+    created_at: Moment
+
+
+class RobotRead(FileRead):
+    """A robot from a file, as it is stored."""
+
     file: str | None = Field(description="file that it was imported from", examples=["a1.urdf"])
     bodies: int
     actuators: int
     mass_kg: float = Field(examples=[12.5])
-    lost: tuple[str, ...] = Field(description="what its import lost or changed", examples=[("transmission: hip",)])
-    created_at: Moment
 
 
-class PoolRead(Read):
+class PoolRead(FileRead):
     """A stored pool: recordings of what a robot did."""
 
-    sha256: str = Field(description="hash of the file, which specs have", examples=["5f2c…"])
-    name: str = Field(description="a spec means the newest pool of this name", examples=["tosses"])
     origin: str = Field(description="where the recordings come from, in words", examples=["tosses.parquet"])
     recordings: int = Field(examples=[40])
     sensors: tuple[str, ...] = Field(description="what was read", examples=[("angle elbow",)])
     actuators: tuple[str, ...] = Field(description="what was commanded", examples=[("elbow",)])
     seconds: float = Field(description="time of the last reading", examples=[20.0])
-    lost: tuple[str, ...] = Field(description="what its import left out or changed", examples=[("toss 3: no reading",)])
-    created_at: Moment

@@ -14,7 +14,7 @@ from gaplab.services.experiments import stored_files
 from gaplab.services.plugins import folders
 from gaplab.services.specs.robots import Driven, ref_of_file, robot_of, robot_of_file
 from gaplab.services.store.session import Store
-from gaplab.services.world.robot_files import read_robot_file
+from gaplab.services.world.robot_files import RobotFile
 from gaplab.services.world.robot_library import IMPORTED, robot_file
 from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
@@ -87,7 +87,7 @@ def _of_file(path: Path) -> PluginRef:
 
     try:
         is_robot_file = path.suffix == ".json"
-        file = read_robot_file(path.read_bytes()) if is_robot_file else import_robot(path, ImportOptions()).robot
+        file = RobotFile.read(path.read_bytes()) if is_robot_file else import_robot(path, ImportOptions()).robot
     except InvalidRobot as error:
         raise InvalidSpec(Violation("/robot", str(path), reason) for reason in error.reasons) from error
     robot_of_file(file)
@@ -105,8 +105,8 @@ def with_files(store: Store, spec: T) -> T:
     if Path(spec.robot.name).suffix:
         found["robot"] = _of_file(Path(spec.robot.name))
     if (file := robot_file(str((found.get("robot") or spec.robot).options.get("sha256", "")))) is not None:
-        stored_files.add_robot(store, file.text)
+        stored_files.ROBOTS.add(store, file.text)
     if spec.reality.pool is not None and Path(spec.reality.pool.name).suffix:
-        read = stored_files.add_pool(store, Path(spec.reality.pool.name).read_bytes())
+        read = stored_files.POOLS.add(store, Path(spec.reality.pool.name).read_bytes())
         found["reality"] = spec.reality.model_copy(update={"pool": PoolRef(name=read.name, sha256=read.sha256)})
     return spec.model_copy(update=found)

@@ -31,7 +31,7 @@ Named = Annotated[str, Path(description="hash or name of the robot", max_length=
 @router.get("/catalogue", summary="List the plug-ins", response_model=Catalogue, responses=CACHED)
 def read_catalogue(request: Request, store: StoreDep) -> Response:
     """Return every plug-in and every stored robot, with its source and the schema of its options."""
-    return tagged(request, catalogue(catalogued(stored_files.list_robots(store))))
+    return tagged(request, catalogue(catalogued(stored_files.ROBOTS.all(store))))
 
 
 @router.get(
@@ -53,13 +53,13 @@ def add_robot(file: Annotated[dict[str, Any], Body(openapi_examples=_EXAMPLES)],
     A file is data: its world, and the names of its usual controller and task. Specs name the robot by its name; of
     several with one name, the one that was added last is meant.
     """
-    return stored_files.add_robot(store, json.dumps(file, separators=(",", ":"), ensure_ascii=False))
+    return stored_files.ROBOTS.add(store, json.dumps(file, separators=(",", ":"), ensure_ascii=False))
 
 
 @router.get("/robots", summary="List the stored robots")
 def list_robots(store: StoreDep) -> tuple[RobotRead, ...]:
     """Return all robots from files, by name, the newest of a name first."""
-    return stored_files.list_robots(store)
+    return stored_files.ROBOTS.all(store)
 
 
 @router.get(
@@ -80,10 +80,10 @@ def add_pool(file: Annotated[dict[str, Any], Body(openapi_examples=_POOLS)], sto
     Specs name it by its name, as `{"reality": {"kind": "recorded", "pool": "tosses"}}`; of several with one name, the
     one that was added last is meant.
     """
-    return stored_files.add_pool(store, json.dumps(file, separators=(",", ":"), ensure_ascii=False))
+    return stored_files.POOLS.add(store, json.dumps(file, separators=(",", ":"), ensure_ascii=False))
 
 
 @router.get("/pools", summary="List the stored pools")
 def list_pools(store: StoreDep) -> tuple[PoolRead, ...]:
     """Return all pools, by name, the newest of a name first."""
-    return stored_files.list_pools(store)
+    return stored_files.POOLS.all(store)

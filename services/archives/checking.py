@@ -35,8 +35,6 @@ from gaplab.services.store.session import Session
 from gaplab.services.store.tables import Column
 from gaplab.services.store.texts import pack_tags, unpack_tags
 from gaplab.services.world import robot_library
-from gaplab.services.world.pools import read_pool
-from gaplab.services.world.robot_files import NamedFile, read_robot_file
 from gaplab.services.world.robot_library import label_of
 from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
@@ -178,8 +176,6 @@ def _refuse(place: str, what: str) -> NoReturn:
 
 MOST_EXPERIMENTS = 1_000
 
-_READERS: Mapping[str, Callable[[str], NamedFile]] = {"robot": read_robot_file, "pool": read_pool}
-
 Rows: TypeAlias = Callable[[str], Iterator[Row]]
 """Yields the checked rows of a table."""
 
@@ -207,7 +203,7 @@ def _learn_files(rows: Rows) -> set[str]:
     found = set[str]()
     for row in rows("file"):
         try:
-            file = _READERS[row["kind"]](row["text"])
+            file = robot_library.FILES[row["kind"]].read(row["text"])
         except InvalidSpec as error:
             raise InvalidArchive(f"the {row['kind']} {row['name']!r} is invalid: {error}"[:300]) from error
         if (file.sha256, file.name, file.text) != (row["sha256"], row["name"], row["text"]):

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-from typing import Any, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar
 
 from gaplab.schemas.plugin import PluginRead, PluginRef
-from gaplab.schemas.robots import FileKind, PoolRead, RobotRead
+from gaplab.schemas.robots import FileKind, FileRead, PoolRead, RobotRead
 from gaplab.schemas.samples import SamplesRead
 from gaplab.schemas.spec import PoolRef, SharedSettings
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation, unknown_name
@@ -17,13 +17,15 @@ from gaplab.services.store.models import FileRow
 from gaplab.services.store.queries import files
 from gaplab.services.store.session import Session, Store, snapshot
 from gaplab.services.store.texts import storable
-from gaplab.services.world.pools import Pool, read_pool, stored_pool
-from gaplab.services.world.robot_files import RobotFile, read_robot_file, stored_robot_file
+from gaplab.services.world.pools import Pool
+from gaplab.services.world.robot_files import NamedFile, RobotFile
 from gaplab.services.world.robot_library import IMPORTED
 from gaplab.services.world.robots import robots
 
 R = TypeVar("R")
 S = TypeVar("S", bound=SharedSettings)
+F = TypeVar("F", bound=NamedFile)
+V = TypeVar("V", bound=FileRead)
 
 
 class InvalidRobotFile(InvalidSpec):
@@ -32,67 +34,61 @@ class InvalidRobotFile(InvalidSpec):
     kind, title = "invalid-robot-file", "The robot file is invalid"
 
 
-def add_robot(store: Store, text: str | bytes) -> RobotRead:
-    """Store a robot file, unless it is stored already, and return what it is; its name now means this robot.
-
-    Raises:
-        InvalidRobotFile: it is not a robot file, a plug-in has its name, or its usual controller or task cannot drive
-            and rate it; with every violation.
-    """
-    try:
-        file = read_robot_file(text)
-        if file.name in robots:
-            message = f"gaplab has a robot {file.name!r} already; choose another name"
-            raise InvalidSpec([Violation("/name", file.name, message, "another name")])
-        robot_of_file(file)
-    except InvalidSpec as error:
-        raise InvalidRobotFile(error.violations) from error
-    return store.write(lambda session: _view(files.put(session, FileKind.ROBOT, file), file))
-
-
-@snapshot
-def list_robots(session: Session) -> tuple[RobotRead, ...]:
-    """Return all stored robots, by name, the newest of a name first."""
-    return tuple(_view(row, stored_robot_file(row.text)) for row in files.all_(session, FileKind.ROBOT))
-
-
 class InvalidPool(InvalidSpec):
     """A pool that cannot be stored, with all its violations."""
 
     kind, title = "invalid-pool", "The pool is invalid"
 
 
-def add_pool(store: Store, text: str | bytes) -> PoolRead:
-    """Store a pool, unless it is stored already, and return what it is; its name now means this pool.
+@dataclass(frozen=True)
+class StoredFiles(Generic[F, V]):
+    """The stored files of one kind.
 
-    Raises:
-        InvalidPool: it is not a pool; with every violation.
+    Attributes:
+        file: the kind.
+        view: what lists say of each.
+        invalid: what is raised instead if one cannot be stored.
+        check: what else than the file itself must be right; it raises InvalidSpec.
     """
-    try:
-        pool = read_pool(text)
-    except InvalidSpec as error:
-        raise InvalidPool(error.violations) from error
-    return store.write(lambda session: _pool_view(files.put(session, FileKind.POOL, pool), pool))
+
+    file: type[F]
+    view: type[V]
+    invalid: type[InvalidSpec]
+    check: Callable[[F], object] = lambda _: None
+
+    def add(self, store: Store, text: str | bytes) -> V:
+        """Store a file, unless it is stored already, and return what it is; its name now means this file.
+
+        Raises:
+            InvalidRobotFile, InvalidPool: it is not a file of this kind, or cannot be used; with every violation.
+        """
+        try:
+            file = self.file.read(text)
+            self.check(file)
+        except InvalidSpec as error:
+            raise self.invalid(error.violations) from error
+        return store.write(lambda session: self._view(files.put(session, file), file))
+
+    def all(self, store: Store) -> tuple[V, ...]:
+        """Return all files, by name, the newest of a name first."""
+        with store.reading() as session:
+            found = files.all_(session, self.file.kind)
+            return tuple(self._view(row, self.file.stored(row.text)) for row in found)
+
+    def _view(self, row: FileRow, file: F) -> V:
+        return self.view.filled_from(row, lost=file.lost, **file.facts())
 
 
-@snapshot
-def list_pools(session: Session) -> tuple[PoolRead, ...]:
-    """Return all stored pools, by name, the newest of a name first."""
-    return tuple(_pool_view(row, stored_pool(row.text)) for row in files.all_(session, FileKind.POOL))
+def _check_robot(file: RobotFile) -> None:
+    """Refuse a robot whose name a plug-in has, or that its usual controller or task cannot drive and rate."""
+    if file.name in robots:
+        message = f"gaplab has a robot {file.name!r} already; choose another name"
+        raise InvalidSpec([Violation("/name", file.name, message, "another name")])
+    robot_of_file(file)
 
 
-def _pool_view(row: FileRow, pool: Pool) -> PoolRead:
-    return PoolRead(
-        sha256=row.sha256,
-        name=row.name,
-        origin=pool.source,
-        recordings=len(pool.recordings),
-        sensors=tuple(each.name for each in pool.sensors),
-        actuators=pool.actuators,
-        seconds=pool.times_s[-1],
-        lost=pool.lost,
-        created_at=row.created_at,
-    )
+ROBOTS = StoredFiles(RobotFile, RobotRead, InvalidRobotFile, _check_robot)
+POOLS = StoredFiles(Pool, PoolRead, InvalidPool)
 
 
 @snapshot
@@ -211,15 +207,3 @@ def _entry(found: RobotRead) -> PluginRead:
         return entry.model_copy(update={"available": False, "note": str(error)})
     details = {**robots[IMPORTED].told(robot), "engine": default_engine(robot), **entry.details}
     return entry.model_copy(update={"details": details})
-
-
-def _view(row: FileRow, file: RobotFile) -> RobotRead:
-    world = file.world
-    return RobotRead.filled_from(
-        row,
-        file=file.source.file if file.source else None,
-        bodies=len(world.bodies),
-        actuators=len(world.actuators),
-        mass_kg=sum(body.mass_kg for body in world.bodies),
-        lost=file.lost,
-    )

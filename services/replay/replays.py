@@ -29,7 +29,7 @@ from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.queries.replays import TunedSample
 from gaplab.services.store.session import Session, Store
-from gaplab.services.world.robot_files import stored_robot_file
+from gaplab.services.world.robot_files import RobotFile
 from gaplab.services.world.robot_library import label_of
 from gaplab.services.world.robots import robots
 
@@ -77,7 +77,7 @@ def robot_shapes(store: Store, name: str) -> RobotShapes:
         NotFound: no usable robot has this name or hash, or it has no body.
     """
     own = robots[name].example().world if name in robots else None
-    world = own if own is not None else stored_robot_file(stored_files.robot_text(store, name)).world
+    world = own if own is not None else RobotFile.stored(stored_files.robot_text(store, name)).world
     if not world.bodies:
         raise NotFound(f"the robot {name!r} has no body, so it has no shapes")
     return at_start(world)

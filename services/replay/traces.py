@@ -10,7 +10,6 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.traces import TraceRead, TracesRead, TracesSpec
 from gaplab.services.core.arrays import FloatArray, frozen, known
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
-from gaplab.services.csv_tables import read_csv
 from gaplab.services.replay.process import RolloutProcess, SentSpec, received, sent
 from gaplab.services.replay.rollout import frame_times
 from gaplab.services.specs.assembly import simulation_of
@@ -73,7 +72,7 @@ def said_by_files(
     try:
         read = {
             digest: read_trace(
-                read_csv(files[digest].decode("utf-8", "replace")), f"/traces/{spec.traces.index(digest)}", robot.world
+                files[digest].decode("utf-8", "replace"), f"/traces/{spec.traces.index(digest)}", robot.world
             )
             for digest in dict.fromkeys(spec.traces)
         }

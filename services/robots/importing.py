@@ -23,7 +23,7 @@ from gaplab.services.robots.motors import with_motors, with_swings
 from gaplab.services.robots.options import ImportOptions, Notes, listed
 from gaplab.services.robots.reading import Handle, Source, body_name, mujoco_library, read_source
 from gaplab.services.robots.xml import decoded
-from gaplab.services.world.robot_files import LONGEST_NAME, RobotFile, read_robot_file
+from gaplab.services.world.robot_files import LONGEST_NAME, RobotFile
 from gaplab.services.world.world import (
     Body,
     Box,
@@ -109,7 +109,7 @@ def import_robot(file: Path, options: ImportOptions) -> ImportedFile:
             lost=tuple(notes.lost),
             world=world,
         )
-        return ImportedFile(read_robot_file(robot.text), masses)
+        return ImportedFile(RobotFile.read(robot.text), masses)
     except ValidationError as error:
         raise InvalidRobot(sentence(dict(each)) for each in error.errors()) from error
     except InvalidSpec as error:

@@ -16,7 +16,7 @@ from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions, Notes
 from gaplab.services.robots.reading import read_source
 from gaplab.services.robots.xml import decoded
-from gaplab.services.world.robot_files import LONGEST_NAME, RobotFile, read_robot_file
+from gaplab.services.world.robot_files import LONGEST_NAME, RobotFile
 from gaplab.services.world.world import World
 
 T = TypeVar("T")
@@ -89,7 +89,7 @@ def write_json(tuning: Tuning, output: Path, accept: Accept) -> WrittenFile:
     name = tuning.robot.name.removesuffix(_TUNED)[: LONGEST_NAME - len(_TUNED)] + _TUNED
     file = tuning.robot.model_copy(update={"name": name, "world": world, "comments": tuning.comments})
     text = json.dumps(file.content, ensure_ascii=False, indent=1) + "\n"
-    again = read_robot_file(text).world
+    again = RobotFile.read(text).world
     if again != world:
         raise InvalidRobot(["the robot file, read again, differs from the tuned world"])
     accept(again)

@@ -19,7 +19,7 @@ import scipy
 from gaplab.schemas.traces import QUANTITIES, TRACE_COLUMNS, heading_parts, how_parts, said_of
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.csv_tables import Row, Table, finite
+from gaplab.services.csv_tables import Row, Table, finite, read_csv
 from gaplab.services.world.motions import Trajectory
 from gaplab.services.world.world import Joint, World
 
@@ -104,15 +104,15 @@ class _Column(NamedTuple):
     wrong: str = ""
 
 
-def read_trace(table: Table, pointer: str, world: World) -> Trace:
-    """Return the trace of a robot from a table; further columns do not matter.
+def read_trace(table: str | Table, pointer: str, world: World) -> Trace:
+    """Return the trace of a robot from a table, or from one in CSV; further columns do not matter.
 
     It has the pose of the base, all joints that have a motor, or both.
 
     Raises:
         InvalidSpec: with every error, each with its line and column, at the pointer.
     """
-    header, rows, lines = table
+    header, rows, lines = read_csv(table) if isinstance(table, str) else table
     columns = list(_columns(header.cells or [""], world))
     if lines > MOST_LINES or lines * len(columns) > MOST_NUMBERS:
         message, most = f"the trace has {lines:,} lines", min(MOST_LINES, MOST_NUMBERS // max(1, len(columns)))

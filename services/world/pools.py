@@ -7,18 +7,19 @@ have no jumps as angles have. Those of joints are `angle NAME`, `speed NAME` and
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
+from gaplab.schemas.robots import FileKind
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.errors import Violation
 from gaplab.services.world.controllers.parts import follows_angle
 from gaplab.services.world.kinematics import rotated
 from gaplab.services.world.motions import Motion, Start, Trajectory
-from gaplab.services.world.robot_files import Lines, NamedFile, parsed
+from gaplab.services.world.robot_files import NamedFile
 from gaplab.services.world.sensing import AXES
 from gaplab.services.world.world import World
 
@@ -69,7 +70,6 @@ class Pool(NamedFile):
 
     Attributes:
         source: where they come from, in words.
-        lost: what the import left out or changed, line by line.
         sensors: what was read.
         times_s: `(r,)`, ascending: seconds from the beginning of a recording at which all sensors were read.
         joints: those whose angles and speeds recordings begin with.
@@ -77,11 +77,10 @@ class Pool(NamedFile):
         recordings: at least one.
     """
 
-    what: ClassVar[str] = "pool"
-    most_bytes: ClassVar[int] = MOST_BYTES
+    kind, what, most_bytes = FileKind.POOL, "pool", MOST_BYTES
+    kept = 4  # one has a million numbers
 
     source: Annotated[str, Field(max_length=1_000)] = ""
-    lost: Lines = ()
     sensors: Annotated[tuple[Channel, ...], Field(min_length=1, max_length=1_000)]
     times_s: Annotated[_Row, Field(min_length=1)]
     joints: tuple[_Text, ...] = ()
@@ -116,6 +115,28 @@ class Pool(NamedFile):
         found = (known.get(joint.name, other) for joint, other in zip(world.joints, others, strict=True))
         return None if given is None else tuple(found)
 
+    def violations(self) -> Iterator[Violation]:
+        """Yield what is inconsistent: names that occur twice, times that do not ascend, rows of wrong length."""
+        lists = {"sensors": [each.name for each in self.sensors], "joints": self.joints, "actuators": self.actuators}
+        for place, names in {**lists, "recordings": [each.name for each in self.recordings]}.items():
+            for name, count in Counter(names).items():
+                if count > 1:
+                    yield Violation(f"/{place}", name, f"{count} {place} are named {name}; each name is permitted once")
+        yield from _time_violations("/times_s", self.times_s)
+        for number, each in enumerate(self.recordings):
+            for violation in _recording_violations(self, each):
+                yield violation.moved("", f"/recordings/{number}")
+
+    def facts(self) -> dict[str, Any]:
+        """Return what lists say of it."""
+        return {
+            "origin": self.source,
+            "recordings": len(self.recordings),
+            "sensors": tuple(each.name for each in self.sensors),
+            "actuators": self.actuators,
+            "seconds": self.times_s[-1],
+        }
+
     @property
     def commands(self) -> FloatArray | None:
         """Return `(n, r · a)`: the commands at the pool's times, over their deviation; None without any."""
@@ -136,36 +157,6 @@ EXAMPLE = Pool(
     recordings=tuple(Recorded(name=name, readings=((0.0, 0.0, 0.1),)) for name in ("first", "second")),
 )
 """A pool for any robot: it rests, twice."""
-
-
-def read_pool(text: str | bytes) -> Pool:
-    """Return the pool of a file's text, checked.
-
-    Raises:
-        InvalidSpec: with every violation; pointers are places in the file.
-    """
-    pool = parsed(Pool, text)
-    if violations := list(pool_violations(pool)):
-        raise InvalidSpec(violations)
-    return pool
-
-
-def stored_pool(text: str) -> Pool:
-    """Return the pool of a text that was checked when it was stored."""
-    return parsed(Pool, text)
-
-
-def pool_violations(pool: Pool) -> Iterator[Violation]:
-    """Yield what is inconsistent in a pool: names that occur twice, times that do not ascend, rows of wrong length."""
-    lists = {"sensors": [each.name for each in pool.sensors], "joints": pool.joints, "actuators": pool.actuators}
-    for place, names in {**lists, "recordings": [each.name for each in pool.recordings]}.items():
-        for name, count in Counter(names).items():
-            if count > 1:
-                yield Violation(f"/{place}", name, f"{count} {place} are named {name}; each name is permitted once")
-    yield from _time_violations("/times_s", pool.times_s)
-    for number, each in enumerate(pool.recordings):
-        for violation in _recording_violations(pool, each):
-            yield violation.moved("", f"/recordings/{number}")
 
 
 def _recording_violations(pool: Pool, each: Recorded) -> Iterator[Violation]:

@@ -4,18 +4,19 @@ The canonical text leaves out what has its default value, so that a field that t
 """
 
 import json
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cached_property
 from hashlib import sha256
-from typing import Annotated, Any, ClassVar, Self, TypeAlias, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
 from pydantic import ConfigDict, Field, StringConstraints, ValidationError
 
 from gaplab.schemas.base import Frozen
 from gaplab.schemas.mistakes import permitted_by, pointer_to, sentence
 from gaplab.schemas.plugin import PluginRef
-from gaplab.schemas.robots import MOST_LOSSES, RobotSource
+from gaplab.schemas.robots import MOST_LOSSES, FileKind, RobotSource
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.world.world import World
 from gaplab.services.world.world_checks import MOST_BODIES, world_violations
@@ -46,25 +47,28 @@ _UNWRITTEN = {"origin", "edits"}
 """Fields of a world that say how it was edited; a file has only what it is."""
 
 
-F = TypeVar("F", bound="NamedFile")
-
-
 class NamedFile(Frozen):
     """A file that specs name: JSON, which is stored once under the hash of its canonical text.
 
     Attributes:
         format_version: version of the format.
         name: a spec means the newest file of this name.
-        what: what it is, for sentences.
+        lost: what its import lost or changed, line by line.
+        kind: what it is.
+        what: the same, for sentences.
         most_bytes: its largest size.
+        kept: most files of its kind that a process keeps as they were read.
     """
 
     model_config = ConfigDict(strict=True)
+    kind: ClassVar[FileKind]
     what: ClassVar[str]
     most_bytes: ClassVar[int] = MOST_BYTES
+    kept: ClassVar[int] = 64
 
     format_version: Annotated[int, Field(ge=1, le=1)] = 1
     name: Annotated[str, StringConstraints(pattern=rf"^[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}$")]
+    lost: Lines = ()
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return the file with other fields; what was computed of the old ones is computed again."""
@@ -74,9 +78,50 @@ class NamedFile(Frozen):
         return found
 
     @classmethod
+    def read(cls, text: str | bytes) -> Self:
+        """Return the file of a text, checked.
+
+        Raises:
+            InvalidSpec: with every violation; pointers are places in the file.
+        """
+        file = cls.stored(text)
+        if violations := list(file.violations()):
+            raise InvalidSpec(violations)
+        return file
+
+    @classmethod
+    def stored(cls, text: str | bytes) -> Self:
+        """Return the file of a text that was checked when it was stored, and stays readable if checks become stricter.
+
+        Raises:
+            InvalidSpec: it is not a file of this kind; with every violation, whose pointers are places in it.
+        """
+        if len(text) > cls.most_bytes:
+            message = f"the {cls.what} has {len(text):,} bytes, but at most {cls.most_bytes:,} are permitted"
+            raise InvalidSpec([Violation("", None, message, f"at most {cls.most_bytes:,} bytes")])
+        try:
+            content = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise InvalidSpec([Violation("", None, f"the {cls.what} is not JSON: {error}", "JSON in UTF-8")]) from error
+        if violations := list(cls.quick_violations(content)):
+            raise InvalidSpec(violations)
+        try:
+            return cls.model_validate_json(text)
+        except ValidationError as error:
+            raise InvalidSpec(_violations(error, content)) from error
+
+    @classmethod
     def quick_violations(cls, content: Any) -> Iterator[Violation]:  # noqa: ANN401, ARG003 - any JSON
         """Yield violations that are found before every value is checked; by default none."""
         yield from ()
+
+    def violations(self) -> Iterator[Violation]:
+        """Yield what is inconsistent in it; by default nothing."""
+        yield from ()
+
+    @abstractmethod
+    def facts(self) -> dict[str, Any]:
+        """Return what lists say of it."""
 
     @cached_property
     def content(self) -> dict[str, Any]:
@@ -101,17 +146,15 @@ class RobotFile(NamedFile):
         source: file that it was imported from; None if it was written by hand.
         usual_controller: controller of a spec that names none.
         usual_task: task of a spec that names none.
-        lost: what its import lost or changed, line by line.
         comments: notes for people, like the intervals of tuned values.
         world: the robot in reality.
     """
 
-    what: ClassVar[str] = "robot file"
+    kind, what = FileKind.ROBOT, "robot file"
 
     source: RobotSource | None = None
     usual_controller: PluginRef
     usual_task: PluginRef
-    lost: Lines = ()
     comments: Lines = ()
     world: World
 
@@ -120,55 +163,24 @@ class RobotFile(NamedFile):
         """Yield fields that a world has and a file has not, and parts that are too many."""
         yield from _world_violations(content)
 
+    def violations(self) -> Iterator[Violation]:
+        """Yield what is inconsistent in its world."""
+        yield from (each.moved("", "/world") for each in world_violations(self.world))
+
+    def facts(self) -> dict[str, Any]:
+        """Return what lists say of it."""
+        return {
+            "file": self.source.file if self.source else None,
+            "bodies": len(self.world.bodies),
+            "actuators": len(self.world.actuators),
+            "mass_kg": sum(body.mass_kg for body in self.world.bodies),
+        }
+
     @cached_property
     def content(self) -> dict[str, Any]:
         """The file as JSON values, without what has its default value."""
         left_out = {"world"} | {name for name in ("source", "comments") if not getattr(self, name)}
         return {**self.model_dump(mode="json", exclude=left_out), "world": _plain(self.world)}
-
-
-def read_robot_file(text: str | bytes) -> RobotFile:
-    """Return the robot of a file's text, checked.
-
-    Raises:
-        InvalidSpec: with every violation; pointers are places in the file.
-    """
-    robot = stored_robot_file(text)
-    if violations := [each.moved("", "/world") for each in world_violations(robot.world)]:
-        raise InvalidSpec(violations)
-    return robot
-
-
-def stored_robot_file(text: str | bytes) -> RobotFile:
-    """Return the robot of a text that was checked when it was stored.
-
-    Its world is not checked again: a robot whose experiments are stored stays readable if later checks are stricter.
-
-    Raises:
-        InvalidSpec: it is not a robot file.
-    """
-    return parsed(RobotFile, text)
-
-
-def parsed(kind: type[F], text: str | bytes) -> F:
-    """Return the file of a text.
-
-    Raises:
-        InvalidSpec: it is not a file of this kind; with every violation, whose pointers are places in it.
-    """
-    if len(text) > kind.most_bytes:
-        message = f"the {kind.what} has {len(text):,} bytes, but at most {kind.most_bytes:,} are permitted"
-        raise InvalidSpec([Violation("", None, message, f"at most {kind.most_bytes:,} bytes")])
-    try:
-        content = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InvalidSpec([Violation("", None, f"the {kind.what} is not JSON: {error}", "JSON in UTF-8")]) from error
-    if violations := list(kind.quick_violations(content)):
-        raise InvalidSpec(violations)
-    try:
-        return kind.model_validate_json(text)
-    except ValidationError as error:
-        raise InvalidSpec(_violations(error, content)) from error
 
 
 def _world_violations(content: Any) -> Iterator[Violation]:  # noqa: ANN401 - any JSON

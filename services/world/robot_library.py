@@ -5,15 +5,17 @@ names first: a store those of the experiments that it loads; workers, which have
 """
 
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, lru_cache
 from hashlib import sha256
-from typing import Any
+from types import MappingProxyType
+from typing import Any, TypeVar
 
 from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.robots import FileKind
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.world.pools import EXAMPLE, Pool, stored_pool
-from gaplab.services.world.robot_files import RobotFile, stored_robot_file
+from gaplab.services.world.pools import EXAMPLE, Pool
+from gaplab.services.world.robot_files import NamedFile, RobotFile
 
 IMPORTED = "robot_file"
 """Name of the plug-in of all robots from files."""
@@ -24,12 +26,10 @@ RECORDED = "recorded"
 MOST_KNOWN = 1_000
 """Most files that a process remembers: more than the experiments of a page have."""
 
-MOST_READ = 64
-"""Most robot files whose worlds a process keeps."""
+FILES: Mapping[FileKind, type[NamedFile]] = MappingProxyType({each.kind: each for each in (RobotFile, Pool)})
+"""What reads each kind of file."""
 
-MOST_POOLS = 4
-"""Most pools whose recordings a process keeps: one has a million numbers."""
-
+F = TypeVar("F", bound=NamedFile)
 _known: OrderedDict[str, str] = OrderedDict()
 
 
@@ -61,7 +61,7 @@ def unknown(specs: Iterable[Mapping[str, Any]]) -> set[str]:
 
 def robot_file(sha256: str) -> RobotFile | None:
     """Return the robot file with this hash; None if this process does not know it."""
-    return _read(_known[sha256]) if sha256 in _known else None
+    return _read(RobotFile)(_known[sha256]) if sha256 in _known else None
 
 
 def pool(sha256: str, name: str) -> Pool:
@@ -75,7 +75,7 @@ def pool(sha256: str, name: str) -> Pool:
     if sha256 not in _known:
         message = f"the pool {name!r} with the hash {sha256!r} is not stored here; add its file: gaplab pool add"
         raise InvalidSpec([Violation("/reality/pool", sha256, message, "a pool that is stored")])
-    return _read_pool(_known[sha256])
+    return _read(Pool)(_known[sha256])
 
 
 def needed_by(spec: Mapping[str, Any]) -> tuple[str, ...]:
@@ -88,11 +88,6 @@ def label_of(robot: PluginRef) -> str:
     return str(robot.options.get("name") or robot.name) if robot.name == IMPORTED else robot.name
 
 
-@lru_cache(maxsize=MOST_READ)
-def _read(text: str) -> RobotFile:
-    return stored_robot_file(text)
-
-
-@lru_cache(maxsize=MOST_POOLS)
-def _read_pool(text: str) -> Pool:
-    return stored_pool(text)
+@cache
+def _read(kind: type[F]) -> Callable[[str], F]:
+    return lru_cache(maxsize=kind.kept)(kind.stored)

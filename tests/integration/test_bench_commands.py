@@ -223,7 +223,7 @@ def test_traces_are_computed_and_stored_as_an_answer(sqlite_store: Store, gaplab
 
 
 def test_encoders_of_an_arm_answer_a_request(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> None:
-    stored_files.add_robot(sqlite_store, imported(tmp_path).read_text())
+    stored_files.ROBOTS.add(sqlite_store, imported(tmp_path).read_text())
     request = asked(sqlite_store, robot="arm", engine="mujoco", budget="smoke", iterations=1)
     robot: Any = read_robot(tmp_path / "arm.json")
     motion = open_loop(robot.motion(np.array(request.genome)))

@@ -74,7 +74,7 @@ def running(store: Store, log: pytest.LogCaptureFixture) -> dict[str, str]:
     study = submission.submit(store, StudySpec.model_validate(STUDY))
     run_halfway(store)
     listing.save_view(store, "mine", ViewSpec(query="strategy = random"))
-    stored_files.add_robot(store, json.dumps(EXAMPLE))
+    stored_files.ROBOTS.add(store, json.dumps(EXAMPLE))
     first, second, _ = study.experiments
     return {"studies": study.id, "experiments": first.id, "other": second.id, "sensitivity": first.sensitivity or ""}
 

@@ -16,7 +16,7 @@ from gaplab.services.experiments import stored_files
 from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.services.world import robot_library
-from gaplab.services.world.pools import read_pool
+from gaplab.services.world.pools import Pool
 from tests.recordings import TRUTH, arm_and_pool
 
 pytest.importorskip("mujoco")
@@ -142,8 +142,8 @@ def test_what_a_recorded_reality_does_not_have_is_refused_with_place_and_what_is
 ) -> None:
     fields, pointer, words = REFUSED[case]
     store = sqlite_store
-    stored_files.add_robot(store, files[0].read_bytes())
-    stored_files.add_pool(store, files[1].read_bytes())
+    stored_files.ROBOTS.add(store, files[0].read_bytes())
+    stored_files.POOLS.add(store, files[1].read_bytes())
     reality = {"kind": "recorded", "pool": "swings", **fields.pop("reality", {})}
     spec = {**SPEC, "robot": "arm", "strategy": "random", "reality": reality, **fields}
     http = TestClient(create_app(store))
@@ -159,7 +159,7 @@ def test_what_a_recorded_reality_does_not_have_is_refused_with_place_and_what_is
 def test_a_pool_is_stored_once_listed_and_travels_in_archives(
     result: Any, files: tuple[Path, Path], tmp_path: Path, sqlite_store: Store
 ) -> None:
-    http, pool = TestClient(create_app(sqlite_store)), read_pool(files[1].read_bytes())
+    http, pool = TestClient(create_app(sqlite_store)), Pool.read(files[1].read_bytes())
     archive = result.save(tmp_path / "study.zip")
 
     imported = http.post("/import", content=archive.read_bytes(), headers={"Content-Type": "application/zip"})
@@ -173,9 +173,9 @@ def test_a_pool_is_stored_once_listed_and_travels_in_archives(
 
 
 def test_a_stored_spec_has_the_hash_of_its_pool_and_resolves_to_itself(files: tuple[Path, Path], store: Store) -> None:
-    pool = read_pool(files[1].read_bytes())
-    stored_files.add_robot(store, files[0].read_bytes())
-    stored_files.add_pool(store, pool.text)
+    pool = Pool.read(files[1].read_bytes())
+    stored_files.ROBOTS.add(store, files[0].read_bytes())
+    stored_files.POOLS.add(store, pool.text)
     reality = {"kind": "recorded", "pool": "swings"}
     spec = ExperimentSpec.model_validate({**SPEC, "robot": "arm", "strategy": "random", "reality": reality})
 
@@ -205,7 +205,7 @@ def test_a_broken_pool_is_refused_with_every_place(case: str, files: tuple[Path,
     content["recordings"][0] |= change
 
     with pytest.raises(InvalidSpec) as refused:
-        read_pool(json.dumps(content))
+        Pool.read(json.dumps(content))
 
     found = [each for each in refused.value.violations if each.pointer == pointer]
     assert found

@@ -18,7 +18,7 @@ from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
-from gaplab.services.world.robot_files import read_robot_file
+from gaplab.services.world.robot_files import RobotFile
 from gaplab.services.world.robots.quadruped import Quadruped
 from gaplab.services.world.world import Material
 from tests.commands import Gaplab
@@ -35,7 +35,7 @@ def test_an_import_writes_a_robot_file_and_says_what_is_lost(gaplab: Gaplab, tmp
     knees = ("--start", "*_lower_joint=-1.8", "--start", "*_upper_joint=0.9")
 
     said = gaplab("robot", "import", str(path_of("a1/a1.urdf")), "--name", "a1", "-o", str(output), *knees)
-    robot = read_robot_file(output.read_bytes())
+    robot = RobotFile.read(output.read_bytes())
 
     assert said.code == 0
     assert robot.sha256 in said.out
@@ -64,7 +64,7 @@ def test_an_import_takes_all_options_and_prints_json(gaplab: Gaplab) -> None:
     )
 
     said = gaplab("robot", "import", "m.xml", *options, "--json")
-    found, robot = json.loads(said.out), read_robot_file(Path("m.json").read_bytes())
+    found, robot = json.loads(said.out), RobotFile.read(Path("m.json").read_bytes())
 
     assert (found["file"], found["sha256"], found["lost"]) == ("m.json", robot.sha256, list(robot.lost))
     assert found["mass_before_kg"] == pytest.approx(2.6)
@@ -135,7 +135,7 @@ def test_an_import_replaces_a_file_only_if_it_is_told_to(gaplab: Gaplab, tmp_pat
     assert refused.err == f"gaplab: {output}: a file of this name is there already; --force replaces it\n"
     assert kept == "by hand"
     assert replaced.code == 0
-    assert read_robot_file(output.read_bytes()).name == "m"
+    assert RobotFile.read(output.read_bytes()).name == "m"
 
 
 def best_of(iteration: int) -> Simulator:
@@ -173,7 +173,7 @@ def test_the_best_simulator_is_written_as_a_robot_file(gaplab: Gaplab, tuned: st
     output = tmp_path / "tuned.json"
 
     said = gaplab("simulator", tuned, "-o", str(output))
-    robot = read_robot_file(output.read_bytes())
+    robot = RobotFile.read(output.read_bytes())
 
     assert said.code == 0
     assert "material.static_friction 1 → 0.9" in said.out

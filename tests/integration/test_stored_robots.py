@@ -25,7 +25,7 @@ from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, FileRow
 from gaplab.services.store.session import Store
 from gaplab.services.world import robot_library, world_checks
-from gaplab.services.world.robot_files import RobotFile, read_robot_file
+from gaplab.services.world.robot_files import RobotFile
 from gaplab.services.world.robots.quadruped import Quadruped
 from gaplab.services.world.robots.robot_file import Imported
 from gaplab.services.world.world import Inertia
@@ -53,7 +53,7 @@ def file_of(name: str = "walker") -> RobotFile:
     """The quadruped, as a file has it."""
     example = robot_library.robot_file(Imported.example().options.sha256)
     assert example is not None
-    return read_robot_file(json.dumps(example.content | {"name": name}))
+    return RobotFile.read(json.dumps(example.content | {"name": name}))
 
 
 @pytest.fixture(autouse=True)
@@ -118,11 +118,11 @@ def test_a_robot_cannot_have_the_name_of_a_plug_in_or_a_controller_that_is_not_t
 
 
 def test_a_spec_means_the_newest_robot_of_a_name_and_keeps_its_hash(store: Store) -> None:
-    old = stored_files.add_robot(store, file_of().text)
+    old = stored_files.ROBOTS.add(store, file_of().text)
     first = submit_one(store, ExperimentSpec.model_validate(SPEC))
     heavier = json.loads(file_of().text)
     heavier["world"]["bodies"][0]["mass_kg"] = 3.0
-    new = stored_files.add_robot(store, json.dumps(heavier))
+    new = stored_files.ROBOTS.add(store, json.dumps(heavier))
     second = submit_one(store, ExperimentSpec.model_validate(SPEC))
 
     assert [each.spec["robot"]["options"]["sha256"] for each in (first, second)] == [old.sha256, new.sha256]
@@ -137,7 +137,7 @@ def test_an_unknown_robot_is_told_with_every_other_mistake(store: Store) -> None
 
 
 def test_an_unknown_robot_is_told_with_the_names_of_the_stored_ones(store: Store, http: TestClient) -> None:
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
     specs = {"/experiments": {"strategy": "random", "robot": "wolker"}, "/studies": {"robot": "wolker"}}
     answers = [http.post(path, json=spec) for path, spec in specs.items()]
     answers.append(
@@ -152,7 +152,7 @@ def test_an_unknown_robot_is_told_with_the_names_of_the_stored_ones(store: Store
 
 
 def test_a_table_of_samples_is_checked_for_a_stored_robot(store: Store, http: TestClient) -> None:
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
     table = ",".join([*(f"gene_{i}" for i in range(24)), "value_1"]) + "\n" + ",".join(["0.5"] * 24 + ["0.3"]) + "\n"
 
     answer = http.post("/samples/check?robot=walker", content=table, headers={"Content-Type": "text/csv"})
@@ -173,21 +173,21 @@ def test_it_is_said_why_an_engine_cannot_run_a_robot(store: Store) -> None:
     inertia = Inertia((0.01, 0.01, 0.01))
     bodies = [replace(body, shape=body.parts * 30, inertia=inertia) for body in Quadruped().world.bodies]
     world = replace(Quadruped().world, bodies=tuple(bodies))
-    stored_files.add_robot(store, file_of().model_copy(update={"world": world}).text)
+    stored_files.ROBOTS.add(store, file_of().model_copy(update={"world": world}).text)
 
     with pytest.raises(InvalidSpec, match=r"pybullet cannot run the .*, since its bodies and shapes need \d+ links"):
         submit_one(store, ExperimentSpec.model_validate(SPEC | {"robot": "walker", "engine": "pybullet"}))
 
 
 def test_a_robot_from_a_file_takes_no_options(store: Store) -> None:
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
     with pytest.raises(InvalidSpec, match="comes from a file, which has no options"):
         submit_one(store, ExperimentSpec.model_validate(SPEC | {"robot": {"name": "walker", "options": {"legs": 4}}}))
 
 
 @pytest.mark.release
 def test_a_robot_from_a_file_has_the_numbers_of_the_plug_in_to_the_last_bit(store: Store) -> None:
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
     made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     with store.reading() as session:
         from_file = ResolvedSpec.model_validate(session.get_one(ExperimentRow, made.id).spec)
@@ -198,7 +198,7 @@ def test_a_robot_from_a_file_has_the_numbers_of_the_plug_in_to_the_last_bit(stor
 
 
 def test_who_claims_work_on_a_stored_robot_can_send_its_file(store: Store) -> None:
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
     submit_one(store, ExperimentSpec.model_validate(SPEC))
 
     robot_library._known.clear()
@@ -211,7 +211,7 @@ def test_who_claims_work_on_a_stored_robot_can_send_its_file(store: Store) -> No
 
 
 def test_a_spec_whose_robot_is_gone_says_so(store: Store) -> None:
-    stored_files.add_robot(store, file_of("lost").text)
+    stored_files.ROBOTS.add(store, file_of("lost").text)
     made = submit_one(store, ExperimentSpec.model_validate(SPEC | {"robot": "lost"}))
     with store.transaction() as session:
         session.delete(session.get_one(FileRow, made.spec["robot"]["options"]["sha256"]))
@@ -226,7 +226,7 @@ def test_a_spec_whose_robot_is_gone_says_so(store: Store) -> None:
 def test_a_stored_robot_stays_usable_where_later_checks_would_refuse_it(
     store: Store, http: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
     made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     robot_library._known.clear()
     monkeypatch.setattr(world_checks, "MOST_BODIES", 3)
@@ -237,14 +237,14 @@ def test_a_stored_robot_stays_usable_where_later_checks_would_refuse_it(
     with store.reading() as session:
         assert next(repetition(setting(ResolvedSpec.model_validate(session.get_one(ExperimentRow, made.id).spec), 0)))
     with pytest.raises(InvalidSpec, match="1 to 3 bodies"):
-        stored_files.add_robot(store, file_of("another").text)
+        stored_files.ROBOTS.add(store, file_of("another").text)
 
 
 def test_a_robot_whose_usual_task_is_gone_is_unavailable_in_the_catalogue(store: Store, http: TestClient) -> None:
-    lost = read_robot_file(json.dumps(file_of("lost").content | {"usual_task": {"name": "fly", "options": {}}}))
+    lost = RobotFile.read(json.dumps(file_of("lost").content | {"usual_task": {"name": "fly", "options": {}}}))
     with store.transaction() as session:
         session.add(FileRow(sha256=lost.sha256, kind=FileKind.ROBOT, name=lost.name, text=lost.text, created_at=now()))
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
 
     entries = {each["name"]: each for each in http.get("/catalogue").json()["robots"]}
 
@@ -254,7 +254,7 @@ def test_a_robot_whose_usual_task_is_gone_is_unavailable_in_the_catalogue(store:
 
 
 def test_queries_and_the_catalogue_know_it_by_its_name(store: Store, http: TestClient) -> None:
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
     made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     entry = next(each for each in http.get("/catalogue").json()["robots"] if each["name"] == "walker")
 
@@ -266,19 +266,19 @@ def test_queries_and_the_catalogue_know_it_by_its_name(store: Store, http: TestC
 
 def test_an_archive_has_its_robots_and_brings_them(store: Store, other: Store) -> None:
     file = file_of()
-    stored_files.add_robot(store, file.text)
+    stored_files.ROBOTS.add(store, file.text)
     made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     archive = exported(export(store, made.id))
     robot_library._known.clear()
 
     imported(other, archive)
 
-    assert read_robot_file(stored_files.robot_text(other, "walker")).sha256 == file.sha256
+    assert RobotFile.read(stored_files.robot_text(other, "walker")).sha256 == file.sha256
 
 
 @pytest.mark.release
 def test_an_archive_of_a_robot_from_a_file_is_verified_in_processes_that_do_not_know_it(store: Store) -> None:
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
     made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, repetition(setting(claim.spec, claim.number)))
@@ -292,14 +292,14 @@ def test_an_archive_of_a_robot_from_a_file_is_verified_in_processes_that_do_not_
 
 
 def test_an_archive_gives_no_name_another_meaning(store: Store, other: Store) -> None:
-    stored_files.add_robot(store, file_of().text)
+    stored_files.ROBOTS.add(store, file_of().text)
     made = submit_one(store, ExperimentSpec.model_validate(SPEC))
     archive = exported(export(store, made.id))
     own = json.loads(file_of().text)
     own["world"]["bodies"][0]["mass_kg"] = 3.0
-    mine = stored_files.add_robot(other, json.dumps(own))
+    mine = stored_files.ROBOTS.add(other, json.dumps(own))
 
     imported(other, archive)
 
-    assert [each.sha256 for each in stored_files.list_robots(other)] == [mine.sha256, file_of().sha256]
-    assert read_robot_file(stored_files.robot_text(other, "walker")).sha256 == mine.sha256
+    assert [each.sha256 for each in stored_files.ROBOTS.all(other)] == [mine.sha256, file_of().sha256]
+    assert RobotFile.read(stored_files.robot_text(other, "walker")).sha256 == mine.sha256

@@ -60,7 +60,7 @@ def rated(robot: Robot, trace: Trace) -> Any:
 @pytest.mark.parametrize("commands", [True, False])
 def test_encoders_of_an_arm_give_fitness_and_readings(arm: Robot, commands: bool) -> None:
     log = Log(arm)
-    found = rated(arm, read_trace(read_csv(log.text(commands=commands)), "/traces/0", arm.world))
+    found = rated(arm, read_trace(log.text(commands=commands), "/traces/0", arm.world))
 
     real = MuJoCo().rollout(arm.world, open_loop(arm.motion(arm.known)))
     assert found.traces[0].lag_s == pytest.approx(LAG_S, abs=0.011)
@@ -71,7 +71,7 @@ def test_encoders_of_an_arm_give_fitness_and_readings(arm: Robot, commands: bool
 
 def test_columns_are_mapped_with_sign_unit_and_zero(arm: Robot) -> None:
     log = Log(arm)
-    plain = read_trace(read_csv(log.text(commands=True)), "/traces/0", arm.world)
+    plain = read_trace(log.text(commands=True), "/traces/0", arm.world)
     degrees, ticks = np.rad2deg(log.angles[:, 0]), 2048 - log.angles[:, 1] * 4096 / (2 * np.pi)
     text = log.text("Pan", "position_Tilt", shoulder=degrees, elbow=ticks)
 
@@ -112,7 +112,7 @@ def test_a_joint_that_cannot_have_moved_so_is_told_with_its_column(
     log.angles = log.commands.copy()
     text = log.text("shoulder", heading, elbow=changed(log.angles[:, 1]), commands=True)
 
-    told = list(unlikely_joints(read_trace(read_csv(text), "/traces/0", arm.world), arm.world))
+    told = list(unlikely_joints(read_trace(text, "/traces/0", arm.world), arm.world))
 
     assert bool(told) == bool(said)
     assert not said or (said in told[0] and told[0].startswith(f"the column {heading!r}"))
@@ -121,7 +121,7 @@ def test_a_joint_that_cannot_have_moved_so_is_told_with_its_column(
 def test_a_joint_beyond_its_limits_is_told_with_its_line(arm: Robot) -> None:
     text = "time_s,shoulder,elbow\n0,0.1,0.2\n0.1,0.2,57\n0.2,0.3,-12\n"
 
-    (told,) = unlikely_joints(read_trace(read_csv(text), "/traces/0", arm.world), arm.world)
+    (told,) = unlikely_joints(read_trace(text, "/traces/0", arm.world), arm.world)
 
     assert told == ("the column 'elbow', line 3: 57 is outside the limits of elbow, -1.6 to 1.6; is it `[deg]`?")
 
@@ -143,18 +143,18 @@ def test_a_joint_beyond_its_limits_is_told_with_its_line(arm: Robot) -> None:
 )
 def test_what_is_no_trace_of_joints_is_refused_with_its_line(arm: Robot, text: str, message: str) -> None:
     with pytest.raises(InvalidSpec, match=message.replace("?", r"\?")):
-        read_trace(read_csv(text), "/traces/0", arm.world)
+        read_trace(text, "/traces/0", arm.world)
 
 
 def test_a_trace_that_lacks_what_counts_is_refused(arm: Robot) -> None:
     poses = "time_s,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n9,1,0,0,0,0,0,1\n"
 
     with pytest.raises(InvalidSpec, match="no finite fitness from this trace, which lacks the angles of its joints"):
-        rated(arm, read_trace(read_csv(poses), "/traces/0", arm.world))
+        rated(arm, read_trace(poses, "/traces/0", arm.world))
     walks = gaplab.read_robot("quadruped")
     joints = ",".join(joint.name for joint in walks.world.actuators)
     zeros = ",".join("0" for _ in walks.world.actuators)
 
     text = f"time_s,{joints}\n0,{zeros}\n9,{zeros}\n"
     with pytest.raises(InvalidSpec, match="which lacks the pose of the base"):
-        rated(walks, read_trace(read_csv(text), "/traces/0", walks.world))
+        rated(walks, read_trace(text, "/traces/0", walks.world))

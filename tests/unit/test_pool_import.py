@@ -10,7 +10,7 @@ import pytest
 
 from gaplab.api.library.pools import PoolOptions, import_pool
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.world.pools import Pool, read_pool
+from gaplab.services.world.pools import Pool
 from tests.drawn_arm import imported
 
 pytest.importorskip("mujoco")
@@ -55,7 +55,7 @@ def test_a_table_becomes_recordings_with_their_starts_commands_and_readings(read
     assert wave.commands == ((0.1, -0.2), (0.3, -0.2))
     assert wave.readings[0] == pytest.approx((0.143828, -0.143828), abs=1e-6)
     assert len(nod.readings) == 5  # it is shorter
-    assert read_pool(pool.text) == pool
+    assert Pool.read(pool.text) == pool
 
 
 def test_a_gap_is_told_and_nothing_is_read_in_it(read: Callable[..., Pool]) -> None:

@@ -11,7 +11,7 @@ import pytest
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import RobotSource
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.world.robot_files import MOST_BYTES, RobotFile, read_robot_file
+from gaplab.services.world.robot_files import MOST_BYTES, RobotFile
 from gaplab.services.world.robots.quadruped import Quadruped
 from gaplab.services.world.world import (
     Body,
@@ -85,15 +85,15 @@ def file_of(world: World) -> RobotFile:
 def test_a_robot_that_is_read_equals_the_one_that_was_written(world: World) -> None:
     robot = file_of(world)
 
-    assert read_robot_file(robot.text) == robot
-    assert read_robot_file(robot.text).world == world
+    assert RobotFile.read(robot.text) == robot
+    assert RobotFile.read(robot.text).world == world
 
 
 def test_the_hash_depends_on_values_and_not_on_spaces_order_or_how_the_world_was_edited() -> None:
     robot = file_of(EVERYTHING)
     reordered = json.dumps(dict(reversed(robot.content.items())), indent=3)
 
-    assert read_robot_file(reordered).sha256 == robot.sha256
+    assert RobotFile.read(reordered).sha256 == robot.sha256
     assert file_of(EVERYTHING.edited("slope", slope_rad=0.1)).sha256 == robot.sha256
     assert file_of(replace(EVERYTHING, slope_rad=0.2)).sha256 != robot.sha256
 
@@ -105,7 +105,7 @@ def test_a_copy_with_another_world_is_another_file() -> None:
     copy = file.model_copy(update={"world": replace(file.world, start_height_m=0.5)})
 
     assert copy.sha256 != before
-    assert read_robot_file(copy.text).world.start_height_m == 0.5
+    assert RobotFile.read(copy.text).world.start_height_m == 0.5
     assert file.sha256 == before
 
 
@@ -193,7 +193,7 @@ def test_an_error_names_the_place_and_what_is_permitted(case: str) -> None:
     change(content)
 
     with pytest.raises(InvalidSpec) as caught:
-        read_robot_file(json.dumps(content))
+        RobotFile.read(json.dumps(content))
 
     violations = {violation.pointer: violation.message for violation in caught.value.violations}
     assert message in violations[pointer]
@@ -205,13 +205,13 @@ def test_the_first_hundred_violations_are_told() -> None:
     content["world"]["bodies"] = [{}] * 200
 
     with pytest.raises(InvalidSpec) as caught:
-        read_robot_file(json.dumps(content))
+        RobotFile.read(json.dumps(content))
 
     assert len(caught.value.violations) == 100
 
 
 def test_a_text_that_is_too_long_or_no_json_is_refused() -> None:
     with pytest.raises(InvalidSpec, match=r"2,000,001 bytes.*at most 2,000,000"):
-        read_robot_file(b" " * (MOST_BYTES + 1))
+        RobotFile.read(b" " * (MOST_BYTES + 1))
     with pytest.raises(InvalidSpec, match="not JSON"):
-        read_robot_file("{")
+        RobotFile.read("{")

@@ -14,7 +14,7 @@ from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.robots.bodies import simplify
 from gaplab.services.robots.importing import ImportedFile, import_robot
 from gaplab.services.robots.options import ImportOptions
-from gaplab.services.world.robot_files import read_robot_file
+from gaplab.services.world.robot_files import RobotFile
 from gaplab.services.world.world import Box, Capsule, Hull, Joint, Motor, PDMotor, World, pd_law, pd_torque
 from tests import real_robots
 from tests.real_robots import FILES, for_each
@@ -220,7 +220,7 @@ def test_the_same_import_gives_the_same_file() -> None:
     again = import_robot(path_of(file), ImportOptions(**options)).robot
 
     assert again.sha256 == imported("mini_cheetah").robot.sha256
-    assert read_robot_file(again.text) == again
+    assert RobotFile.read(again.text) == again
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.writing import Tuning, WrittenFile, write_json, write_plain, write_xml
 from gaplab.services.world.motions import Trajectory
-from gaplab.services.world.robot_files import RobotFile, read_robot_file
+from gaplab.services.world.robot_files import RobotFile
 from gaplab.services.world.tunables.labels import tunable_of
 from gaplab.services.world.world import Body, Inertia, Joint, World
 from tests.robot_texts import MJCF
@@ -223,7 +223,7 @@ def test_a_file_has_no_place_for_clocks_encoders_the_frame_of_the_sensors_and_jo
         assert {name for name in names if any(name in each for each in lost)} == names
         assert len(lost) == len(names)
     write_json(tuning, tmp_path / "tuned.json", fine)
-    assert not changes(tuning.world, read_robot_file((tmp_path / "tuned.json").read_bytes()).world)
+    assert not changes(tuning.world, RobotFile.read((tmp_path / "tuned.json").read_bytes()).world)
 
 
 def test_an_inertia_that_does_not_grow_with_the_mass_is_possible_for_a_single_body(tmp_path: Path) -> None:
@@ -278,7 +278,7 @@ def test_a_robot_file_holds_all_and_its_intervals(tmp_path: Path) -> None:
     tuned = replace(tuned, slope_rad=0.1).edited("slope", slope_rad=0.2)
 
     written = write_json(Tuning(robot, tuned, COMMENTS), tmp_path / "tuned.json", fine)
-    again = read_robot_file((tmp_path / "tuned.json").read_bytes())
+    again = RobotFile.read((tmp_path / "tuned.json").read_bytes())
 
     assert again.world == tuned == written.world
     assert again.name == f"{robot.name}_tuned"

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from gaplab.schemas.traces import TRACE_COLUMNS
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.csv_tables import read_csv
 from gaplab.services.engines.mujoco.engine import MuJoCo
 from gaplab.services.world.logs import MOST_ERRORS, Trace, read_trace
 from gaplab.services.world.motions import open_loop
@@ -189,7 +188,7 @@ def table(**changes: Any) -> str:
 
 def test_a_trace_is_read_with_any_order_units_and_more_columns() -> None:
     text = "qw;qx;qy;qz;note;time_s [ms];x (m);y [cm];z[mm]\n1;0;0;0;begins;500;1;200;3000\n1;0;0;0;;750;2;200;3000\n"
-    trace = read_trace(read_csv(text), "/traces/0", ROBOT.world)
+    trace = read_trace(text, "/traces/0", ROBOT.world)
 
     assert trace.times_s.tolist() == [0.5, 0.75]
     assert trace.positions_m.tolist() == [[1, 2, 3], [2, 2, 3]]
@@ -225,7 +224,7 @@ ENDLESS = '"' + "0123456789\n" * 20_000
 )
 def test_what_is_no_trace_is_refused_with_its_line(text: str, message: str) -> None:
     with pytest.raises(InvalidSpec, match=message) as refused:
-        read_trace(read_csv(text), "/traces/0", ROBOT.world)
+        read_trace(text, "/traces/0", ROBOT.world)
     assert {each.pointer for each in refused.value.violations} == {"/traces/0"}
 
 
@@ -235,7 +234,7 @@ def test_a_hostile_trace_gives_few_errors_and_takes_little_memory() -> None:
     tracemalloc.start()
 
     with pytest.raises(InvalidSpec) as refused:
-        read_trace(read_csv(text), "/traces/0", ROBOT.world)
+        read_trace(text, "/traces/0", ROBOT.world)
 
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

@@ -55,9 +55,9 @@ def names(session: Session, kind: FileKind) -> tuple[str, ...]:
     return tuple(session.scalars(select(FileRow.name).where(FileRow.kind == kind).distinct().order_by(FileRow.name)))
 
 
-def put(session: Session, kind: FileKind, file: NamedFile) -> FileRow:
+def put(session: Session, file: NamedFile) -> FileRow:
     """Insert a file unless it is there, and return its row; it is the newest of its name now."""
-    values = {"sha256": file.sha256, "kind": kind, "name": file.name, "text": file.text}
+    values = {"sha256": file.sha256, "kind": file.kind, "name": file.name, "text": file.text}
     session.execute(insert_new(session, FileRow).values(**values, created_at=now()))
     session.execute(update(FileRow).where(FileRow.sha256 == file.sha256).values(created_at=now()))
     return session.get_one(FileRow, file.sha256)
