@@ -19,7 +19,7 @@ from gaplab.services.world.kinematics import started
 from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory, commands_at
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.safety import MOST_SIMULATORS, Extremes, extremes, recording_times, safety
-from gaplab.services.world.sensing import QUIET, biases, disturbed
+from gaplab.services.world.sensing import QUIET, biases, disturbed, truly_begun
 from gaplab.services.world.tunables.base import Tunable
 from gaplab.services.world.world import World
 
@@ -118,8 +118,9 @@ class Simulation:
     def _simulated(self, genomes: Genomes, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
         """Return the trajectories without commands; the worlds whose motions are alike are simulated together."""
         groups: dict[Hashable, list[int]] = {}
+        read = any(isinstance(each, Motion) and each.read for each in motions)
         for column, world in enumerate(worlds):
-            groups.setdefault((world.noise, _late_steps(world)), []).append(column)
+            groups.setdefault((world.noise, _late_steps(world), world.biases if read else ()), []).append(column)
         if len(groups) == 1:
             return self._engine.rollouts(worlds, _disturbed(worlds[0], motions, genomes))
         found: dict[int, Trajectory] = {}
@@ -138,7 +139,9 @@ def _edited(world: World, edits: Sequence[tuple[int, Tunable]], values: tuple[fl
 
 
 def _disturbed(world: World, motions: Sequence[Motion | Loop], genomes: Genomes) -> Sequence[Motion | Loop]:
-    """Return what an engine is to run of motions: with the noise of a world, and its offset of time."""
+    """Return what an engine is to run of motions: with biases of the start, noise and an offset of time of a world."""
+    if world.biases:
+        motions = [truly_begun(world, motion) for motion in motions]
     if world.noise != QUIET:
         motions = [disturbed(world, motion, genome) for motion, genome in zip(motions, genomes, strict=True)]
     return [_late(world, motion) for motion in motions] if _late_steps(world) else motions

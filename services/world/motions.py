@@ -55,6 +55,7 @@ class Motion:
         start: how the robot is at time 0; None if it is as the world has it.
         joints: true if the trajectory has what encoders tell, too.
         until_s: time after which sensors say nothing: all readings are 0 then, in every simulator.
+        read: joints whose angle at the start is what their encoder said of it, bias and all.
     """
 
     times_s: FloatArray
@@ -65,6 +66,7 @@ class Motion:
     start: Start | None = None
     joints: bool = False
     until_s: float = inf
+    read: tuple[str, ...] = ()
 
     def observed_at(self, times_s: FloatArray, joints: bool | None = None) -> "Motion":
         """Return the same motion, observed at other times `(t,)`; None tells joints if the motion itself does."""

@@ -108,7 +108,8 @@ class Pool(NamedFile):
             targets[:, places[name]] = [row[column] for row in recorded.commands]
         start = replace(start, angles_rad=angles, speeds_rad_s=speeds)
         until_s = float(self.times_s[len(recorded.readings) - 1])
-        return Motion(times_s, frozen(targets), frozen(self.times_s), start=start, until_s=until_s)
+        observe_s = frozen(self.times_s)
+        return Motion(times_s, frozen(targets), observe_s, start=start, until_s=until_s, read=self.joints)
 
     def _of_joints(self, given: _Row | None, world: World, others: Sequence[float]) -> _Row | None:
         known = dict(zip(self.joints, given or (), strict=False))

@@ -121,6 +121,20 @@ def biases(world: World, sensors: Sequence[str]) -> FloatArray:
     return np.array([known.get(name, 0.0) for name in sensors])
 
 
+def truly_begun(world: World, motion: Motion | Loop) -> Motion | Loop:
+    """Return a motion that begins where the joints were: where encoders said that they were, less their biases.
+
+    A motor that holds its joint where that began does so there, too.
+    """
+    if isinstance(motion, Loop) or not motion.read or motion.start is None or motion.start.angles_rad is None:
+        return motion
+    shifts = biases(world, [f"angle {joint.name}" if joint.name in motion.read else "" for joint in world.joints])
+    said, following = np.array(motion.start.angles_rad), [each.follows == "position" for each in world.actuators]
+    held = following & (motion.targets == _actuated(world, said[None])).all(axis=0)
+    start = replace(motion.start, angles_rad=tuple((said - shifts).tolist()))
+    return replace(motion, start=start, targets=frozen(motion.targets - held * _actuated(world, shifts[None])))
+
+
 def names(world: World, senses: Sequence[str]) -> tuple[str, ...]:
     """Return the names `(s,)` of the observations, like `angle knee` or `tilt z`."""
     return tuple(name for sense in senses for name in _GROUPS[sense].names(world))

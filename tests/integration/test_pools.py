@@ -16,8 +16,10 @@ from gaplab.services.experiments import stored_files
 from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.services.world import robot_library
-from gaplab.services.world.pools import Pool
-from tests.recordings import TRUTH, arm_and_pool
+from gaplab.services.world.motions import Start
+from gaplab.services.world.pools import Channel, Pool, Recorded
+from tests.drawn_arm import imported
+from tests.recordings import TRUTH, arm_and_pool, simulated
 
 pytest.importorskip("mujoco")
 
@@ -185,6 +187,21 @@ def test_a_stored_spec_has_the_hash_of_its_pool_and_resolves_to_itself(files: tu
     assert found.reality.pool.sha256 == pool.sha256
     assert found.iterations == 6  # all that are not held out
     assert resolve(found)[0] == found
+
+
+def test_a_joint_begins_where_a_biased_encoder_that_read_its_start_was_wrong(tmp_path: Path) -> None:
+    channels = tuple(Channel(name=f"angle {joint}", unit="rad", noise=0.01) for joint in ("shoulder", "elbow"))
+    start, commands = Start(angles_rad=(0.1, 0.3)), ((0.1,), (0.4,))
+    one = Recorded(name="one", start=start, times_s=(0.0, 0.2), commands=commands, readings=((0.0, 0.0),) * 2)
+    parts: dict[str, Any] = {"sensors": channels, "times_s": (0.01, 0.2), "joints": ("shoulder", "elbow")}
+
+    said = [
+        simulated(imported(tmp_path), [one], truth, actuators=("shoulder",), **parts).readings(0)
+        for truth in ({"bias(elbow)": 0.0}, {"bias(elbow)": 0.2}, {"bias(elbow)": -0.2})
+    ]
+
+    for readings in said:  # with noise of 0.01; nothing commands the elbow, which stays where it was
+        assert readings[:, 1] == pytest.approx([0.3, 0.3], abs=0.06)
 
 
 BROKEN: dict[str, tuple[dict[str, Any], str, str]] = {

@@ -109,7 +109,10 @@ class BiasOptions(Frozen):
 
 
 class Bias(Tunable):
-    """What the encoders of joints read beyond the true angle; motors do not follow it, but controllers in a loop do."""
+    """What the encoders of joints read beyond the true angle; motors do not follow it, but controllers in a loop do.
+
+    A recorded angle at the start of a motion is what an encoder read, so the joint began at that, less the bias.
+    """
 
     name = "bias"
     order = IN_PLACE
