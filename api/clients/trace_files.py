@@ -4,14 +4,14 @@ They are read here, so that the service parses CSV alone.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, groupby
 from operator import itemgetter
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TypedDict, Unpack
 
 from gaplab.api.clients.errors import library
-from gaplab.api.clients.mcap_traces import mcap_table
 from gaplab.schemas.traces import TRACE_COLUMNS, heading_parts, how_parts, said_of
 from gaplab.services.csv_tables import Table, read_csv
 
@@ -25,6 +25,22 @@ COLUMNS = {
 
 ALL = "*"
 """In place of a joint in a mapping: all of which nothing else says how they count."""
+
+POSES = {
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/TransformStamped",
+    "nav_msgs/msg/Odometry",
+    "foxglove.PoseInFrame",
+}
+"""Messages that have the pose of one frame: in ROS 2's encoding, or as JSON."""
+
+JOINTS = "sensor_msgs/msg/JointState"
+"""Messages that have angles, and perhaps speeds and torques, of joints by name."""
+
+_NESTED = ("pose", "transform")
+_PLACES, _TURNS = ("position", "translation"), ("orientation", "rotation")
+_STAMPS, _NANOSECONDS = ("timestamp", "stamp"), ("nsec", "nanosec")
 
 
 class Chosen(TypedDict, total=False):
@@ -46,14 +62,15 @@ def trace_csv(file: str | Path, columns: Mapping[str, str] | None = None, **chos
 
 def recording(path: Path, **chosen: Unpack[Chosen]) -> Table:
     """Return the table of a recording, in whatever format it is; see `Bench.attach_trace`."""
-    suffix, episode = path.suffix.lower(), chosen.get("episode")
+    suffix = path.suffix.lower()
     if suffix == ".mcap":
         return mcap_table(path, chosen.get("topic"), chosen.get("body"))
     if suffix == ".parquet" and _root(path) is None:
-        return _plain(library("pyarrow.parquet", "lerobot").read_table(path))
+        table = library("pyarrow.parquet", "lerobot").read_table(path)
+        return Table.of(table.column_names, [*zip(*(each.to_pylist() for each in table.columns), strict=True)])
     if suffix != ".parquet" and not path.is_dir():
         return read_csv(path.read_text("utf-8", "replace"))
-    found = lerobot_tables(path, episode)
+    found = lerobot_tables(path, chosen.get("episode"))
     if len(found) > 1:
         raise ValueError(f"{path.name} has {len(found)} episodes; permitted: {min(found)} to {max(found)}")
     return found.popitem()[1]
@@ -98,10 +115,6 @@ def _counted(how: str, quantity: str) -> str:
     if quantity == "torque":
         return sign
     return f"{sign}{unit}{'/s' if unit and not unit.endswith('/s') else ''}" if quantity == "speed" else how
-
-
-def _plain(table: Any) -> Table:  # noqa: ANN401 - of pyarrow
-    return Table.of(table.column_names, [*zip(*(each.to_pylist() for each in table.columns), strict=True)])
 
 
 def _root(path: Path) -> Path | None:
@@ -163,3 +176,95 @@ def _names(feature: Mapping[str, Any]) -> list[str]:
     names = feature["names"]
     every = names if isinstance(names, list) else [name for group in names.values() for name in group]
     return [name.removesuffix(".pos") for name in every]
+
+
+def mcap_table(file: Path, topic: str | None = None, body: str | None = None) -> Table:
+    """Return the trace of an MCAP file as a table; see `Bench.attach_trace`."""
+    mcap, ros = library("mcap.reader", "mcap"), library("mcap_ros2.decoder", "mcap")
+    errors = library("mcap.exceptions", "mcap")
+    try:
+        with file.open("rb") as stream:
+            factories: list[Any] = [ros.DecoderFactory(), _Json()]
+            reader = mcap.make_reader(stream, decoder_factories=factories)
+            chosen, schema = _chosen(reader.get_summary(), topic, file)
+            messages = reader.iter_decoded_messages(topics=[chosen])
+            if schema == JOINTS:
+                return _joints((_time_s(decoded, message.log_time), decoded) for _, _, message, decoded in messages)
+            poses: dict[str, list[list[float]]] = {}
+            for _, _, message, decoded in messages:
+                name = getattr(decoded, "child_frame_id", "")
+                poses.setdefault(name, []).append(_pose(decoded, message.log_time))
+            return Table.of(TRACE_COLUMNS, _of_body(poses, body, f"{file.name} has {{}} on {chosen!r}"))
+    except errors.McapError as error:
+        raise ValueError(f"{file.name} is not an MCAP file that can be read: {error}") from error
+
+
+class _Json:
+    """Decodes messages in JSON."""
+
+    def decoder_for(self, message_encoding: str, schema: Any) -> Any:  # noqa: ANN401, ARG002 - mcap's interface
+        """Return the decoder of JSON, or None for another encoding."""
+        if message_encoding != "json":
+            return None
+        return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
+
+
+def _chosen(summary: Any, topic: str | None, file: Path) -> tuple[str, str]:  # noqa: ANN401 - of mcap
+    """Return a topic and its schema: the given one; or the only one that has poses, or without any, joints."""
+    if summary is None:
+        raise ValueError(f"{file.name} has no summary, perhaps because its recording was cut off; repair it first")
+    schemas = {id_: schema.name for id_, schema in summary.schemas.items()}
+    every = {each.topic: schemas.get(each.schema_id, "") for each in summary.channels.values()}
+    poses = [name for name, schema in every.items() if schema in POSES]
+    joints = [name for name, schema in every.items() if schema == JOINTS]
+    found = poses or joints if topic is None else [*poses, *joints]
+    if topic in found or (topic is None and len(found) == 1):
+        name = topic or found[0]
+        return name, every[name]
+    what = "joints" if joints and not poses else "poses"
+    wrong = f"topics of {what}" if topic is None else f"{what} on {topic!r}"
+    permitted = ", ".join(sorted(found)) or f"none: no topic has one of {', '.join(sorted({*POSES, JOINTS}))}"
+    raise ValueError(
+        f"{file.name} has {'several' if topic is None and found else 'no'} {wrong}; permitted: {permitted}"
+    )
+
+
+def _joints(messages: Iterator[tuple[float, Any]]) -> Table:
+    """Return the trace of states of joints, whose order may change from one message to the next."""
+    rows = []
+    for time_s, message in messages:
+        told = (("angle", message.position), ("speed", message.velocity), ("torque", message.effort))
+        said = ((f"{what} {name}", value) for what, values in told for name, value in zip(message.name, values))  # noqa: B905 - lists may be empty
+        rows.append({"time_s": time_s, **dict(said)})
+    headings = list(dict.fromkeys(name for row in rows for name in row)) or ["time_s"]
+    return Table.of(headings, [[row.get(name) for name in headings] for row in rows])
+
+
+def _of_body(poses: Mapping[str, list[list[float]]], body: str | None, problem: str) -> list[list[float]]:
+    """Return the poses of the named body, or of the only one."""
+    if body is None and len(poses) < 2:
+        return next(iter(poses.values()), [])
+    if body is None or body not in poses:
+        what = "several bodies" if body is None else f"no body {body!r}"
+        raise ValueError(f"{problem.format(what)}; choose one by its child_frame_id: {', '.join(sorted(poses))}")
+    return poses[body]
+
+
+def _pose(message: Any, log_time_ns: int) -> list[float]:  # noqa: ANN401 - of any schema
+    """Return the row of a message."""
+    inner = message
+    while (deeper := next(_fields(inner, _NESTED), None)) is not None:
+        inner = deeper
+    place, turn = next(_fields(inner, _PLACES)), next(_fields(inner, _TURNS))
+    return [_time_s(message, log_time_ns), place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
+
+
+def _time_s(message: Any, log_time_ns: int) -> float:  # noqa: ANN401 - of any schema
+    """Return the time of a message's stamp, or else that of the recording."""
+    stamp = next(_fields(getattr(message, "header", message), _STAMPS), None)
+    nanoseconds = 0 if stamp is None else round(stamp.sec * 10**9 + next(_fields(stamp, _NANOSECONDS), 0))
+    return (nanoseconds or log_time_ns) / 1e9
+
+
+def _fields(message: Any, names: tuple[str, ...]) -> Iterator[Any]:  # noqa: ANN401 - of any schema
+    yield from (getattr(message, name) for name in names if hasattr(message, name))

@@ -11,7 +11,7 @@ from mcap.writer import Writer
 from mcap_ros2.writer import Writer as RosWriter
 
 from gaplab import ExtraMissing
-from gaplab.api.clients.mcap_traces import mcap_table
+from gaplab.api.clients.trace_files import mcap_table
 from gaplab.services.world.logs import read_trace
 from gaplab.services.world.world import World
 
