@@ -6,10 +6,10 @@ names first: a store those of the experiments that it loads; workers, which have
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache, lru_cache
+from functools import lru_cache
 from hashlib import sha256
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import FileKind
@@ -29,8 +29,10 @@ MOST_KNOWN = 1_000
 FILES: Mapping[FileKind, type[NamedFile]] = MappingProxyType({each.kind: each for each in (RobotFile, Pool)})
 """What reads each kind of file."""
 
-F = TypeVar("F", bound=NamedFile)
 _known: OrderedDict[str, str] = OrderedDict()
+_read: Mapping[type, Callable[[str], Any]] = {
+    each: lru_cache(maxsize=each.kept)(each.stored) for each in FILES.values()
+}
 
 
 def learn(texts: Iterable[str]) -> None:
@@ -61,7 +63,7 @@ def unknown(specs: Iterable[Mapping[str, Any]]) -> set[str]:
 
 def robot_file(sha256: str) -> RobotFile | None:
     """Return the robot file with this hash; None if this process does not know it."""
-    return _read(RobotFile)(_known[sha256]) if sha256 in _known else None
+    return _read[RobotFile](_known[sha256]) if sha256 in _known else None
 
 
 def pool(sha256: str, name: str) -> Pool:
@@ -75,7 +77,8 @@ def pool(sha256: str, name: str) -> Pool:
     if sha256 not in _known:
         message = f"the pool {name!r} with the hash {sha256!r} is not stored here; add its file: gaplab pool add"
         raise InvalidSpec([Violation("/reality/pool", sha256, message, "a pool that is stored")])
-    return _read(Pool)(_known[sha256])
+    found: Pool = _read[Pool](_known[sha256])
+    return found
 
 
 def needed_by(spec: Mapping[str, Any]) -> tuple[str, ...]:
@@ -86,8 +89,3 @@ def needed_by(spec: Mapping[str, Any]) -> tuple[str, ...]:
 def label_of(robot: PluginRef) -> str:
     """Return the name that people know a robot by."""
     return str(robot.options.get("name") or robot.name) if robot.name == IMPORTED else robot.name
-
-
-@cache
-def _read(kind: type[F]) -> Callable[[str], F]:
-    return lru_cache(maxsize=kind.kept)(kind.stored)

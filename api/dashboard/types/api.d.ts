@@ -446,13 +446,13 @@ declare namespace Api {
   interface PoolRead {
     sha256: string;
     name: string;
+    lost: Array<string>;
+    created_at: string;
     origin: string;
     recordings: number;
     sensors: Array<string>;
     actuators: Array<string>;
     seconds: number;
-    lost: Array<string>;
-    created_at: string;
   }
   type PoolRef = string | Record<string, any>;
   interface Pooled {
@@ -636,12 +636,12 @@ declare namespace Api {
   interface RobotRead {
     sha256: string;
     name: string;
+    lost: Array<string>;
+    created_at: string;
     file: string | null;
     bodies: number;
     actuators: number;
     mass_kg: number;
-    lost: Array<string>;
-    created_at: string;
   }
   interface RobotShapes {
     shapes: Array<Shape>;
