@@ -5,8 +5,7 @@ bus of LeRobot counts ticks, and a controller of ros2_control refuses a trajecto
 """
 
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -26,6 +25,7 @@ NAMES = ("shoulder_lift", "elbow_flex")
 CHANGES_S, TARGETS = (0.0, 0.6), ((0.2, -0.3), (0.5, 0.4))
 STARTS = (0.1, -0.1)
 TICK = 2 * np.pi / 4095
+STATE = "sensor_msgs/msg/JointState"
 
 
 @pytest.fixture(autouse=True)
@@ -105,21 +105,24 @@ class Bus:
     def angles(self) -> list[float]:
         return [(-1 if name in self.turned else 1) * (self.ticks[name] - 2000.5) * TICK for name in NAMES]
 
-    def _value(self, name: str, ticks: int) -> float:
+    def _unit(self, name: str) -> tuple[float, float]:
+        """Return the value of a tick, and the ticks at the value 0."""
         low, high = self.calibration[name].range_min, self.calibration[name].range_max
-        share = (min(high, max(low, ticks)) - low) / (high - low)
-        mode = self.motors[name].norm_mode
-        return {Mode.RANGE_M100_100: share * 200 - 100, Mode.RANGE_0_100: share * 100}.get(
-            mode, (ticks - (low + high) / 2) * 360 / 4095
-        )
+        shares = {
+            Mode.RANGE_M100_100: (200 / (high - low), (low + high) / 2),
+            Mode.RANGE_0_100: (100 / (high - low), low),
+        }
+        return shares.get(self.motors[name].norm_mode, (360 / 4095, (low + high) / 2))
+
+    def _value(self, name: str, ticks: int) -> float:
+        per_tick, zero = self._unit(name)
+        return (ticks - zero) * per_tick
 
     def _ticks(self, name: str, value: float) -> int:
-        low, high = self.calibration[name].range_min, self.calibration[name].range_max
-        if self.motors[name].norm_mode is Mode.RANGE_M100_100:
-            return int((min(100.0, max(-100.0, value)) + 100) / 200 * (high - low) + low)
-        if self.motors[name].norm_mode is Mode.RANGE_0_100:
-            return int(min(100.0, max(0.0, value)) / 100 * (high - low) + low)
-        return int(value * 4095 / 360 + (low + high) / 2)
+        per_tick, zero = self._unit(name)
+        ticks, known = int(value / per_tick + zero), self.calibration[name]
+        within = min(known.range_max, max(known.range_min, ticks))
+        return ticks if self.motors[name].norm_mode is Mode.DEGREES else within
 
 
 class Follower:
@@ -219,54 +222,27 @@ def test_a_motion_that_lerobot_limits_is_not_measured(
         driver.run(motion)
 
 
-@dataclass
-class Stamp:
-    sec: int = 0
-    nanosec: int = 0
+class Ns(int):
+    """A time of ROS, in nanoseconds."""
 
     @property
-    def ns(self) -> int:
-        return self.sec * 10**9 + self.nanosec
+    def nanoseconds(self) -> int:
+        return int(self)
+
+    def __add__(self, other: int) -> "Ns":
+        return Ns(int(self) + int(other))
+
+    def to_msg(self) -> Any:
+        return SimpleNamespace(sec=self // 10**9, nanosec=self % 10**9)
 
 
-@dataclass
-class Header:
-    stamp: Stamp = field(default_factory=Stamp)
-    frame_id: str = ""
+def ns(stamp: Any) -> int:
+    return stamp.sec * 10**9 + stamp.nanosec
 
 
-@dataclass
-class State:
-    header: Header = field(default_factory=Header)
-    name: list[str] = field(default_factory=list)
-    position: list[float] = field(default_factory=list)
-
-
-@dataclass(kw_only=True)
-class Point:
-    positions: list[float] = field(default_factory=list)
-    time_from_start: Stamp = field(default_factory=Stamp)
-
-    def __post_init__(self) -> None:
-        assert all(type(each) is float for each in self.positions), "rclpy takes floats alone"
-
-
-@dataclass(kw_only=True)
-class Trajectory:
-    header: Header = field(default_factory=Header)
-    joint_names: list[str] = field(default_factory=list)
-    points: list[Point] = field(default_factory=list)
-
-
-@dataclass(frozen=True, order=True)
-class Ns:
-    nanoseconds: int
-
-    def __add__(self, other: "Ns") -> "Ns":
-        return Ns(self.nanoseconds + other.nanoseconds)
-
-    def to_msg(self) -> Stamp:
-        return Stamp(*divmod(self.nanoseconds, 10**9))
+def trajectory(joint_names: Sequence[str] = (), points: Sequence[Any] = ()) -> Any:
+    """Return a message, of which rclpy has the type."""
+    return SimpleNamespace(header=SimpleNamespace(stamp=Ns().to_msg()), joint_names=joint_names, points=points)
 
 
 class Ros:
@@ -274,28 +250,29 @@ class Ros:
 
     def __init__(self) -> None:
         self.now_ns, self.angles, self.listeners = 1_700_000_000 * 10**9, [0.0, 0.0], 1
-        self.accepted = list[Trajectory]()
+        self.accepted = list[Any]()
         self._heard: Any = None
         self._line: Any = None
         self.at_s, self.happens = np.inf, lambda: None
 
     def create_publisher(self, kind: Any, topic: str, qos_profile: int) -> Any:
-        assert (kind, topic) == (Trajectory, "/joint_trajectory_controller/joint_trajectory")
+        assert (kind, topic) == (trajectory, "/joint_trajectory_controller/joint_trajectory")
         return SimpleNamespace(publish=self.take, get_subscription_count=lambda: self.listeners)
 
     def create_subscription(self, kind: Any, topic: str, callback: Any, qos_profile: int) -> None:
-        assert (kind, topic) == (State, "/joint_states")
+        assert (kind, topic) == (STATE, "/joint_states")
         self._heard = callback
 
     def get_clock(self) -> Any:
         return SimpleNamespace(now=lambda: Ns(self.now_ns))
 
-    def take(self, message: Trajectory) -> None:
+    def take(self, message: Any) -> None:
         """Follow a trajectory from now on, by lines from where the joints are; ignore an empty one, or of others."""
         if sorted(message.joint_names) != sorted(NAMES) or not message.points:
             return
-        start_ns = message.header.stamp.ns or self.now_ns
-        times = [start_ns + point.time_from_start.ns for point in message.points]
+        assert {type(each) for point in message.points for each in point.positions} == {float}, "rclpy takes no others"
+        start_ns = ns(message.header.stamp) or self.now_ns
+        times = [start_ns + ns(point.time_from_start) for point in message.points]
         assert all(np.diff([self.now_ns, *times]) > 0), "times ascend, and none is over"
         order = [message.joint_names.index(name) for name in NAMES]
         rows = [self.angles, *([point.positions[place] for place in order] for point in message.points)]
@@ -309,9 +286,9 @@ class Ros:
         if (self.now_ns - 1_700_000_000 * 10**9) / 1e9 >= self.at_s:
             self.at_s = np.inf
             self.happens()
-        header = Header(Stamp(*divmod(self.now_ns, 10**9)))
-        self._heard(State(header, ["gripper", *reversed(NAMES)], [0.0, *reversed(self.angles)]))
-        self._heard(State(header, ["wheel"], [1.0]))
+        header = SimpleNamespace(stamp=Ns(self.now_ns).to_msg())
+        for names, angles in ((["gripper", *reversed(NAMES)], [0.0, *reversed(self.angles)]), (["wheel"], [1.0])):
+            self._heard(SimpleNamespace(header=header, name=names, position=angles))
 
 
 @pytest.fixture
@@ -329,9 +306,9 @@ def ros(monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Ros]:
         rclpy__duration={"Duration": lambda *, seconds: Ns(int(seconds * 10**9))},
         rclpy__signals={"SignalHandlerOptions": signals},
         sensor_msgs={},
-        sensor_msgs__msg={"JointState": State},
+        sensor_msgs__msg={"JointState": STATE},
         trajectory_msgs={},
-        trajectory_msgs__msg={"JointTrajectory": Trajectory, "JointTrajectoryPoint": Point},
+        trajectory_msgs__msg={"JointTrajectory": trajectory, "JointTrajectoryPoint": SimpleNamespace},
     )
     driver: Any = drivers.load(EXAMPLES / "ros2_arm.py")
     driver.connect()
@@ -352,7 +329,7 @@ def test_an_arm_of_ros_2_runs_the_motion_and_is_rated_by_its_states(
     sent = node.accepted[0]
     assert [point.positions for point in sent.points[:2]] == [list(STARTS)] * 2
     assert sent.points[0].time_from_start.sec >= 3
-    assert sent.header.stamp.ns == 1_700_000_000 * 10**9
+    assert ns(sent.header.stamp) == 1_700_000_000 * 10**9
 
 
 def test_an_arm_of_ros_2_that_is_stopped_holds_where_it_is(motion: DriverMotion, ros: tuple[Any, Ros]) -> None:
