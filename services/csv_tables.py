@@ -43,18 +43,13 @@ class Row(NamedTuple):
 
     Attributes:
         line: its last line in the file, from 1.
-        cells: texts without spaces around them, and without the apostrophe before what looks like a formula; numbers
-            or None where the file has values.
+        cells: texts, without spaces around them or the apostrophe before what looks like a formula; or numbers.
         error: why the file cannot be read beyond the lines before; "" if it can.
     """
 
     line: int
     cells: Sequence[Any]
     error: str = ""
-
-    def cell(self, place: int) -> Any:  # noqa: ANN401 - as of the file
-        """Return the cell at a place; "" beyond the end of the row."""
-        return self.cells[place] if place < len(self.cells) else ""
 
 
 class Table(NamedTuple):
@@ -72,8 +67,9 @@ class Table(NamedTuple):
 
     @classmethod
     def of(cls, headings: Sequence[str], rows: Sequence[Sequence[object]]) -> "Table":
-        """Return the table of values that a file has without lines; they are counted as in CSV."""
-        return cls(Row(1, headings), [Row(line, row) for line, row in enumerate(rows, start=2)], len(rows) + 1)
+        """Return the table of values that a file has without lines, which are counted as in CSV; None is empty."""
+        cells = (["" if cell is None else cell for cell in row] for row in rows)
+        return cls(Row(1, headings), [Row(line, row) for line, row in enumerate(cells, start=2)], len(rows) + 1)
 
     def csv(self) -> str:
         """Return the table as CSV."""
@@ -87,13 +83,13 @@ def read_csv(text: str) -> Table:
     return Table(next(rows, Row(1, [])), rows, len(lines))
 
 
-def finite(cell: str | float | None) -> float | None:
+def finite(cell: str | float) -> float | None:
     """Return the finite number of a cell; None if it has none. Decimals have a point, and digits have no groups."""
     try:
-        number = float("" if cell is None else cell)
+        number = float(cell)
     except ValueError:
         return None
-    return number if isfinite(number) and not (isinstance(cell, str) and "_" in cell) else None
+    return number if isfinite(number) and "_" not in str(cell) else None
 
 
 def _rows(lines: Sequence[str]) -> Iterator[Row]:

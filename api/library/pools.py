@@ -1,7 +1,7 @@
 """Import of pools: tables and files that a robot's sensors filled are checked line by line, and become recordings."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -132,7 +132,7 @@ def _recordings(path: Path, column: str) -> Iterator[tuple[str, Table]]:
             raise InvalidSpec([Violation("/", column, f"line 1: no column {column!r} names the recordings", columns)])
         place = header.cells.index(column)
         others = header._replace(cells=["" if each == column else each for each in header.cells])
-        for name, lines in groupby(rows, key=lambda row: str(row.cell(place))):
+        for name, lines in groupby(rows, key=lambda row: "".join(map(str, row.cells[place : place + 1]))):
             some = [*lines]
             yield name, Table(others, some, len(some) + 1)
 
@@ -142,20 +142,20 @@ def _read(name: str, table: Table, options: PoolOptions, world: World) -> _Read:
     bare = [match[1] if (match := _BASE.fullmatch(each)) else each for each in table.header.cells]
     unread = {*_VELOCITIES, *_TURNING, *(TRACE_COLUMNS[1:] if world.fixed else ())}
     header = table.header._replace(cells=["" if each in unread else each for each in bare])
-    rows = [*table.rows]
-    if options.seconds is not None and "time_s" in bare:
-        rows = [*_until(rows, bare.index("time_s"), options.seconds)]
+    place = bare.index("time_s") if "time_s" in bare else len(bare)
+    rows = [*_until(table.rows, place, options.seconds or np.inf)]
     first = dict(zip(bare, rows[0].cells if rows else (), strict=False))
     found = mapped(Table(header, rows, len(rows) + 1), options.columns)
     return _Read(name, read_trace(found, f"/{name}", world), first)
 
 
-def _until(rows: Sequence[Row], place: int, seconds: float) -> Iterator[Row]:
+def _until(rows: Iterable[Row], place: int, seconds: float) -> Iterator[Row]:
     """Yield the rows up to the first one after so many seconds, which readings are interpolated to."""
-    begun = finite(rows[0].cell(place)) if rows else None
-    for row in rows:
+    begun = None
+    for number, row in enumerate(rows):
         yield row
-        at = finite(row.cell(place))
+        at = finite(row.cells[place]) if place < len(row.cells) else None
+        begun = at if number == 0 else begun
         if begun is not None and at is not None and at - begun > seconds:
             return
 
@@ -248,5 +248,5 @@ def _row(values: FloatArray | None, places: Any = slice(None)) -> Any:  # noqa: 
 
 
 def _first(row: Mapping[str, Any], names: Sequence[str]) -> Any:  # noqa: ANN401 - a tuple of three numbers, or None
-    found = [finite(row.get(name)) for name in names]
+    found = [finite(row.get(name, "")) for name in names]
     return None if None in found else tuple(found)

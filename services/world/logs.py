@@ -211,18 +211,18 @@ def _lacking(columns: Sequence[_Column], world: World) -> tuple[str, str] | None
 def _table(rows: Iterable[Row], columns: Sequence[_Column]) -> tuple[list[list[float]], list[int], list[str]]:
     """Return the numbers of all rows, their lines, and what is wrong; nothing is read after `MOST_ERRORS`."""
     numbers, lines, errors = list[list[float]](), list[int](), list[str]()
-    for row in rows:
-        found = [finite(row.cell(each.place)) for each in columns]
+    for line, cells, error in rows:
+        found = [finite(cells[each.place]) if each.place < len(cells) else None for each in columns]
         known = [number for number in found if number is not None]
-        if row.error:
-            errors.append(f"line {row.line}: {row.error}")
+        if error:
+            errors.append(f"line {line}: {error}")
         elif len(known) == len(found):
             numbers.append(known)
-            lines.append(row.line)
+            lines.append(line)
         else:
-            wrong = ((each.name, row.cell(each.place)) for each in columns if finite(row.cell(each.place)) is None)
-            shown = ((name, "" if cell is None else str(cell)[:50]) for name, cell in wrong)
-            errors += [f"line {row.line}, {name}: {cell!r} is not a finite number" for name, cell in shown]
+            wrong = (each for each, number in zip(columns, found, strict=True) if number is None)
+            shown = ((each.name, "".join(map(str, cells[each.place : each.place + 1]))[:50]) for each in wrong)
+            errors += [f"line {line}, {name}: {cell!r} is not a finite number" for name, cell in shown]
         if len(errors) >= MOST_ERRORS:
             break
     return numbers, lines, errors
