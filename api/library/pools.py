@@ -17,7 +17,8 @@ from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.csv_tables import Row, Table, finite
 from gaplab.services.world.logs import Trace, read_trace
 from gaplab.services.world.motions import Start
-from gaplab.services.world.pools import DIRECTIONS, JOINTS, PLACES, Channel, Pool, Recorded, said
+from gaplab.services.world.pools import DIRECTIONS, PLACES, Channel, Pool, Recorded, said
+from gaplab.services.world.sensing import JOINTS
 from gaplab.services.world.traces import unlikely_joints
 from gaplab.services.world.world import World
 
@@ -190,10 +191,10 @@ def _channels(options: PoolOptions, world: World, joints: Sequence[int], *, movi
         yield from (Channel(name=each, unit="m", noise=noises["place"]) for each in PLACES)
     if moving and {"base", "direction"} & {*groups}:
         yield from (Channel(name=each, noise=noises["direction"]) for each in DIRECTIONS)
-    units = {"angle": ("rad", "m"), "speed": ("rad/s", "m/s"), "torque": ("N·m", "N")}
     for group in (each for each in JOINTS if each in groups):
+        units = JOINTS[group][1]
         for joint in (world.joints[place] for place in joints):
-            yield Channel(name=f"{group} {joint.name}", unit=units[group][joint.slides], noise=noises[group])
+            yield Channel(name=f"{group} {joint.name}", unit=units[joint.slides], noise=noises[group])
 
 
 def _recorded(

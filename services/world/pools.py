@@ -20,15 +20,12 @@ from gaplab.services.world.controllers.parts import follows_angle
 from gaplab.services.world.kinematics import rotated
 from gaplab.services.world.motions import Motion, Start, Trajectory
 from gaplab.services.world.robot_files import NamedFile
-from gaplab.services.world.sensing import AXES
+from gaplab.services.world.sensing import AXES, JOINTS
 from gaplab.services.world.world import World
 
 PLACES = AXES
 DIRECTIONS = tuple(f"{body} axis {axis}" for body in AXES[:2] for axis in AXES)
 """Sensors of a free base, in metres and without unit."""
-
-JOINTS = ("angle", "speed", "torque")
-"""What encoders say of a joint: the first word of a sensor."""
 
 MOST_BYTES = 8_000_000
 """Largest size of a pool: an archive has it as one row. Fewer readings, or fewer decimals, make it smaller."""
@@ -207,7 +204,6 @@ def fit_violations(pool: Pool, world: World, robot: str, pointer: str) -> Iterat
 
 def said(names: Sequence[str], seen: Trajectory, world: World) -> FloatArray:
     """Return `(..., t, s)`: what sensors of these names say of a trajectory; nan of joints that it does not have."""
-    told = dict(zip(JOINTS, (seen.angles_rad, seen.speeds_rad_s, seen.torques_nm), strict=True))
     places = {joint.name: place for place, joint in enumerate(world.joints)}
 
     def one(name: str) -> FloatArray:
@@ -217,7 +213,7 @@ def said(names: Sequence[str], seen: Trajectory, world: World) -> FloatArray:
             axis, along = divmod(DIRECTIONS.index(name), 3)
             return rotated(seen.orientations, np.eye(3)[axis])[..., along]
         what, _, joint = name.partition(" ")
-        values = told[what]
+        values: FloatArray | None = getattr(seen, JOINTS[what][0])
         return np.full(seen.positions_m.shape[:-1], np.nan) if values is None else values[..., places[joint]]
 
     return np.stack([one(name) for name in names], axis=-1)

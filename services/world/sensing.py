@@ -85,6 +85,16 @@ class Sensors:
 
 
 AXES = ("x", "y", "z")
+
+JOINTS = MappingProxyType(
+    {
+        "angle": ("angles_rad", ("rad", "m")),
+        "speed": ("speeds_rad_s", ("rad/s", "m/s")),
+        "torque": ("torques_nm", ("N·m", "N")),
+    }
+)
+"""Sensors of a joint, by the first word of their names: what of a trajectory each tells; units of hinge and slide."""
+
 WORLDS_KEPT = 64
 
 

@@ -13,7 +13,7 @@ from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.registry import Plugin
 from gaplab.services.world.motions import Trajectory
-from gaplab.services.world.sensing import Bearing, Sensors, feet, in_order, listed, observations
+from gaplab.services.world.sensing import JOINTS, Bearing, Sensors, feet, in_order, listed, observations
 from gaplab.services.world.world import World
 
 
@@ -57,16 +57,7 @@ class Task(Plugin):
         return {"unit": cls.unit, **cls().sensors.details()}
 
 
-JOINTS = MappingProxyType(
-    {
-        "angles": ("angle", ("rad", "m"), "angles_rad"),
-        "speeds": ("speed", ("rad/s", "m/s"), "speeds_rad_s"),
-        "torques": ("torque", ("N·m", "N"), "torques_nm"),
-    }
-)
-"""Groups of sensors of joints: their names, units of hinges and of slides, and what of a trajectory they tell."""
-
-GROUPS = ("base", *JOINTS, "contacts")
+GROUPS = ("base", *(f"{name}s" for name in JOINTS), "contacts")
 """Groups of sensors, in the order of their readings."""
 
 NOISES = MappingProxyType({"tilt": 0.02, "place": 0.005, "angle": 0.002, "speed": 0.05, "torque": 0.05, "contact": 0.5})
@@ -170,7 +161,7 @@ class ReadingTask(Task):
     def _told(self, trajectory: Trajectory, group: str) -> FloatArray:
         if group == "contacts":
             return self._contacts(trajectory)
-        values: FloatArray | None = getattr(trajectory, JOINTS[group][2])
+        values: FloatArray | None = getattr(trajectory, JOINTS[group.removesuffix("s")][0])
         if values is None:
             return np.full((*trajectory.positions_m.shape[:-1], len(self._places)), np.nan)
         return np.asarray(values[..., self._places])
@@ -189,5 +180,6 @@ class ReadingTask(Task):
             return self.base()
         if group == "contacts":
             return [(f"contact {foot.name}", "", self.noise("contact"), 0.0) for foot in feet(world)]
-        name, units, _ = JOINTS[group]
+        name = group.removesuffix("s")
+        units = JOINTS[name][1]
         return [(f"{name} {joint.name}", units[joint.slides], self.noise(name), 0.0) for joint in world.actuators]

@@ -8,8 +8,8 @@ from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.world import robot_library
 from gaplab.services.world.controllers.recorded import RecordedOptions
 from gaplab.services.world.motions import Trajectory
-from gaplab.services.world.pools import JOINTS, said
-from gaplab.services.world.sensing import Sensors
+from gaplab.services.world.pools import said
+from gaplab.services.world.sensing import JOINTS, Sensors
 from gaplab.services.world.tasks.base import Task
 from gaplab.services.world.world import World
 
