@@ -132,21 +132,26 @@ def _stored_pool(session: Session, pool: PoolRef) -> PoolRef:
     return PoolRef(name=row.name, sha256=row.sha256)
 
 
-def stored_ref(store: Store, robot: PluginRef) -> PluginRef:
+@snapshot
+def stored_ref(session: Session, robot: PluginRef) -> PluginRef:
     """Return the hash of the stored robot that a name means; unchanged if a plug-in has the name.
 
     Raises:
-        InvalidSpec: the robot has options, which one from a file does not have, or no robot with its hash is stored.
+        InvalidSpec: the robot has options, which one from a file does not have, or no robot with its hash is stored;
+            the process may know that, but forgets it when it ends.
     """
-    name = robot.name
-    if name == IMPORTED:
-        _check_stored(store, str(robot.options.get("sha256", "")))
-    if name in robots or name in robots.unusable or (found := _newest(store, name)) is None:
+    name, sha256 = robot.name, str(robot.options.get("sha256", ""))
+    if name == IMPORTED and session.get(FileRow, storable(sha256)) is None:
+        message = f"no robot with the hash {sha256!r} is stored here; add its file: gaplab robot add"
+        raise InvalidSpec([Violation("/robot/options/sha256", sha256, message, "the hash of a stored robot")])
+    if name in robots or name in robots.unusable:
+        return robot
+    if (row := files.newest(session, FileKind.ROBOT, storable(name))) is None:
         return robot
     if robot.options:
         message = f"the robot {name} comes from a file, which has no options"
         raise InvalidSpec([Violation("/robot/options", robot.options, message, "left out")])
-    return found
+    return ref_of_file(row.sha256, row.name)
 
 
 def check_samples(store: Store, text: str, driven: Driven) -> SamplesRead:
@@ -158,14 +163,6 @@ def check_samples(store: Store, text: str, driven: Driven) -> SamplesRead:
     with _naming_stored(store):
         robot = robot_of(replace(driven, robot=stored_ref(store, driven.robot)))
     return read_samples(text, robot)
-
-
-@snapshot
-def _check_stored(session: Session, sha256: str) -> None:
-    """Refuse a hash that is not stored; the process may know its robot, but forgets it when it ends."""
-    if session.get(FileRow, storable(sha256)) is None:
-        message = f"no robot with the hash {sha256!r} is stored here; add its file: gaplab robot add"
-        raise InvalidSpec([Violation("/robot/options/sha256", sha256, message, "the hash of a stored robot")])
 
 
 @contextmanager
@@ -183,12 +180,6 @@ def _with_stored_names(store: Store, violation: Violation) -> Violation:
         return violation
     names = {*robots, *snapshot(files.names)(store, FileKind.ROBOT)} - {IMPORTED}
     return unknown_name("/robot", "robot", str(violation.value), sorted(names))
-
-
-@snapshot
-def _newest(session: Session, name: str) -> PluginRef | None:
-    row = files.newest(session, FileKind.ROBOT, storable(name))
-    return None if row is None else ref_of_file(row.sha256, row.name)
 
 
 def catalogued(found: Sequence[RobotRead]) -> tuple[PluginRead, ...]:
