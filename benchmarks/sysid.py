@@ -6,16 +6,19 @@ are compared, with the same tunables and bounds.
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
+from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
-from mujoco import rollout, sysid
 
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.world.pools import Pool
+
+mujoco: Any = import_module("mujoco")  # without types
+rollout: Any = import_module("mujoco.rollout")
+sysid: Any = import_module("mujoco.sysid")
 
 ROUNDS = 25
 """Most iterations; each costs a rollout of each motion for each tunable."""
@@ -60,7 +63,7 @@ class Arm:
             found = sysid.apply_param_modifiers(params, self.spec)
         return frozen([self._error(found, params, each) for each in motions])
 
-    def _modifier(self, label: str) -> Callable[[Any, Any], None] | None:
+    def _modifier(self, label: str) -> Callable[[Any, Any], object] | None:
         name, _, joint = label.removesuffix(")").partition("(")
         fields = {"joint_friction": "frictionloss", "armature": "armature"}
         if name in fields:
@@ -103,7 +106,7 @@ class Arm:
         delay = 0.0 if params is None or "delay" not in params else params["delay"].value[0]
         columns = [np.interp(times_s - delay, own_s, column) for column in angles.T]
         biases = [0.0 if params is None else params[f"bias({joint})"].value[0] for joint in self.pool.joints]
-        return np.array(columns).T + biases
+        return np.asarray(np.array(columns).T + biases)
 
     def _error(self, model: Any, params: Any, number: int) -> FloatArray:  # noqa: ANN401
         times_s, angles = self._measured(number)

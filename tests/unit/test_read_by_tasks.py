@@ -137,7 +137,7 @@ def test_contacts_tell_which_feet_are_on_the_ground() -> None:
     contacts = robot.sensors.values(outcomes[0, 0, 1:])
     assert robot.sensors.names == tuple(f"contact {leg}_shin" for leg in LEGS)
     assert set(np.unique(contacts)) == {0.0, 1.0}
-    together = np.corrcoef(contacts.T)
+    together = np.asarray(np.corrcoef(contacts.T))
     assert together[0, 3] > 0.5 > together[0, 1] + 0.5  # in its trot, diagonal legs move together
 
 

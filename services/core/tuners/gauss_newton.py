@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.linear_models import PRIOR_VARIANCE, LinearModel, cutter
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.tuners.base import Tuner, TuningTask
@@ -136,7 +136,7 @@ class LeastSquares(Tuner):
         freedom = max(1, len(level) - size)
         variance = max(float(level @ level) / freedom, task.misfit.noise)
         covariance = np.linalg.inv(jacobian.T @ jacobian / variance + np.eye(size) / PRIOR_VARIANCE)
-        return _simulators(task, LocalEstimate(place, covariance, freedom), rng)
+        return _simulators(task, LocalEstimate(place, frozen(covariance), freedom), rng)
 
 
 class _Spent(Exception):
