@@ -80,7 +80,7 @@ def kept(path: Path, study: str) -> list[Any]:
 
 
 def test_every_strategy_has_the_numbers_of_the_service() -> None:
-    spec = SMALL | {"strategies": list(strategies)}
+    spec = SMALL | {"strategies": [name for name, each in strategies.items() if not each().senses]}  # a toy has none
 
     result = gaplab.run(spec, workers=2)
 
