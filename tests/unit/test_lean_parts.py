@@ -204,7 +204,7 @@ class TestEqualRollouts:
 
 class TestWeightiest:
     def test_the_first_selection_is_in_all_simulators_and_later_ones_in_the_weightiest(self) -> None:
-        for name in DIVERSE:
+        for name in set(DIVERSE) - {"fit_unless_near"}:  # that asks the best simulator, unless a sample is near
             simulate = Recorder()
             steps = repetition(small_setting(name, {"simulators": 6, "weightiest": 2}, simulate=simulate))
             counts = []
