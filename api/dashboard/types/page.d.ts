@@ -38,7 +38,7 @@ declare namespace Page {
   type Choices = [value: string, label: string, disabled?: boolean][];
 
   /** A name as the API takes it: a plug-in without options is its bare name. */
-  type PluginName = string | { name: string; options?: Record<string, any> };
+  type PluginName = string | { name: string; preset?: string; options?: Record<string, any> };
 
   /** How loading ended: it failed and an earlier answer stands, the service still computes, or neither. */
   type Loaded = "failed" | "pending" | void;
