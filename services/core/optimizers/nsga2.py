@@ -1,4 +1,8 @@
-"""NSGA-II: several objectives at once, by fronts of members that none dominates, and by their distance in a front."""
+"""NSGA-II: several objectives at once, by fronts of members that none dominates, and by their distance in a front.
+
+It is NumPy: pymoo, whose fronts and distances the tests compare with these, would bring compiled libraries for sixty
+lines, and its variation knows no genes that wrap. Fronts take n² comparisons, less than a millisecond for 40 members.
+"""
 
 from typing import Annotated, ClassVar
 
