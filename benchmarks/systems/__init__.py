@@ -1,0 +1,1 @@
+"""Whether systems from elsewhere do here what their authors say."""

@@ -1,0 +1,34 @@
+"""Whether each system from elsewhere does here what its authors say: `python -m benchmarks.systems NAME …`.
+
+Each check is a few studies at desk scale, and claims that are judged on them. A study is read from the folder of
+studies if it is there as an archive, or else computed and kept there; an interrupted one goes on. `--smoke` tries the
+studies at a size that shows nothing.
+
+A claim holds if the 90 % interval of its difference is on its side of 0, fails if that is on the other side, and is
+open otherwise. Repetitions are the unit; the interval is Welch's.
+"""
+
+from argparse import ArgumentParser
+from pathlib import Path
+
+from benchmarks.systems import cited, later  # noqa: F401 - each check registers itself
+from benchmarks.systems.judging import FOLDER, SMOKE, SYSTEMS
+
+
+def main() -> None:
+    """Print the claims of the systems that are named, or of all."""
+    parser = ArgumentParser(prog="python -m benchmarks.systems", description=__doc__)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(SYSTEMS)}; default: all")
+    parser.add_argument("--folder", type=Path, default=FOLDER, help="of the studies; default: docs/studies")
+    parser.add_argument("--smoke", action="store_true", help="try the studies at a tiny size; name another folder too")
+    arguments = parser.parse_args()
+    if unknown := set(arguments.names) - set(SYSTEMS):
+        parser.error(f"no system is called {', '.join(sorted(unknown))}")
+    for name in arguments.names or SYSTEMS:
+        print(f"{name}:")
+        for claim in SYSTEMS[name].claims(arguments.folder, SMOKE if arguments.smoke else {}):
+            print(claim)
+
+
+if __name__ == "__main__":
+    main()
