@@ -1,8 +1,8 @@
-"""The model of what experiments cost, which comes with a question about their results and not with their specs."""
+"""The model of what experiments cost: of a question about their results, or of a spec that is to stay within it."""
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from gaplab.schemas.base import Frozen
 
@@ -64,6 +64,19 @@ class CostModel(Frozen):
             return f"Time: {f'{evaluations} and ' if self.cost_s else ''}{simulation}, mean over repetitions."
         attended = f"{self.attention:g} an hour of {evaluations}, {self.wear:g} for the wear of each"
         return f"Cost: {attended}, and {self.machine:g} an hour of {simulation}, mean over repetitions."
+
+
+class Stop(CostModel):
+    """What a repetition may take: its iterations are as many as are expected to stay within it."""
+
+    x: Literal["rollouts", "time", "cost"] = Field("cost", description="what may not be exceeded")
+    at: float = Field(gt=0, le=1e12, description="the most: rollouts, seconds, or a cost in the unit of the prices")
+
+    @model_validator(mode="after")
+    def _check_the_seconds(self) -> "Stop":
+        if self.measures:
+            raise ValueError(f"rollout_s, the seconds of a rollout, is needed where {self.x} may not be exceeded")
+        return self
 
 
 OF_EVALUATIONS = CostModel()

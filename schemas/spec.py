@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, Discriminator, Field, Tag, model_validator
 
 from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Read, Real, Repetitions, Seed, from_name
+from gaplab.schemas.costs import Stop
 from gaplab.schemas.measurements import Beyond, KnownSample, LimitsSpec
 from gaplab.schemas.plugin import Named, PluginRef, TunableRef
 
@@ -144,6 +145,12 @@ class SharedSettings(Frozen):
         "measure nothing",
     )
     repetitions: Repetitions | None = Field(None, description="repetitions of each experiment; the paper: 40")
+    stop: Stop | None = Field(
+        None,
+        exclude_if=_is_none,
+        description="rollouts, time or cost that no repetition may exceed: each strategy has as many iterations as are "
+        "expected to stay within it, `iterations` at most. It counts all searches as full. `direct` counts at any cost",
+    )
     robot: PluginRef = PluginRef(name="quadruped")
     controller: PluginRef | None = Field(
         None, description="how a genome drives the actuators; default: the robot's own"

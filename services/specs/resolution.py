@@ -3,11 +3,13 @@
 From a resolved spec follow the number of rollouts that it costs, and the hardware that it moves.
 """
 
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Sequence
 from hashlib import sha256
 from typing import Any
 
+from gaplab.schemas.costs import Stop
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedBudget, ResolvedSpec
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
@@ -97,9 +99,10 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         raise InvalidSpec(violations)
     plugins = {each.kind: (ref := getattr(spec, each.kind)) and completed(each, ref) for each in NEED_NO_OTHERS}
     plugins["strategy"] = with_proper_labels(plugins["strategy"], strategy.named_tunables)
-    return ResolvedSpec.filled_from(
+    resolved = ResolvedSpec.filled_from(
         spec,
         **plugins,
+        stop=None,
         name=spec.name or _label(strategy, spec),
         iterations=iterations,
         repetitions=spec.repetitions or preset.repetitions,
@@ -109,6 +112,25 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         reality=resolved_reality(spec, robot, real, reality_engine),
         budget=budget,
     )
+    return resolved if spec.stop is None or strategy.in_reality else _affordable(resolved, spec.stop)
+
+
+def _affordable(spec: ResolvedSpec, stop: Stop) -> ResolvedSpec:
+    """Return a spec with as many of its iterations as are expected to stay within a cost.
+
+    Raises:
+        InvalidSpec: not even the first does.
+    """
+    planned = spec.iterations if takes_samples(spec) else 0
+
+    def cost(iterations: int) -> float:
+        return stop.of(iterations, expected_rollouts(spec.model_copy(update={"iterations": iterations})), 0.0)
+
+    if (least := cost(min(1, planned))) > stop.at:
+        message = f"{spec.name} takes {least:.6g} until its first result, which exceeds {stop.at:.6g}"
+        raise InvalidSpec([Violation("/stop/at", stop.at, message, f"at least {least:.6g}")])
+    iterations = bisect_right(range(planned + 1), stop.at, key=cost) - 1
+    return spec.model_copy(update={"iterations": iterations}) if planned else spec
 
 
 def _iterations(spec: ExperimentSpec, strategy: Strategy, preset: Preset) -> int:

@@ -317,3 +317,27 @@ def test_expected_rollouts_follow_from_how_many_simulators_an_evaluation_needs(
     )
 
     assert expected_rollouts(resolved) == expected
+
+
+def test_each_strategy_has_as_many_iterations_as_stay_within_a_cost() -> None:
+    named = ["simulated_fit", "informative", "domain_randomization", "direct"]
+    study = StudySpec.model_validate({"strategies": named, "robot": "toy_function", "budget": "desk", "iterations": 9})
+    stop = {"x": "time", "at": 400.0, "cost_s": 30.0, "rollout_s": 0.02}
+    whole = resolve(study)
+    paid = resolve(StudySpec.model_validate(study.model_dump(exclude_unset=True) | {"stop": stop}))
+
+    def seconds(spec: ResolvedSpec, iterations: int) -> float:
+        return 30.0 * iterations + 0.02 * expected_rollouts(spec.model_copy(update={"iterations": iterations}))
+
+    for before, after in zip(whole[:2], paid[:2], strict=True):
+        assert 0 < after.iterations < 9
+        assert seconds(before, after.iterations) <= 400.0 < seconds(before, after.iterations + 1)
+        assert after == before.model_copy(update={"iterations": after.iterations})
+    assert paid[2:] == whole[2:]
+
+
+def test_a_cost_that_pays_for_nothing_is_refused() -> None:
+    found = refused(robot="toy_function", budget="desk", stop={"x": "rollouts", "at": 100})
+    assert (found["/stop/at"].value, found["/stop/at"].permitted) == (100.0, "at least 1350")
+    with pytest.raises(ValidationError, match="rollout_s, the seconds of a rollout, is needed where cost"):
+        experiment(stop={"at": 5, "cost_s": 60})

@@ -308,6 +308,7 @@ declare namespace Api {
     max_parallel: number | null;
     iterations: number | null;
     repetitions: number | null;
+    stop: Stop | null;
     robot: PluginRef;
     controller: PluginRef | null;
     task: PluginRef | null;
@@ -713,6 +714,7 @@ declare namespace Api {
   interface SensitivitySpec {
     iterations: number | null;
     repetitions: number | null;
+    stop: Stop | null;
     robot: PluginRef;
     controller: PluginRef | null;
     task: PluginRef | null;
@@ -793,6 +795,16 @@ declare namespace Api {
     rollouts: number;
     budget: number;
   }
+  interface Stop {
+    x: "rollouts" | "time" | "cost";
+    cost_s: number;
+    rollout_s: number | null;
+    cores: number;
+    machine: number;
+    attention: number;
+    wear: number;
+    at: number;
+  }
   interface StudyRead {
     id: string;
     name: string;
@@ -812,6 +824,7 @@ declare namespace Api {
     max_parallel: number | null;
     iterations: number | null;
     repetitions: number | null;
+    stop: Stop | null;
     robot: PluginRef;
     controller: PluginRef | null;
     task: PluginRef | null;

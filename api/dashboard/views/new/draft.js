@@ -37,6 +37,7 @@ export function draftOf(spec, catalogue) {
     tuner: pluginDraft(spec.tuner ?? defaults.tuner),
     tunables: tunableDrafts(spec.tunables ?? usualTunables(pluginDraft(spec.robot ?? defaults.robot).name, catalogue), catalogue),
     tunablesOf: pluginDraft(spec.robot ?? defaults.robot).name,
+    stop: { ...spec.stop },
     ...realityDraft(spec.reality ?? {}),
     budget: {
       preset: budget.preset ?? defaults.budget.preset,
@@ -139,6 +140,7 @@ export function specOf(draft) {
     discrepancy: draft.bench.isRecorded && discrepancy.name === "squared_fitness" ? "" : pluginName(discrepancy),
     tuner: pluginName(tuner),
     tunables: ticked(tunables).map(({ name, lower, upper }) => shortest({ name, ...withoutEmpty(typedValues({ lower, upper })) })),
+    stop: withoutEmpty(typedValues(draft.stop)),
     reality: realityOf(draft),
     budget: budgetOf(budget),
     ...typedValues(Object.fromEntries(COUNTS.map((name) => [name, draft[name]]))),

@@ -78,10 +78,25 @@ export function sizeStep(form) {
       h("div", { class: "fields" }, ...searches,
         countField("direct_repetitions", "Repetitions of the direct baseline", "", "as the strategies"),
         countField("priority", "Priority", "−10 to 10; the highest is computed first", "0"),
-        countField("max_parallel", "Repetitions at once", "of an experiment", "any number")),
+        countField("max_parallel", "Repetitions at once", "of an experiment", "any number"),
+        ...stopFields(form)),
       tickField("Reuse the transferred controller as the next sample, where a strategy would only search for it again. This saves rollouts, but makes comparisons unfair: other strategies select from a search of their own",
         budget.reuse_transfer, form.setter(budget, "reuse_transfer")).element));
 }
+
+/** @type {[name: string, label: string, hint: string, placeholder: string][]} */
+const STOP = [
+  ["at", "Stop at", "rollouts, seconds, or a cost in your unit: each strategy has as many iterations as stay within it", "all iterations"],
+  ["cost_s", "Time of a real-world evaluation", "s", "0"], ["rollout_s", "Time of a rollout on a core", "s", ""],
+  ["cores", "Cores", "that share the rollouts", "1"], ["machine", "Price of the machine", "an hour", "1"],
+  ["attention", "Price of attention", "an hour of real-world evaluations", "1"], ["wear", "Price of wear", "of one real-world evaluation", "0"],
+];
+
+/** Return what may not be exceeded, and the prices. @param {Form} form */
+const stopFields = ({ draft: { stop }, places, setter }) => [
+  field({ label: "Limit of", value: stop.x ?? "", set: setter(stop, "x"), pointer: "/stop/x", places, choices: [["", "cost"], ["time", "time"], ["rollouts", "rollouts"]] }),
+  ...STOP.map(([name, label, hint, placeholder]) => numberField({ label, hint, placeholder, value: stop[name] ?? "", set: setter(stop, name), places, pointer: `/stop/${name}` })),
+];
 
 /** Return the strategies that are compared, each with its options; one can be there several times. @param {Form} form */
 function strategies(form) {
