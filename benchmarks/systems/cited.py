@@ -7,6 +7,7 @@ import numpy as np
 from scipy import stats
 
 from benchmarks.systems.judging import DESK, Arm, Claim, Spec, above, check, not_above
+from benchmarks.systems.rows import compared
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.loop import repetition
@@ -56,8 +57,10 @@ def _selected(arm: Arm, iteration: int) -> tuple[FloatArray, FloatArray]:
 @check(
     surrogate_toy=DESK
     | {"strategies": ["surrogate", "direct"], "robot": "toy_function", "engine": "analytic", "repetitions": 20},
-    surrogate=DESK
-    | {"strategies": ["surrogate", "known_fit", "simulated_fit", "fit_unless_near", "residual", "direct"]},
+    surrogate=compared(
+        *("inside", "surrogate of reality", "known fit", "simulated fit"),
+        *("fit unless near", "surrogate of the residual", "direct"),
+    ),
 )
 def surrogate(surrogate_toy: list[Arm], surrogate: list[Arm]) -> Iterator[Claim]:
     """Judge what Hemker et al. say of few parameters, and what is expected of 24."""
@@ -94,7 +97,7 @@ REPERTOIRE: Spec = {"preset": "desk", "controller_evaluations": 2_000, "selectio
 @check(
     trial_and_error=DESK | {"strategies": [BY_CONTACTS], "task": CONTACTS, "budget": REPERTOIRE},
     trial_and_error_tilt=DESK | {"strategies": [BY_TILT], "budget": REPERTOIRE},
-    trial_and_error_fit=DESK | {"strategies": ["simulated_fit"]},
+    trial_and_error_fit=compared("inside", "simulated fit"),
 )
 def trial_and_error(
     trial_and_error: list[Arm], trial_and_error_tilt: list[Arm], trial_and_error_fit: list[Arm]
@@ -125,20 +128,15 @@ def _best_of_repertoire(arm: Arm) -> FloatArray:
 
 @check(
     transferability=DESK
-    | {
-        "strategies": [
-            "transferability",
-            {"name": "transferability", "preset": "as_published"},
-            "simulated_fit",
-            "direct",
-        ],
-        "reality": {"engine": "physx"},
-    },
-    transferability_inside=DESK | {"strategies": ["transferability", "simulated_fit"]},
+    | {"strategies": [{"name": "transferability", "preset": "as_published"}], "reality": {"engine": "physx"}},
+    transferability_outside=compared("outside", "transferability", "simulated fit", "direct"),
+    transferability_inside=compared("inside", "transferability", "simulated fit"),
 )
-def transferability(transferability: list[Arm], transferability_inside: list[Arm]) -> Iterator[Claim]:
+def transferability(
+    transferability: list[Arm], transferability_outside: list[Arm], transferability_inside: list[Arm]
+) -> Iterator[Claim]:
     """Judge what Koos et al. say, and that tuning wins where reality is within the simulators' span, not beyond."""
-    plain, published, fit, direct = transferability
+    (published,), (plain, fit, direct) = transferability, transferability_outside
     inside, inside_fit = transferability_inside
     best = direct.measured(0, "probe")
     margin = 0.05 * float(np.nanmean(best))

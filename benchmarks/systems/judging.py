@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,7 @@ Spec = dict[str, Any]
 
 FOLDER = Path(__file__).parents[2] / "docs" / "studies"
 DESK: Spec = {"robot": "quadruped", "engine": "mujoco", "budget": "desk", "iterations": 10, "repetitions": 10}
-SMOKE: Spec = {"budget": "smoke", "repetitions": 2, "direct_repetitions": 2}
+SMOKE: Spec = {"budget": {"preset": "smoke", "controller_evaluations": 400}, "repetitions": 2, "direct_repetitions": 2}
 
 
 @dataclass(frozen=True)
@@ -109,32 +109,36 @@ class Arm:
         return np.array([simulation(genome[None], simulator[None])[0, 0] for genome, simulator in pairs])
 
 
+Reads = Callable[[Path, Spec], list[Arm]]
+"""Returns experiments, given the folder of studies and changes of their specs."""
+
+
 @dataclass(frozen=True)
 class System:
     """The check of a system.
 
     Attributes:
-        studies: their specs, by label.
+        studies: their specs by label, or functions that read experiments of others.
         judge: returns the claims, given the experiments of each study, in the order of its strategies.
     """
 
-    studies: Mapping[str, Spec]
+    studies: Mapping[str, Spec | Reads]
     judge: Callable[..., Iterator[Claim]]
 
     def claims(self, folder: Path, changes: Spec) -> Iterator[Claim]:
         """Yield the claims, judged; studies that are missing in the folder are computed, with these changes."""
-        yield from self.judge(**{label: arms(label, spec | changes, folder) for label, spec in self.studies.items()})
+        yield from self.judge(**{label: self._read(label, folder, changes) for label in self.studies})
+
+    def _read(self, label: str, folder: Path, changes: Spec) -> list[Arm]:
+        found = self.studies[label]
+        if callable(found):
+            return found(folder, changes)
+        return arms(f"system-{label.replace('_', '-')}", found | changes, folder)
 
 
-def arms(label: str, spec: Spec, folder: Path) -> list[Arm]:
-    """Return the experiments of a study, in the order of its strategies, from its archive or by computing it."""
-    name = f"system-{label.replace('_', '-')}"
-    archive, database = folder / f"{name}.zip", folder / f"{name}.db"
-    if archive.exists():
-        result = gaplab.run(archive)
-    else:
-        result = gaplab.run(database if database.exists() else {"name": name, "seed": 2026} | spec, path=database)
-        result.save(archive)
+@lru_cache(maxsize=4)
+def _arms(archive: Path) -> list[Arm]:
+    result = gaplab.run(archive)
     samples, simulators = result.samples, result.simulators
     with result._store.reading() as session:
         ids = {each.id: [row.id for row in repetitions_of(session, each.id)] for each in result.study.experiments}
@@ -150,10 +154,23 @@ def arms(label: str, spec: Spec, folder: Path) -> list[Arm]:
     ]
 
 
+def arms(label: str, spec: Spec, folder: Path) -> list[Arm]:
+    """Return the experiments of a study, in the order of its strategies, from its archive or by computing it."""
+    return _arms(computed(label, spec, folder))
+
+
+def computed(name: str, spec: Spec, folder: Path) -> Path:
+    """Return the archive of a study, which is computed if it is not there; an interrupted one goes on."""
+    archive, database = folder / f"{name}.zip", folder / f"{name}.db"
+    if not archive.exists():
+        gaplab.run(database if database.exists() else {"name": name, "seed": 2026} | spec, path=database).save(archive)
+    return archive
+
+
 SYSTEMS: dict[str, System] = {}
 
 
-def check(**studies: Spec) -> Callable[[Callable[..., Iterator[Claim]]], Callable[..., Iterator[Claim]]]:
+def check(**studies: Spec | Reads) -> Callable[[Callable[..., Iterator[Claim]]], Callable[..., Iterator[Claim]]]:
     """Register a function as the check of the system with its name, on these studies."""
 
     def register(judge: Callable[..., Iterator[Claim]]) -> Callable[..., Iterator[Claim]]:

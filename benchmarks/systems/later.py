@@ -5,22 +5,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.systems.judging import DESK, Arm, Claim, Spec, above, check
+from benchmarks.systems.rows import SETTINGS, compared
 from gaplab.services.core.arrays import FloatArray
 
 # SimOpt
 
-SENSED: Spec = DESK | {"discrepancy": {"name": "readings", "options": {"absolute_weight": 0.5}}}
-
 
 @check(
-    simopt=SENSED
-    | {
-        "strategies": [{"name": "weighted", "preset": "chebotar_2019"}],
-        "tuner": "simopt",
-        "budget": {"preset": "desk", "simulator_evaluations": 620},
-    },
-    simopt_search=SENSED
-    | {"strategies": ["simulated_fit"], "budget": {"preset": "desk", "simulator_evaluations": 620}},
+    simopt=compared("inside", "SimOpt"),
+    simopt_search=DESK | SETTINGS["simopt"] | {"tuner": "search", "strategies": ["simulated_fit"]},
 )
 def simopt(simopt: list[Arm], simopt_search: list[Arm]) -> Iterator[Claim]:
     """Judge what Chebotar et al. say: a few iterations suffice, and beat the distribution that one begins with."""
@@ -56,13 +49,7 @@ def _away(arm: Arm, iteration: int) -> FloatArray:
 # Bayesian domain randomization
 
 
-@check(
-    bayrn=DESK
-    | {
-        "strategies": ["bayrn", "simulated_fit", "domain_randomization"],
-        "budget": {"preset": "desk", "reuse_transfer": True},
-    }
-)
+@check(bayrn=compared("inside", "BayRn", "simulated fit", "domain randomization"))
 def bayrn(bayrn: list[Arm]) -> Iterator[Claim]:
     """Judge what Muratore et al. say, and that tuning wins where reality is among the simulators."""
     learned, tuned, randomized = bayrn
@@ -83,23 +70,15 @@ def bayrn(bayrn: list[Arm]) -> Iterator[Claim]:
 
 # Interleaved evolution
 
-IN_TURN: Spec = {
-    "preset": "desk",
-    "controller_evaluations": 100,
-    "selection_evaluations": 100,
-    "simulator_evaluations": 50,
-}
-WARM: Spec = {"name": "search", "options": {"warm_start": True}}
-
 
 @check(
-    interleaved=DESK
-    | {"strategies": ["interleaved", "simulated_fit_and_informative", "direct"], "budget": IN_TURN, "tuner": WARM},
-    interleaved_anew=DESK | {"strategies": ["simulated_fit_and_informative"]},
+    interleaved=DESK | SETTINGS["turns"] | {"strategies": ["simulated_fit_and_informative"]},
+    interleaved_turns=compared("inside", "interleaved evolution", "direct"),
+    interleaved_anew=compared("inside", "simulated fit and informative"),
 )
-def interleaved(interleaved: list[Arm], interleaved_anew: list[Arm]) -> Iterator[Claim]:
+def interleaved(interleaved: list[Arm], interleaved_turns: list[Arm], interleaved_anew: list[Arm]) -> Iterator[Claim]:
     """Judge what the paper expects of its future work: as fit controllers for fewer evaluations."""
-    (turns, small, direct), (large,) = interleaved, interleaved_anew
+    (small,), (turns, direct), (large,) = interleaved, interleaved_turns, interleaved_anew
     margin = 0.05 * float(np.nanmean(direct.measured(0, "probe")))
     for says, of in (("recorded", Arm.recorded), ("transferred alone", lambda arm, at: arm.measured(at, "probe"))):
         first, second, third = (of(arm, 10) for arm in (turns, small, large))

@@ -1,0 +1,256 @@
+"""All systems on one robot, reality, budget and statistics: `python -m benchmarks.systems.comparison`.
+
+Studies are read from docs/studies, or computed there; docs/comparison.md and its figure are written from them. With
+names of studies, like `inside-fitness`, only these are computed, and nothing is written.
+"""
+
+from argparse import ArgumentParser
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+
+from benchmarks.findings import import_file, private_store
+from benchmarks.reproduction.results import table
+from benchmarks.systems.judging import FOLDER, SMOKE, computed
+from benchmarks.systems.rows import REALITIES, ROWS, SETTINGS, label, study
+from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.costs import CostModel
+from gaplab.schemas.curves import Fitness
+from gaplab.services.figures.marks import Axis, Bars, FigureDefinition, Level, Panel, Points
+from gaplab.services.figures.matplotlib.files import Look, render_file
+from gaplab.services.figures.style import Style, strategy_style
+from gaplab.services.findings.statistics import SIGNIFICANT
+from gaplab.services.findings.wording import MISSING, listed
+from gaplab.services.results.comparisons import compare
+from gaplab.services.store.session import Store
+
+KINDS = (Fitness.TRANSFERRED, Fitness.EQUAL_CHANCES)
+EQUAL: dict[str, tuple[CostModel, float | None]] = {
+    "ten evaluations": (CostModel(), None),
+    "7,000 rollouts": (CostModel(x="rollouts"), 7_000.0),
+    "a cost of 10": (CostModel(x="cost", cost_s=120.0, rollout_s=1.0, cores=2.0, attention=40.0), 10.0),
+}
+"""What is equal. An evaluation takes two minutes of a person at 40 an hour, a rollout a second on one of two cores of a
+machine at 1 an hour; 7,000 rollouts are what systems take that tune nothing."""
+
+TITLES = {
+    "inside": "inside",
+    "inside-noisy": "inside, noise",
+    "outside": "outside",
+    "outside-noisy": "outside, noise",
+}
+WIDTH_IN = 9.0
+HEIGHT = 4.6
+"""Of a panel, as a factor of the usual height: each system has a line of text."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A system in a column: fitness over direct and its interval, and whether others are shown to be better."""
+
+    mean: float
+    lower: float
+    upper: float
+    beaten: bool
+
+
+@dataclass(frozen=True)
+class Column:
+    """Systems in one reality at one thing equal; places are those of `ROWS`.
+
+    Attributes:
+        cells: by place; none where a system ended with less.
+        above: pairs of places of which the first is shown to be better, after Holm's correction over all pairs.
+    """
+
+    cells: Mapping[int, Cell]
+    above: frozenset[tuple[int, int]]
+
+    @property
+    def unbeaten(self) -> list[int]:
+        """Return the places of systems that none is shown to be better than, the best mean first."""
+        ranked = sorted(self.cells, key=lambda place: -self.cells[place].mean)
+        return [place for place in ranked if not self.cells[place].beaten]
+
+
+def column(store: Store, ids: Sequence[str], kind: Fitness, equal: str) -> Column:
+    """Return a column of the table; the reference is `direct`, the last row."""
+    model, amount = EQUAL[equal]
+    pairs = compare(store, ids, fitness=kind, model=model, at=amount, intervals=True)
+    found = dict[int, tuple[float, float, float]]()
+    above = set[tuple[int, int]]()
+    for (first, second), pair in zip(combinations(range(len(ids)), 2), pairs, strict=True):
+        for place, summary in ((first, pair.summary_first), (second, pair.summary_second)):
+            if (value := summary.mean.value) is not None:
+                lower, upper = (value if end is None else end for end in (summary.mean.lower, summary.mean.upper))
+                found[place] = (value, lower, upper)
+        if _shown(pair):
+            above.add((first, second) if (pair.difference or 0.0) > 0 else (second, first))
+    unit = found[len(ids) - 1][0]
+    beaten = {worse for better, worse in above if better < len(ids) - 1}
+    return Column(
+        {
+            place: Cell(mean / unit, lower / unit, upper / unit, place in beaten)
+            for place, (mean, lower, upper) in sorted(found.items())
+        },
+        frozenset(above),
+    )
+
+
+def _shown(pair: Comparison) -> bool:
+    return pair.trusted.p_holm is not None and pair.trusted.p_holm < SIGNIFICANT
+
+
+Columns = Mapping[tuple[str, str, Fitness], Column]
+"""By reality, what is equal, and whose fitness counts."""
+
+
+def columns(folder: Path) -> dict[tuple[str, str, Fitness], Column]:
+    """Return every column, from the studies in a folder; one that is missing is computed."""
+    found = dict[tuple[str, str, Fitness], Column]()
+    for reality in REALITIES:
+        with private_store() as store:
+            ids = dict[int, str]()
+            for settings in SETTINGS:
+                archive = computed(label(reality, settings), study(reality, settings), folder)
+                places = [place for place, row in enumerate(ROWS) if row.settings == settings]
+                ids |= zip(places, import_file(store, archive).experiments, strict=True)
+            ordered = [ids[place] for place in range(len(ROWS))]
+            for equal in EQUAL:
+                found |= {(reality, equal, kind): column(store, ordered, kind, equal) for kind in KINDS}
+    return found
+
+
+def figure(found: Columns) -> FigureDefinition:
+    """Return the fitness of all systems after ten evaluations: a panel for each reality, a row for each system."""
+    ticks = tuple((float(-place), row.name) for place, row in enumerate(ROWS))
+    at = {reality: [found[reality, "ten evaluations", kind] for kind in KINDS] for reality in REALITIES}
+    every = [cell for both in at.values() for each in both for cell in each.cells.values()]
+    ends = (min(cell.lower for cell in every) - 0.02, max(cell.upper for cell in every) + 0.02)
+    panels = []
+    for number, (reality, (alone, chances)) in enumerate(at.items()):
+        marks = [Level("direct", 1.0, upright=True), *_dots(alone), *_hollow(chances)]
+        left = Axis("", (0.5 - len(ROWS), 0.5), ticks=ticks if number == 0 else tuple((y, "") for y, _ in ticks))
+        below = Axis("fitness over direct", ends)
+        panels.append(Panel(tuple(marks), below, left, title=TITLES[reality], height=HEIGHT))
+    caption = (
+        "Ten real-world evaluations, n = 10. Dots: transferred controllers, with 95 % intervals; rings: equal chances."
+    )
+    return FigureDefinition("comparison", "", tuple(panels), caption, caption, columns=len(REALITIES))
+
+
+def _dots(one: Column) -> Iterator[Bars | Points]:
+    for place, cell in one.cells.items():
+        style = _style(place)
+        yield Bars("", ((cell.lower, cell.upper, float(-place)),), style, thickness=0.12)
+        yield Points("", (cell.mean,), (float(-place),), style, size=0.8)
+
+
+def _hollow(one: Column) -> Iterator[Points]:
+    for place, cell in one.cells.items():
+        yield Points("", (cell.mean,), (float(-place),), _style(place), size=0.8, hollow=True)
+
+
+def _style(place: int) -> Style:
+    given = ROWS[place].strategy
+    style = strategy_style(given if isinstance(given, str) else given["name"])
+    return Style(style.color, "solid", "circle")
+
+
+def rows(found: Columns) -> str:
+    """Return the table: percent of direct, of transferred controllers alone and with equal chances."""
+    keys = [(reality, equal) for equal in EQUAL for reality in REALITIES]
+    head = ["system", *(f"{TITLES[reality]}: {equal}" for reality, equal in keys)]
+    lines, group = [], ""
+    for place, row in enumerate(ROWS):
+        if row.group != group:
+            group = row.group
+            lines.append([f"*{group}*", *[""] * len(keys)])
+        cells = [[found[(*key, kind)].cells.get(place) for kind in KINDS] for key in keys]
+        lines.append([row.name, *(" · ".join(map(_percent, pair)) for pair in cells)])
+    return table(head, lines)
+
+
+def _percent(cell: Cell | None) -> str:
+    if cell is None:
+        return MISSING
+    return f"{100 * cell.mean:.0f}" if cell.beaten else f"**{100 * cell.mean:.0f}**"
+
+
+def reversals(found: Columns) -> list[str]:
+    """Return the pairs of which each is shown to be better than the other in some column, in words."""
+    told = []
+    for first, second in combinations(range(len(ROWS) - 1), 2):
+        wins, losses = (
+            [_where(key) for key, one in found.items() if pair in one.above]
+            for pair in ((first, second), (second, first))
+        )
+        if wins and losses:
+            names = ROWS[first].name, ROWS[second].name
+            told.append(f"{names[0]} above {names[1]}: {'; '.join(wins)}. The other way: {'; '.join(losses)}.")
+    return told
+
+
+def _where(key: tuple[str, str, Fitness]) -> str:
+    reality, equal, kind = key
+    return f"{TITLES[reality]}, {equal}, {kind.words}"
+
+
+def page(found: Columns) -> str:
+    """Return the document."""
+    text = (Path(__file__).parent / "comparison.md").read_text("utf-8")
+    best = "\n".join(f"- {line}" for line in answers(found))
+    turned = "\n".join(f"- {line}" for line in reversals(found)) or "- No pair of systems is shown in both directions."
+    return text.format(table=rows(found), answers=best, reversals=turned)
+
+
+def answers(found: Columns) -> Iterator[str]:
+    """Yield, for each reality at ten evaluations, the best system and how many none is shown to beat."""
+    for reality in REALITIES:
+        told = []
+        for kind in KINDS:
+            one = found[reality, "ten evaluations", kind]
+            leads = [place for place in one.unbeaten if place < len(ROWS) - 1]
+            best = one.cells[leads[0]]
+            told.append(
+                f"{kind.words}: {ROWS[leads[0]].name}, {best.mean:.2f} ({best.lower:.2f} to {best.upper:.2f}) of "
+                f"direct; {len(leads)} of {len(ROWS) - 1} systems are not shown to be worse than another"
+            )
+        yield f"**{TITLES[reality].capitalize()}**: {'. '.join(told)}."
+    alone = [found[reality, "ten evaluations", KINDS[0]] for reality in REALITIES]
+    means = {
+        row.name: sum(each.cells[place].mean for each in alone) / len(alone)
+        for place, row in enumerate(ROWS[:-1])
+        if all(place in each.cells for each in alone)
+    }
+    best_five = sorted(means, key=lambda name: -means[name])[:5]
+    leading = listed([f"{name} ({means[name]:.2f})" for name in best_five])
+    yield f"**On average over the four**, transferred alone, these lead: {leading}."
+
+
+def main() -> None:
+    """Compute what is missing, and write the page."""
+    parser = ArgumentParser(prog="python -m benchmarks.systems.comparison", description=__doc__)
+    every = {f"{reality}-{settings}": (reality, settings) for reality in REALITIES for settings in SETTINGS}
+    parser.add_argument("names", nargs="*", help=f"studies to compute, of {', '.join(every)}; default: write the page")
+    parser.add_argument("--folder", type=Path, default=FOLDER, help="of the studies; default: docs/studies")
+    parser.add_argument("--smoke", action="store_true", help="compute them at a tiny size; name another folder too")
+    given = parser.parse_args()
+    if unknown := set(given.names) - set(every):
+        parser.error(f"no study is called {', '.join(sorted(unknown))}")
+    for name in given.names or every:
+        reality, settings = every[name]
+        computed(label(reality, settings), study(reality, settings) | (SMOKE if given.smoke else {}), given.folder)
+    if not given.names and not given.smoke:
+        write(columns(given.folder), FOLDER.parent)
+
+
+def write(found: Columns, folder: Path) -> None:
+    """Write the document and its figure into a folder."""
+    (folder / "comparison.md").write_text(page(found), "utf-8")
+    (folder / "figures" / "comparison.svg").write_bytes(render_file(figure(found), "svg", Look(WIDTH_IN)))
+
+
+if __name__ == "__main__":
+    main()
