@@ -199,7 +199,7 @@ def _where(key: tuple[str, str, Fitness]) -> str:
 
 def page(found: Columns) -> str:
     """Return the document."""
-    text = (Path(__file__).parent / "comparison.md").read_text("utf-8")
+    text = (Path(__file__).parent / "comparison.txt").read_text("utf-8")
     best = "\n".join(f"- {line}" for line in answers(found))
     turned = "\n".join(f"- {line}" for line in reversals(found)) or "- No pair of systems is shown in both directions."
     return text.format(table=rows(found), answers=best, reversals=turned)
