@@ -27,6 +27,13 @@ Bounds = Mapping[str, tuple[float, float]]
 """Bounds by label, like `bias(elbow_flex)`, or `delay`."""
 
 
+def _without_shapes(spec: Any) -> Any:  # noqa: ANN401 - of a library without types
+    """Return the model without shapes, as its links touch nothing in gaplab; all of them have stated inertias."""
+    for each in [*spec.worldbody.find_all("geom"), *spec.meshes, *spec.materials, *spec.textures]:
+        spec.delete(each)
+    return spec
+
+
 class Arm:
     """An MJCF whose tunables `mujoco.sysid` fits.
 
@@ -38,7 +45,7 @@ class Arm:
     """
 
     def __init__(self, file: Path, pool: Pool, bounds: Bounds, step_s: float) -> None:
-        self.spec, self.pool = sysid.remove_visuals(mujoco.MjSpec.from_file(str(file))), pool
+        self.spec, self.pool = _without_shapes(mujoco.MjSpec.from_file(str(file))), pool
         self.spec.option.timestep = step_s
         for joint in pool.joints:
             kind = mujoco.mjtSensor.mjSENS_JOINTPOS
