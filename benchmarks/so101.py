@@ -34,6 +34,8 @@ JOINTS = {
     "gripper": "Jaw",
 }
 STEP_S = 0.005
+BELOW_M = -1.0
+"""Height of the ground, out of reach: the arm goes below its base, where its file has nothing."""
 EACH = {
     "kp({}, as=value)": (0.5, 20.0),
     "joint_damping({})": (0.0, 2.0),
@@ -85,7 +87,7 @@ def _parameters(rows: Any) -> FloatArray:  # noqa: ANN401 - a data frame
 def _run(given: Namespace) -> gaplab.Result:
     with TemporaryDirectory() as folder:
         robot, pool = Path(folder) / "so101.json", Path(folder) / "motions.json"
-        imported = import_robot(given.robot, ImportOptions(name="so101", time_step_s=STEP_S))
+        imported = import_robot(given.robot, ImportOptions(name="so101", time_step_s=STEP_S, ground_m=BELOW_M))
         robot.write_text(json.dumps(imported.robot.content), "utf-8")
         options = PoolOptions(columns=JOINTS, recording="motion", every_s=0.1, seconds=given.seconds)
         pool.write_text(import_pool(given.table, str(robot), "motions", options).text, "utf-8")

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 MOTORS = "servo, position, velocity or torque"
 OTHERS = (
-    "kp, kd, max_torque, position_gain, motored, turn, keyframe, vertices, visuals, static_friction, dynamic_friction, "
-    "observed, controller or task; repeatable"
+    "kp, kd, max_torque, position_gain, motored, ground_m, turn, keyframe, vertices, visuals, static_friction, "
+    "dynamic_friction, observed, controller or task; repeatable"
 )
 _IMPORTED = {b"<robot": "a URDF", b"<mujoco": "an MJCF"}
 """Roots of files that `gaplab robot import` reads."""

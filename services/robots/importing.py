@@ -125,12 +125,15 @@ def _world(source: Source, bodies: Bodies) -> World:
     joints = _with_starts([bodies.joint(head) for head in bodies.heads[1:]], source, qpos)
     joints = with_swings(with_motors(joints, source), notes)
     found, material, surfaces = _surfaces(source, bodies)
-    height_m, turn = _base_pose(bodies, found, joints, qpos, fixed=fixed)
+    ground_m = options.ground_m or 0.0
+    height_m, turn = _base_pose(bodies, found, joints, qpos, ground_m, fixed=fixed)
     largest_m = max([abs(height_m), *(abs(each) for joint in joints for each in joint.origin_m)])
     if largest_m > HUGE_M:
         notes.lose(f"lengths up to {largest_m:.3g} m are taken as they are, not as millimetres; meshes have a scale")
     if not fixed and source.is_urdf:
         notes.lose("the base floats: --fixed holds it")
+    if fixed and options.ground_m is None:
+        notes.lose("the ground is at height 0 and stops the robot: -s ground_m=-1 if its base stands on something")
     usual_step_s = URDF_STEP_S if source.is_urdf else float(model.opt.timestep)
     return World(
         bodies=tuple(found),
@@ -141,6 +144,7 @@ def _world(source: Source, bodies: Bodies) -> World:
         start_turn=turn,
         gravity_m_s2=0.0 if "gravity" in _flags(model, "disable") else abs(float(model.opt.gravity[2])),
         time_step_s=options.time_step_s or usual_step_s,
+        ground_m=ground_m,
         fixed=fixed,
         observed=options.observed or (_last(joints) if fixed else ""),
     )
@@ -309,7 +313,7 @@ def _start(joint: Joint, given: float, chosen: Mapping[str, float], notes: Notes
 
 
 def _base_pose(
-    bodies: Bodies, world_bodies: list[Body], joints: list[Joint], qpos: FloatArray, *, fixed: bool
+    bodies: Bodies, world_bodies: list[Body], joints: list[Joint], qpos: FloatArray, ground_m: float, *, fixed: bool
 ) -> tuple[float, Quaternion]:
     """Return height and rotation of the base: its lowest point touches the ground; a fixed base is only raised."""
     model, data = bodies.model, mujoco_library().MjData(bodies.model)
@@ -324,7 +328,7 @@ def _base_pose(
         if part.collides
     ]
     place, turn = _frame(model, data, bodies.heads[0])
-    height, below = float(place[2]), min(lowest, default=0.0)
+    height, below = float(place[2]), min(lowest, default=ground_m) - ground_m
     return height - (min(below, 0.0) if fixed else below) + 0.0, quaternion(turn)
 
 

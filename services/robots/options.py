@@ -14,6 +14,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.world.robot_files import LONGEST_LINE
 from gaplab.services.world.world import MOST_VERTICES
+from gaplab.services.world.world_checks import HIGHEST_M
 
 Positive = Annotated[float, Field(gt=0)]
 
@@ -35,6 +36,7 @@ class ImportOptions(Frozen):
         max_torque: largest torque of the motors; None: the file's, or computed.
         time_step_s: time step; None: MJCF's own, and 1/240 s for a URDF.
         start: angle at time 0 by pattern of joint names; a later pattern wins.
+        ground_m: height of the ground, which a robot whose base is free touches; None: 0.
         turn: roll, pitch and yaw of the base at time 0, rad, as in a URDF; None: the file's.
         keyframe: name of the MJCF's keyframe that is the start; None for the first.
         vertices: largest number of vertices of a hull.
@@ -58,6 +60,7 @@ class ImportOptions(Frozen):
     max_torque: Positive | None = None
     time_step_s: Annotated[float, Field(gt=0, le=0.1)] | None = None
     start: dict[str, float] = Field(default_factory=dict)
+    ground_m: Annotated[float, Field(ge=-HIGHEST_M, le=HIGHEST_M)] | None = None
     turn: tuple[float, float, float] | None = None
     keyframe: str | None = None
     vertices: Annotated[int, Field(ge=8, le=MOST_VERTICES)] = 32

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import FloatArray
@@ -408,6 +409,16 @@ def test_a_base_that_is_turned_stands_on_the_ground(tmp_path: Path) -> None:
     assert world.start_height_m == pytest.approx(0.2, abs=0.03)
     laikago = import_robot(path_of(FILES["laikago"][0]), ImportOptions(mend=True, turn=(np.pi / 2, 0, 0))).robot.world
     assert laikago.start_height_m > 0.4
+
+
+@pytest.mark.parametrize("fixed", [True, False])
+def test_the_ground_may_be_lower(tmp_path: Path, *, fixed: bool) -> None:
+    usual, lower = (small(tmp_path, fixed=fixed, ground_m=height) for height in (None, -0.5))
+
+    assert (usual.ground_m, lower.ground_m) == (0.0, -0.5)
+    assert lower.start_height_m == pytest.approx(usual.start_height_m - (0.0 if fixed else 0.5))
+    with pytest.raises(ValidationError, match="ground_m"):
+        small(tmp_path, ground_m=-5.0)
 
 
 def test_a_locked_joint_is_fixed(tmp_path: Path) -> None:
