@@ -9,12 +9,12 @@ motions of the first N orders are given to `mujoco.sysid`, too. An archive that 
 import json
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 import gaplab
+from benchmarks.kept import kept
 from gaplab.api.library.pools import PoolOptions, import_pool
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.robots.importing import import_robot
@@ -37,8 +37,8 @@ STEP_S = 0.005
 BELOW_M = -1.0
 """Height of the ground, out of reach: the arm goes below its base, where its file has nothing."""
 EACH = {
-    "kp({}, as=value)": (0.5, 20.0),
-    "joint_damping({})": (0.0, 2.0),
+    "kp({}, as=value)": (0.5, 40.0),
+    "joint_damping({})": (0.0, 3.0),
     "joint_friction({})": (0.0, 1.0),
     "joint_static_friction({})": (0.0, 0.5),
     "armature({})": (0.0, 0.1),
@@ -84,31 +84,27 @@ def _parameters(rows: Any) -> FloatArray:  # noqa: ANN401 - a data frame
     return frozen(rows[list(BOUNDS)])
 
 
-def _run(given: Namespace) -> gaplab.Result:
-    with TemporaryDirectory() as folder:
-        robot, pool = Path(folder) / "so101.json", Path(folder) / "motions.json"
-        imported = import_robot(given.robot, ImportOptions(name="so101", time_step_s=STEP_S, ground_m=BELOW_M))
-        robot.write_text(json.dumps(imported.robot.content), "utf-8")
-        options = PoolOptions(columns=JOINTS, recording="motion", every_s=0.1, seconds=given.seconds)
-        pool.write_text(import_pool(given.table, str(robot), "motions", options).text, "utf-8")
-        result = gaplab.run(
-            {
-                "name": "SO-101",
-                "robot": str(robot),
-                "engine": "mujoco",
-                "strategies": given.strategies,
-                "repetitions": given.orders,
-                "direct_repetitions": 1,
-                "iterations": given.motions,
-                "tunables": [{"name": name, "lower": low, "upper": high} for name, (low, high) in BOUNDS.items()],
-                "tuner": "least_squares",
-                "seed": given.seed,
-                "budget": {"preset": "smoke", "simulator_evaluations": given.evaluations},
-                "reality": {"kind": "recorded", "pool": str(pool)},
-            }
-        )
-    result.save(given.output)
-    return result
+def spec_for(given: Namespace, folder: Path) -> dict[str, Any]:
+    """Return the spec of the study, whose robot and pool are written into a folder."""
+    robot, pool = folder / "so101.json", folder / "motions.json"
+    imported = import_robot(given.robot, ImportOptions(name="so101", time_step_s=STEP_S, ground_m=BELOW_M))
+    robot.write_text(json.dumps(imported.robot.content), "utf-8")
+    options = PoolOptions(columns=JOINTS, recording="motion", every_s=0.1, seconds=given.seconds)
+    pool.write_text(import_pool(given.table, str(robot), "motions", options).text, "utf-8")
+    return {
+        "name": "SO-101",
+        "robot": str(robot),
+        "engine": "mujoco",
+        "strategies": given.strategies,
+        "repetitions": given.orders,
+        "direct_repetitions": 1,
+        "iterations": given.motions,
+        "tunables": [{"name": name, "lower": low, "upper": high} for name, (low, high) in BOUNDS.items()],
+        "tuner": "least_squares",
+        "seed": given.seed,
+        "budget": {"preset": "smoke", "simulator_evaluations": given.evaluations},
+        "reality": {"kind": "recorded", "pool": str(pool)},
+    }
 
 
 def main() -> None:
@@ -125,7 +121,7 @@ def main() -> None:
     asked.add_argument("--sysid", type=int, default=0)
     asked.add_argument("--output", type=Path, default=Path("so101.zip"))
     given = asked.parse_args()
-    result = gaplab.run(given.output) if given.output.exists() else _run(given)
+    result = kept(given.output, lambda folder: spec_for(given, folder))
     print(result.verdict)
     best = result.simulators.query("rank == 0").copy()
     stored = {each.name: each.spec for each in result.study.experiments}

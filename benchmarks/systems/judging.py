@@ -10,6 +10,7 @@ import numpy as np
 from scipy import stats
 
 import gaplab
+from benchmarks.kept import kept
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.types import Step
@@ -160,10 +161,10 @@ def arms(label: str, spec: Spec, folder: Path) -> list[Arm]:
 
 
 def computed(name: str, spec: Spec, folder: Path) -> Path:
-    """Return the archive of a study, which is computed if it is not there; an interrupted one goes on."""
-    archive, database = folder / f"{name}.zip", folder / f"{name}.db"
+    """Return the archive of a study, which is computed if it is not there."""
+    archive = folder / f"{name}.zip"
     if not archive.exists():
-        gaplab.run(database if database.exists() else {"name": name, "seed": 2026} | spec, path=database).save(archive)
+        kept(archive, lambda _: {"name": name, "seed": 2026} | spec)
     return archive
 
 
