@@ -12,7 +12,8 @@ from gaplab.services.findings.wording import many, number, share, spread
 from gaplab.services.world.sensing import Sensors
 
 LACKING = (
-    "Often missing in a model: a slope of the ground, a weak or slow motor, mass, latency; or a tunable is at its bound"
+    "Often missing in a model: the height or slope of the ground, a weak or slow motor, mass, latency; or a tunable is "
+    "at its bound"
 )
 
 SHOWN = 2
