@@ -77,6 +77,12 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     Raises:
         InvalidSpec: with every violation, each with its pointer into the spec; or an external plug-in raised an error.
     """
+    resolved = _complete(spec)
+    return resolved if spec.stop is None or is_direct(spec) else _affordable(resolved, spec.stop)
+
+
+def _complete(spec: ExperimentSpec) -> ResolvedSpec:
+    """Return the spec with every field, and all of its iterations."""
     spec, preset = with_recordings(with_preset(spec)), PRESETS[spec.budget.preset]
     robot, strategy, controllers, simulators, discrepancy, tuner = _created(spec)
     check_recordings(spec, robot)  # a motion of another robot says nothing
@@ -99,7 +105,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         raise InvalidSpec(violations)
     plugins = {each.kind: (ref := getattr(spec, each.kind)) and completed(each, ref) for each in NEED_NO_OTHERS}
     plugins["strategy"] = with_proper_labels(plugins["strategy"], strategy.named_tunables)
-    resolved = ResolvedSpec.filled_from(
+    return ResolvedSpec.filled_from(
         spec,
         **plugins,
         stop=None,
@@ -112,7 +118,6 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         reality=resolved_reality(spec, robot, real, reality_engine),
         budget=budget,
     )
-    return resolved if spec.stop is None or strategy.in_reality else _affordable(resolved, spec.stop)
 
 
 def _affordable(spec: ResolvedSpec, stop: Stop) -> ResolvedSpec:
