@@ -8,22 +8,13 @@ A claim holds if the 90 % interval of its difference is on its side of 0, fails 
 open otherwise. Repetitions are the unit; the interval is Welch's.
 """
 
-from argparse import ArgumentParser
-from pathlib import Path
-
 from benchmarks.systems import cited, later  # noqa: F401 - each check registers itself
-from benchmarks.systems.judging import FOLDER, SMOKE, SYSTEMS
+from benchmarks.systems.judging import SMOKE, SYSTEMS, asked
 
 
 def main() -> None:
     """Print the claims of the systems that are named, or of all."""
-    parser = ArgumentParser(prog="python -m benchmarks.systems", description=__doc__)
-    parser.add_argument("names", nargs="*", help=f"of {', '.join(SYSTEMS)}; default: all")
-    parser.add_argument("--folder", type=Path, default=FOLDER, help="of the studies; default: docs/studies")
-    parser.add_argument("--smoke", action="store_true", help="try the studies at a tiny size; name another folder too")
-    arguments = parser.parse_args()
-    if unknown := set(arguments.names) - set(SYSTEMS):
-        parser.error(f"no system is called {', '.join(sorted(unknown))}")
+    arguments = asked("python -m benchmarks.systems", __doc__, SYSTEMS)
     for name in arguments.names or SYSTEMS:
         print(f"{name}:")
         for claim in SYSTEMS[name].claims(arguments.folder, SMOKE if arguments.smoke else {}):

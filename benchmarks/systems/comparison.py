@@ -4,7 +4,6 @@ Studies are read from docs/studies, or computed there; docs/comparison.md and it
 names of studies, like `inside-fitness`, only these are computed, and nothing is written.
 """
 
-from argparse import ArgumentParser
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -12,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.findings import import_file, private_store
 from benchmarks.reproduction.results import table
-from benchmarks.systems.judging import FOLDER, SMOKE, computed
+from benchmarks.systems.judging import FOLDER, SMOKE, asked, computed
 from benchmarks.systems.rows import REALITIES, ROWS, SETTINGS, label, study
 from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.costs import CostModel
@@ -231,14 +230,8 @@ def answers(found: Columns) -> Iterator[str]:
 
 def main() -> None:
     """Compute what is missing, and write the page."""
-    parser = ArgumentParser(prog="python -m benchmarks.systems.comparison", description=__doc__)
     every = {f"{reality}-{settings}": (reality, settings) for reality in REALITIES for settings in SETTINGS}
-    parser.add_argument("names", nargs="*", help=f"studies to compute, of {', '.join(every)}; default: write the page")
-    parser.add_argument("--folder", type=Path, default=FOLDER, help="of the studies; default: docs/studies")
-    parser.add_argument("--smoke", action="store_true", help="compute them at a tiny size; name another folder too")
-    given = parser.parse_args()
-    if unknown := set(given.names) - set(every):
-        parser.error(f"no study is called {', '.join(sorted(unknown))}")
+    given = asked("python -m benchmarks.systems.comparison", __doc__, every)
     for name in given.names or every:
         reality, settings = every[name]
         computed(label(reality, settings), study(reality, settings) | (SMOKE if given.smoke else {}), given.folder)

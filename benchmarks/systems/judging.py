@@ -1,6 +1,7 @@
 """Claims about systems, the studies that they are judged on, and how."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -166,6 +167,18 @@ def computed(name: str, spec: Spec, folder: Path) -> Path:
     if not archive.exists():
         kept(archive, lambda _: {"name": name, "seed": 2026} | spec)
     return archive
+
+
+def asked(prog: str, description: str | None, names: Collection[str]) -> Namespace:
+    """Return the `names` that a command was given, of these; its `folder` of studies; and whether it is to `smoke`."""
+    parser = ArgumentParser(prog=prog, description=description)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(names)}; default: all")
+    parser.add_argument("--folder", type=Path, default=FOLDER, help="of the studies; default: docs/studies")
+    parser.add_argument("--smoke", action="store_true", help="try the studies at a tiny size; name another folder too")
+    given = parser.parse_args()
+    if unknown := set(given.names) - set(names):
+        parser.error(f"nothing is called {', '.join(sorted(unknown))}")
+    return given
 
 
 SYSTEMS: dict[str, System] = {}
