@@ -4,7 +4,7 @@ Studies are read from docs/studies, or computed there; docs/comparison.md and it
 names of studies, like `inside-fitness`, only these are computed, and nothing is written.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -105,10 +105,10 @@ Columns = Mapping[tuple[str, str, Fitness], Column]
 """By reality, what is equal, and whose fitness counts."""
 
 
-def columns(folder: Path) -> dict[tuple[str, str, Fitness], Column]:
-    """Return every column, from the studies in a folder; one that is missing is computed."""
+def columns(folder: Path, realities: Iterable[str] = REALITIES) -> dict[tuple[str, str, Fitness], Column]:
+    """Return the columns of realities, from the studies in a folder; one that is missing is computed."""
     found = dict[tuple[str, str, Fitness], Column]()
-    for reality in REALITIES:
+    for reality in realities:
         with private_store() as store:
             ids = dict[int, str]()
             for settings in SETTINGS:
@@ -121,10 +121,19 @@ def columns(folder: Path) -> dict[tuple[str, str, Fitness], Column]:
     return found
 
 
+def _realities(found: Columns) -> list[str]:
+    return list(dict.fromkeys(reality for reality, *_ in found))
+
+
+def drawn(found: Columns) -> bytes:
+    """Return the figure as SVG."""
+    return render_file(figure(found), "svg", Look(WIDTH_IN))
+
+
 def figure(found: Columns) -> FigureDefinition:
     """Return the fitness of all systems after ten evaluations: a panel for each reality, a row for each system."""
     ticks = tuple((float(-place), row.name) for place, row in enumerate(ROWS))
-    at = {reality: [found[reality, "ten evaluations", kind] for kind in KINDS] for reality in REALITIES}
+    at = {reality: [found[reality, "ten evaluations", kind] for kind in KINDS] for reality in _realities(found)}
     every = [cell for both in at.values() for each in both for cell in each.cells.values()]
     ends = (min(cell.lower for cell in every) - 0.02, max(cell.upper for cell in every) + 0.02)
     panels = []
@@ -136,7 +145,7 @@ def figure(found: Columns) -> FigureDefinition:
     caption = (
         "Ten real-world evaluations, n = 10. Dots: transferred controllers, with 95 % intervals; rings: equal chances."
     )
-    return FigureDefinition("comparison", "", tuple(panels), caption, caption, columns=len(REALITIES))
+    return FigureDefinition("comparison", "", tuple(panels), caption, caption, columns=len(at))
 
 
 def _dots(one: Column) -> Iterator[Bars | Points]:
@@ -159,7 +168,7 @@ def _style(place: int) -> Style:
 
 def rows(found: Columns) -> str:
     """Return the table: percent of direct, of transferred controllers alone and with equal chances."""
-    keys = [(reality, equal) for equal in EQUAL for reality in REALITIES]
+    keys = [(reality, equal) for equal in EQUAL for reality in _realities(found)]
     head = ["system", *(f"{TITLES[reality]}: {equal}" for reality, equal in keys)]
     lines, group = [], ""
     for place, row in enumerate(ROWS):
@@ -242,7 +251,7 @@ def main() -> None:
 def write(found: Columns, folder: Path) -> None:
     """Write the document and its figure into a folder."""
     (folder / "comparison.md").write_text(page(found), "utf-8")
-    (folder / "figures" / "comparison.svg").write_bytes(render_file(figure(found), "svg", Look(WIDTH_IN)))
+    (folder / "figures" / "comparison.svg").write_bytes(drawn(found))
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ def _lean(name: str) -> Spec:
     return {"name": name, "preset": "lean"}
 
 
-ROWS = (
+ROWS = [
     Row("random", PAPER, "random"),
     Row("known fit", PAPER, "known_fit"),
     Row("informative", PAPER, _lean("informative")),
@@ -95,7 +95,8 @@ ROWS = (
     Row("the same, fewer rollouts", UNTUNED, {"name": "domain_randomization", "options": {"equal_rollouts": True}}),
     Row("noise envelope", UNTUNED, "noise_envelope"),
     Row("direct", BASE, "direct"),
-)
+]
+"""A notebook may insert a row with settings of its own; `direct`, which others are compared with, is last."""
 
 
 def study(reality: str, settings: str) -> Spec:
