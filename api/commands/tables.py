@@ -107,14 +107,25 @@ def best(study: StudyRead) -> list[str]:
     if not (found := study.best):
         return []
     evaluations = f"{found.evaluations} real-world evaluation{'' if found.evaluations == 1 else 's'}"
-    mean = f"mean {found.mean:.3f} after {evaluations}{from_before(found.known)}"
+    what = "mean error on held-out recordings, × untuned," if _is_recorded(study) else "mean"
+    mean = f"{what} {_text(study, found.mean)} after {evaluations}{from_before(found.known)}"
     return [escape(f"best: {found.name.replace('_', ' ')}, {mean} (n = {found.n})")]
+
+
+def _is_recorded(record: Record) -> bool:
+    first = record.experiments[0] if isinstance(record, StudyRead) else record
+    return bool(first.spec["reality"]["kind"] == "recorded")
+
+
+def _text(record: Record, mean: float) -> str:
+    """Return a mean fitness; of recordings, the error that it is minus of."""
+    return f"{-mean if _is_recorded(record) else mean:.3f}"
 
 
 def _fitness(record: Record) -> str:
     """Return the fitness of an experiment, or of a study's best, with its number of evaluations: "0.585 at 10"."""
     found = record.best if isinstance(record, StudyRead) else record.fitness
-    return f"{found.mean:.3f} at {found.evaluations}{from_before(found.known)}" if found else "-"
+    return f"{_text(record, found.mean)} at {found.evaluations}{from_before(found.known)}" if found else "-"
 
 
 def _record(record: Record) -> tuple[str, ...]:

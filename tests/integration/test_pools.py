@@ -9,6 +9,7 @@ from fastapi.testclient import TestClient
 
 import gaplab
 from gaplab.api.app import create_app
+from gaplab.api.commands import tables
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives.rerunning import verify
 from gaplab.services.core.errors import InvalidSpec
@@ -82,9 +83,11 @@ def test_the_error_on_held_out_recordings_falls_and_the_fit_on_the_whole_pool_is
     assert curve["random", 2] > curve["random", 0]
 
 
-def test_the_figure_has_the_error_and_the_number_of_recordings(result: Any) -> None:
+def test_the_figure_and_the_command_have_the_error_and_the_number_of_recordings(result: Any) -> None:
     svg = result.figure().content("svg").decode()
+    (best,) = tables.best(result.study)
 
+    assert ", mean error on held-out recordings, × untuned, 0." in best
     assert "Error on held-out recordings" in svg
     assert "Number of recordings used" in svg
 

@@ -1,7 +1,7 @@
 import { FakeNode } from "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { isFunction, isPhysical, unitsOf, worldsText } from "../../api/dashboard/lib/robots.js";
+import { isFunction, isPhysical, meanText, unitsOf, worldsText } from "../../api/dashboard/lib/robots.js";
 
 const { lastIteration } = await import("../../api/dashboard/views/replay.js");
 const { actions, primary, refusal } = await import("../../api/dashboard/views/study/actions.js");
@@ -146,4 +146,5 @@ test("worlds are the engines, or the bench", () => {
   assert.deepEqual([{ engine: { name: "fast" } }, { engine: { name: "slow" } }, { kind: "physical", engine: null, bench: "leg" }, { kind: "recorded", engine: null, pool: { name: "tosses" } }].map((reality) => worldsText(spec(reality))),
     ["Fast", "Fast, reality in Slow", "Fast, reality on the bench “leg”", "Fast, reality is the pool “tosses”"]);
   assert.deepEqual([isPhysical({ spec: { reality: { kind: "simulated" } } }), isPhysical({ spec: { reality: { kind: "physical" } } })], [false, true]);
+  assert.deepEqual(["simulated", "recorded"].map((kind) => meanText({ spec: { reality: { kind } } }, -0.25)), ["−0.250", "0.250"]);
 });

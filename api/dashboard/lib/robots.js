@@ -1,7 +1,7 @@
 // @ts-check
 /** What the catalogue says of the robots of experiments. */
 
-import { readableName } from "./format.js";
+import { fixed, readableName } from "./format.js";
 
 /** @typedef {Api.ExperimentRead | undefined} Experiment */
 
@@ -30,6 +30,12 @@ export const isFunction = ({ robots }, { spec }) => robots.some(({ name, details
 
 /** Return whether reality is a robot on a bench. @param {{ spec: Record<string, any> }} experiment */
 export const isPhysical = ({ spec }) => spec.reality.kind === "physical";
+
+/** Return whether reality is a pool of recordings. @param {{ spec: Record<string, any> }} experiment */
+export const isRecorded = ({ spec }) => spec.reality.kind === "recorded";
+
+/** Format a mean fitness; of recordings, the error that it is minus of. @param {{ spec: Record<string, any> }} experiment @param {number} mean */
+export const meanText = (experiment, mean) => fixed(isRecorded(experiment) ? -mean : mean);
 
 /** Return the engine of the simulators, and what reality is if it is something else. @param {Record<string, any>} spec resolved */
 export function worldsText({ engine, reality }) {

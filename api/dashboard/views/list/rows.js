@@ -2,9 +2,9 @@
 /** Rows of the list: a study, which can be unfolded if it has several experiments, and an experiment below it. */
 
 import { h, refill, setText } from "../../lib/dom.js";
-import { age, count, evaluationsText, fixed, fromBefore, readableName, titleOf } from "../../lib/format.js";
+import { age, count, evaluationsText, fromBefore, readableName, titleOf } from "../../lib/format.js";
 import { progressBar, timeLeft } from "../../lib/progress.js";
-import { robotName, worldsText } from "../../lib/robots.js";
+import { meanText, robotName, worldsText } from "../../lib/robots.js";
 import { stateBadge } from "../../lib/state_badge.js";
 import { tagList } from "../../lib/tags.js";
 import { tickBox } from "./selection.js";
@@ -83,7 +83,7 @@ export function listRow({ value: first, isNested = false }, list) {
     toggle?.setAttribute("aria-label", `Experiments of ${value.name}`);
     refill(cells.stands, `${value.state} ${value.caveat}`, () => stateBadge(value.state, value.caveat));
     setText(cells.left, timeLeft(value));
-    refill(cells.best, JSON.stringify([fitness, unit]), () => (fitness ? fitnessParts(fitness, unit) : "–"));
+    refill(cells.best, JSON.stringify([fitness, unit]), () => (fitness ? fitnessParts(experiments[0], fitness, unit) : "–"));
     setText(cells.age, age(value.created_at));
     cells.age.title = new Date(value.created_at).toLocaleString();
   };
@@ -97,9 +97,9 @@ function subtitleOf(experiments) {
   return [what, ...(first ? [robotName(first.spec), worldsText(first.spec)] : [])].join(" · ");
 }
 
-/** Return a fitness with its number of real-world evaluations. @param {Api.FitnessRead | Api.BestRead} fitness @param {string} unit */
-function fitnessParts(fitness, unit) {
+/** Return a fitness with its number of real-world evaluations. @param {Api.ExperimentRead} first @param {Api.FitnessRead | Api.BestRead} fitness @param {string} unit */
+function fitnessParts(first, fitness, unit) {
   const by = "name" in fitness ? `${titleOf(fitness)}: ` : "";
   const title = `${by}mean of ${fitness.n} after ${evaluationsText(fitness)}`;
-  return h("span", { title }, fixed(fitness.mean), h("span", { class: "unit" }, ` ${unit}`), h("small", { class: "at" }, ` at ${fitness.evaluations}${fromBefore(fitness.known)}`));
+  return h("span", { title }, meanText(first, fitness.mean), h("span", { class: "unit" }, ` ${unit}`), h("small", { class: "at" }, ` at ${fitness.evaluations}${fromBefore(fitness.known)}`));
 }

@@ -5,12 +5,12 @@ import { get } from "../../lib/api.js";
 import { requestWords, stateText } from "../../lib/bench/requests.js";
 import { h, refill, refillInPlace, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
-import { age, count, evaluationsText, fixed, percent, readableName, timeBetween, titleOf } from "../../lib/format.js";
+import { age, count, evaluationsText, percent, readableName, timeBetween, titleOf } from "../../lib/format.js";
 import { notesBlock } from "../../lib/markdown.js";
 import { progressBar, timeLeft } from "../../lib/progress.js";
 import { FIGURE_KINDS } from "../../lib/event_kinds.js";
 import { robotPicture } from "../../lib/robot_picture.js";
-import { isPhysical, robotName, worldsText } from "../../lib/robots.js";
+import { isPhysical, isRecorded, meanText, robotName, worldsText } from "../../lib/robots.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { factItems } from "../../lib/table.js";
 import { tagList } from "../../lib/tags.js";
@@ -92,7 +92,7 @@ function factsOf({ study, unit }) {
     others.length ? ["Experiments", `${count(ended)} of ${count(others.length + 1)} ended`] : ["Strategy", readableName(strategy)],
     ["Robot", robotName(spec)], ["Engine", worldsText(spec)], tunes !== "" && [level && !others.length ? "Varies" : "Tunes", tunes],
     ["Budget", budgetText(study)],
-    fitness && [by ? "Best fitness" : "Fitness in reality", `${fixed(fitness.mean)} ${unit(first)}${by} after ${evaluationsText(fitness)} (mean of ${fitness.n})`],
+    fitness && [isRecorded(first) ? "Held-out error" : by ? "Best fitness" : "Fitness in reality", `${meanText(first, fitness.mean)} ${unit(first)}${by} after ${evaluationsText(fitness)} (mean of ${fitness.n})`],
     ["Work", progress.text], ...times(study),
     !others.length && priority !== 0 && ["Priority", priority], !others.length && atOnce !== null && ["At once", `at most ${count(atOnce)}`]];
   return /** @type {Fact[]} */ (facts.filter(Boolean));
