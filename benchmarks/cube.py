@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.kept import kept
+from benchmarks.kept import kept, strategy
 from gaplab.api.library.pools import PoolOptions, import_pool
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.robots.importing import import_robot
@@ -74,7 +74,7 @@ def main() -> None:
     asked = ArgumentParser(description=__doc__)
     asked.add_argument("path", type=Path)
     asked.add_argument("--engine", default="mujoco")
-    asked.add_argument("--strategies", nargs="+", default=["random", "direct"])
+    asked.add_argument("--strategies", nargs="+", type=strategy, default=["random", "direct"])
     asked.add_argument("--orders", type=int, default=40)
     asked.add_argument("--tosses", type=int, default=10)
     asked.add_argument("--evaluations", type=int, default=90)

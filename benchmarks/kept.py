@@ -1,5 +1,6 @@
 """Studies that are computed once: in a database, in which an interrupted one goes on, and then an archive."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,3 +23,8 @@ def kept(archive: Path, spec: Callable[[Path], dict[str, Any]]) -> gaplab.Result
         result = gaplab.run(database if database.exists() else spec(Path(folder)), path=database)
     result.save(archive)
     return result
+
+
+def strategy(text: str) -> str | dict[str, Any]:
+    """Return a strategy of a command line: its name, or an object of JSON as in a spec."""
+    return dict(json.loads(text)) if text.startswith("{") else text

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import gaplab
-from benchmarks.kept import kept
+from benchmarks.kept import kept, strategy
 from gaplab.api.library.pools import PoolOptions, import_pool
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.robots.importing import import_robot
@@ -61,16 +61,16 @@ def errors(stored: dict[str, Any], simulators: FloatArray | None) -> FloatArray:
     return np.asarray(np.sqrt(squares).mean(axis=(0, 2)))
 
 
-def compared(result: gaplab.Result, robot: Path, strategy: str, orders: int, motions: int) -> None:
-    """Print the errors of gaplab and of `mujoco.sysid` on the motions that a strategy chose."""
+def compared(result: gaplab.Result, robot: Path, orders: int, motions: int) -> None:
+    """Print the errors of gaplab and of `mujoco.sysid` on the motions that the first strategy chose."""
     from benchmarks.sysid import Arm  # an extra of MuJoCo, for this alone
 
-    one = next(each for each in result.study.experiments if each.name == strategy)
+    one = result.study.experiments[0]
     spec = spec_of(one.spec)
     arm = Arm(robot, pool_of(spec), {name.replace(", as=value", ""): bounds for name, bounds in BOUNDS.items()}, STEP_S)
     unseen = held_out(spec)
     print(f"mujoco.sysid, untuned: {arm.errors(unseen).mean():.5f} rad")
-    some = f"name == {strategy!r} and iteration"
+    some = f"name == {one.name!r} and iteration"
     chosen = result.samples.query(f"{some} <= {motions}").groupby("repetition")
     for number, rows in list(chosen)[:orders]:
         fitted = [int(each) for each in rows["gene_0"]]
@@ -112,7 +112,9 @@ def main() -> None:
     asked = ArgumentParser(description=__doc__)
     asked.add_argument("table", type=Path)
     asked.add_argument("robot", type=Path)
-    asked.add_argument("--strategies", nargs="+", default=["random", "farthest", "informative", "direct"])
+    asked.add_argument(
+        "--strategies", nargs="+", type=strategy, default=["random", "farthest", "informative", "direct"]
+    )
     asked.add_argument("--orders", type=int, default=10)
     asked.add_argument("--motions", type=int, default=5)
     asked.add_argument("--seconds", type=float, default=20.0)
@@ -130,7 +132,7 @@ def main() -> None:
     print(f"as its file has it: {errors(next(iter(stored.values())), None)[0]:.5f} rad")
     print(best.groupby(["name", "iteration"])["rad"].agg(["mean", "std", "count"]).to_string())
     if given.sysid:
-        compared(result, given.robot, given.strategies[0], given.sysid, min(3, given.motions))
+        compared(result, given.robot, given.sysid, min(3, given.motions))
 
 
 if __name__ == "__main__":

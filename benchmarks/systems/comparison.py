@@ -215,7 +215,7 @@ def page(found: Columns) -> str:
 
 def answers(found: Columns) -> Iterator[str]:
     """Yield, for each reality at ten evaluations, the best system and how many none is shown to beat."""
-    for reality in REALITIES:
+    for reality in _realities(found):
         told = []
         for kind in KINDS:
             one = found[reality, "ten evaluations", kind]
@@ -226,7 +226,7 @@ def answers(found: Columns) -> Iterator[str]:
                 f"direct; {len(leads)} of {len(ROWS) - 1} systems are not shown to be worse than another"
             )
         yield f"**{TITLES[reality].capitalize()}**: {'. '.join(told)}."
-    alone = [found[reality, "ten evaluations", KINDS[0]] for reality in REALITIES]
+    alone = [found[reality, "ten evaluations", KINDS[0]] for reality in _realities(found)]
     means = {
         row.name: sum(each.cells[place].mean for each in alone) / len(alone)
         for place, row in enumerate(ROWS[:-1])
@@ -234,7 +234,7 @@ def answers(found: Columns) -> Iterator[str]:
     }
     best_five = sorted(means, key=lambda name: -means[name])[:5]
     leading = listed([f"{name} ({means[name]:.2f})" for name in best_five])
-    yield f"**On average over the four**, transferred alone, these lead: {leading}."
+    yield f"**On average over these realities**, transferred alone, these lead: {leading}."
 
 
 def main() -> None:
