@@ -4,6 +4,7 @@ A process is a new Python that imports gaplab alone: not the program that starte
 "__main__"`. It ends when that program does, and Ctrl-C in a terminal does not reach it.
 """
 
+import os
 import signal
 import subprocess
 import sys
@@ -214,6 +215,7 @@ def main(descriptor: int) -> None:
                 _compute(connection, work)
             elif callable(work):
                 connection.send(_answered(work))
+    os._exit(0)  # at once: a rollout in another thread would find its libraries unloaded
 
 
 def _compute(connection: "Connection[Any, Any]", work: Work) -> None:
