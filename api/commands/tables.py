@@ -108,7 +108,7 @@ def best(study: StudyRead) -> list[str]:
         return []
     evaluations = f"{found.evaluations} real-world evaluation{'' if found.evaluations == 1 else 's'}"
     what = "mean error on held-out recordings, × untuned," if _is_recorded(study) else "mean"
-    mean = f"{what} {_text(study, found.mean)} after {evaluations}{from_before(found.known)}"
+    mean = f"{what} {_mean_text(study, found.mean)} after {evaluations}{from_before(found.known)}"
     return [escape(f"best: {found.name.replace('_', ' ')}, {mean} (n = {found.n})")]
 
 
@@ -117,7 +117,7 @@ def _is_recorded(record: Record) -> bool:
     return bool(first.spec["reality"]["kind"] == "recorded")
 
 
-def _text(record: Record, mean: float) -> str:
+def _mean_text(record: Record, mean: float) -> str:
     """Return a mean fitness; of recordings, the error that it is minus of."""
     return f"{-mean if _is_recorded(record) else mean:.3f}"
 
@@ -125,7 +125,7 @@ def _text(record: Record, mean: float) -> str:
 def _fitness(record: Record) -> str:
     """Return the fitness of an experiment, or of a study's best, with its number of evaluations: "0.585 at 10"."""
     found = record.best if isinstance(record, StudyRead) else record.fitness
-    return f"{_text(record, found.mean)} at {found.evaluations}{from_before(found.known)}" if found else "-"
+    return f"{_mean_text(record, found.mean)} at {found.evaluations}{from_before(found.known)}" if found else "-"
 
 
 def _record(record: Record) -> tuple[str, ...]:
