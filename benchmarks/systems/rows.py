@@ -24,10 +24,13 @@ IN_TURN: Spec = {
     "simulator_evaluations": 50,
 }
 WARM: Spec = {"name": "search", "options": {"warm_start": True}}
-DRAWS: Spec = {"preset": "desk", "simulator_evaluations": 620}
 
 SETTINGS: dict[str, Spec] = {
     "fitness": {},
+    "lean": {},
+    "untuned": {},
+    "cited": {},
+    "later": {},
     "gauss-newton": READINGS | {"tuner": "gauss_newton"},
     "abc-smc": READINGS | {"tuner": "abc_smc"},
     "climbers": READINGS | {"tuner": "climbers"},
@@ -35,12 +38,14 @@ SETTINGS: dict[str, Spec] = {
     "simopt": {
         "discrepancy": {"name": "readings", "options": {"absolute_weight": 0.5}},
         "tuner": "simopt",
-        "budget": DRAWS,
     },
     "turns": {"tuner": WARM, "budget": IN_TURN},
     "six": {"tunables": ["dynamic_friction", "static_friction", "restitution", "motor_gain", "mass", "length_scale"]},
 }
-"""What studies have beside `DESK`, by the last part of their names."""
+"""What studies have beside `DESK`, by the last part of their names; some differ in their strategies alone."""
+
+DISTRIBUTION: Spec = {"name": "weighted", "preset": "chebotar_2019", "options": {"simulators": 5}}
+"""With 20 draws for each evaluation of a controller it would have ten times the rollouts of others."""
 
 PAPER, CITED, LATER, UNTUNED, BASE = "the paper's", "cited", "later", "without samples", "in reality"
 
@@ -70,31 +75,36 @@ def _lean(name: str) -> Spec:
 ROWS = [
     Row("random", PAPER, "random"),
     Row("known fit", PAPER, "known_fit"),
-    Row("informative", PAPER, _lean("informative")),
+    Row("informative", PAPER, _lean("informative"), "lean"),
     Row("simulated fit", PAPER, "simulated_fit"),
     Row("simulated fit and unique", PAPER, "simulated_fit_and_unique"),
-    Row("simulated fit and informative", PAPER, _lean("simulated_fit_and_informative")),
+    Row("simulated fit and informative", PAPER, _lean("simulated_fit_and_informative"), "lean"),
     Row("simulated fit, six tunables", PAPER, "simulated_fit", "six"),
-    Row("weighted sum", PAPER, _lean("weighted")),
+    Row("weighted sum", PAPER, _lean("weighted"), "lean"),
     Row("interleaved evolution", PAPER, "interleaved", "turns"),
     Row("estimation–exploration", CITED, "estimation_exploration", "climbers"),
     Row("the same, of disagreement", CITED, {"name": "estimation_exploration", "preset": "bongard_2005"}, "climbers"),
     Row("Back-to-Reality", CITED, "back_to_reality", "absolute"),
-    Row("surrogate of reality", CITED, "surrogate"),
-    Row("fit unless near", CITED, _lean("fit_unless_near")),
-    Row("surrogate of the residual", CITED, "residual"),
-    Row("transferability", CITED, "transferability"),
-    Row("farthest", LATER, "farthest"),
+    Row("surrogate of reality", CITED, "surrogate", "cited"),
+    Row("fit unless near", CITED, _lean("fit_unless_near"), "lean"),
+    Row("surrogate of the residual", CITED, "residual", "cited"),
+    Row("transferability", CITED, "transferability", "cited"),
+    Row("farthest", LATER, "farthest", "later"),
     Row("Gauss–Newton on readings", LATER, "simulated_fit", "gauss-newton"),
     Row("ASID", LATER, {"name": "weighted", "preset": "asid_2024"}, "gauss-newton"),
     Row("ABC-SMC on readings", LATER, "simulated_fit", "abc-smc"),
-    Row("intelligent trial and error", LATER, "intelligent_trial_and_error"),
-    Row("SimOpt", LATER, {"name": "weighted", "preset": "chebotar_2019"}, "simopt"),
-    Row("BayRn", LATER, "bayrn"),
-    Row("domain randomization", UNTUNED, "domain_randomization"),
-    Row("the same, fewer rollouts", UNTUNED, {"name": "domain_randomization", "options": {"equal_rollouts": True}}),
-    Row("noise envelope", UNTUNED, "noise_envelope"),
-    Row("direct", BASE, "direct"),
+    Row("intelligent trial and error", LATER, "intelligent_trial_and_error", "later"),
+    Row("SimOpt", LATER, DISTRIBUTION, "simopt"),
+    Row("BayRn", LATER, "bayrn", "later"),
+    Row("domain randomization", UNTUNED, "domain_randomization", "untuned"),
+    Row(
+        "the same, fewer rollouts",
+        UNTUNED,
+        {"name": "domain_randomization", "options": {"equal_rollouts": True}},
+        "untuned",
+    ),
+    Row("noise envelope", UNTUNED, "noise_envelope", "untuned"),
+    Row("direct", BASE, "direct", "untuned"),
 ]
 """A notebook may insert a row with settings of its own; `direct`, which others are compared with, is last."""
 
