@@ -28,15 +28,15 @@ ROUND = 5
         "strategies": [
             "back_to_reality",
             {"name": "back_to_reality", "options": {"learn_from_trials": True}},
-            "simulated_fit",
         ],
         "discrepancy": "absolute_fitness",
         "iterations": 3 * ROUND + 1,
-    }
+    },
+    back_to_reality_fit=compared("inside", "simulated fit"),
 )
-def back_to_reality(back_to_reality: list[Arm]) -> Iterator[Claim]:
+def back_to_reality(back_to_reality: list[Arm], back_to_reality_fit: list[Arm]) -> Iterator[Claim]:
     """Judge what Zagal and Ruiz-del-Solar say, and what Klaus et al. expect of it."""
-    plain, taught, fit = back_to_reality
+    (plain, taught), (fit,) = back_to_reality, back_to_reality_fit
     begins = (1, 1 + 3 * ROUND)
     gaps = [np.abs(plain.measured(at) - plain.simulated(*_selected(plain, at))) for at in begins]
     yield above("the gap of L1's best halves within three rounds", gaps[0] / 2, gaps[1])

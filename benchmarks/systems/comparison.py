@@ -1,7 +1,7 @@
 """All systems on one robot, reality, budget and statistics: `python -m benchmarks.systems.comparison`.
 
-Studies are read from docs/studies, or computed there; docs/comparison.md and its figure are written from them. With
-names of studies, like `inside-fitness`, only these are computed, and nothing is written.
+Studies are read from docs/studies, or computed there; docs/comparison.md and its figure are written from the realities
+of which all are there. With names of studies, like `inside-fitness`, only these are computed.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -210,7 +210,9 @@ def page(found: Columns) -> str:
     text = (Path(__file__).parent / "comparison.txt").read_text("utf-8")
     best = "\n".join(f"- {line}" for line in answers(found))
     turned = "\n".join(f"- {line}" for line in reversals(found)) or "- No pair of systems is shown in both directions."
-    return text.format(table=rows(found), answers=best, reversals=turned)
+    left = [title for reality, title in TITLES.items() if reality not in _realities(found)]
+    missing = f"\nNot computed: {listed(left)}.\n" if left else ""
+    return text.format(table=rows(found), answers=best, reversals=turned, missing=missing)
 
 
 def answers(found: Columns) -> Iterator[str]:
@@ -244,8 +246,14 @@ def main() -> None:
     for name in given.names or every:
         reality, settings = every[name]
         computed(label(reality, settings), study(reality, settings) | (SMOKE if given.smoke else {}), given.folder)
-    if not given.names and not given.smoke:
-        write(columns(given.folder), FOLDER.parent)
+    if (realities := whole(given.folder)) and not given.smoke:
+        write(columns(given.folder, realities), FOLDER.parent)
+
+
+def whole(folder: Path) -> list[str]:
+    """Return the realities of which all studies are in a folder."""
+    archives = {each.stem for each in folder.glob("*.zip")}
+    return [each for each in REALITIES if archives >= {label(each, settings) for settings in SETTINGS}]
 
 
 def write(found: Columns, folder: Path) -> None:
