@@ -29,12 +29,11 @@ export async function show(root, parameters, signal) {
   const starts = presets.map(({ name, summary, spec }) =>
     h("button", { type: "button", class: "quiet", title: summary, onclick: () => form.start(spec) }, name));
   const paste = pasteField((spec) => { form.start(spec); });
-  const note = parameters.get("note");
+  const [note, given] = [parameters.get("note"), parameters.get("spec")];
+  if (given === null || !await paste.take(given)) form.remake();
+  if (signal.aborted) return;
   root.replaceChildren(h("h1", {}, "New study"), ...(note ? [h("p", { class: "remark" }, note)] : []),
     h("div", { class: "starts", role: "group", "aria-label": "Start from" }, h("span", { class: "note" }, "Start from"), ...starts), paste.element, form.element);
-  form.remake();
-  const given = parameters.get("spec");
-  if (given !== null) await paste.take(given);
 }
 
 /** The form, its content, and what the service says about it. */
@@ -159,7 +158,10 @@ export function specIn(text) {
   return found;
 }
 
-/** Return a field for pasted JSON, and a function that takes a text as if it had been pasted. @param {(spec: Spec) => void} fill fills the form */
+/**
+ * Return a field for pasted JSON, and a function that takes a text as if it had been pasted, and returns whether it is a spec.
+ * @param {(spec: Spec) => void} fill fills the form
+ */
 function pasteField(fill) {
   const area = h("textarea", { id: "pasted", rows: 8, spellcheck: "false", placeholder: '{"budget": "smoke", "repetitions": 3}' });
   const troubles = h("div", { role: "alert", class: "trouble" });
@@ -174,11 +176,13 @@ function pasteField(fill) {
       await post("/studies/estimate", spec);
       fill(spec);
       element.open = false;
+      return true;
     } catch (error) {
       element.open = true;
       const errors = error.errors?.length ? error.errors : [{ pointer: "", message: error.message }];
       troubles.replaceChildren(...errors.map((/** @type {{ pointer: string, message: string }} */ { pointer, message }) =>
         h("p", {}, pointer ? h("code", {}, pointer) : null, ` ${message}`)));
+      return false;
     }
   };
   return { element, take };
