@@ -132,6 +132,10 @@ class TimedConnection(H11Protocol):
 GRACE_S = 5
 """Time that requests under way have to finish when the service ends."""
 
+KEPT_S = 60
+"""Time for which an idle connection is kept: longer than clients keep theirs, httpx for 5 s, since one that is closed
+while its client sends loses the request."""
+
 BACKLOG = 256
 """Connections that are taken at once, before any of them counts."""
 
@@ -195,6 +199,7 @@ class Server(uvicorn.Server):
             http=connection,
             limit_concurrency=app.state.connections,
             backlog=BACKLOG,
+            timeout_keep_alive=KEPT_S,
             log_config=None,
             server_header=False,
             timeout_graceful_shutdown=GRACE_S,
