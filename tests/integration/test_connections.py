@@ -207,8 +207,8 @@ def test_a_new_connection_takes_the_place_of_the_one_that_waited_longest(app: Fa
         assert waiting[3].recv(65536).startswith(b"HTTP/1.1 200 OK")
 
 
-def test_an_idle_connection_outlives_that_of_a_client_so_that_none_closes_while_it_is_used(app: FastAPI) -> None:
-    assert Server(app).config.timeout_keep_alive > 2 * httpx2.Limits().keepalive_expiry
+def test_an_idle_connection_outlives_that_of_a_client_so_that_none_closes_while_it_is_used(sqlite_store: Store) -> None:
+    assert Server(create_app(sqlite_store)).config.timeout_keep_alive > 2 * httpx2.Limits().keepalive_expiry
 
 
 def test_beyond_the_most_requests_at_once_all_but_the_sign_of_life_are_refused(app: FastAPI) -> None:
