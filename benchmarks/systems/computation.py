@@ -1,4 +1,4 @@
-"""What each system computes beside its rollouts: `python -m benchmarks.systems.computation`, in about ten minutes.
+"""What each system computes beside its rollouts: `python -m benchmarks.systems.computation`.
 
 Printed is the processor time of one repetition of three iterations outside of its rollouts, as a share of these; that
 of `direct`, whose strategy computes nothing, is what the search for a controller takes.
