@@ -8,11 +8,12 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import engines, service
+from benchmarks import encoders, engines, service
 from benchmarks.measure import Row
 
 MEASUREMENTS: dict[str, Callable[[int], list[Row]]] = {
     "engines": engines.rows,
+    "encoders": encoders.rows,
     "service": lambda rounds: service.rows(max(2, rounds // 2)),
 }
 

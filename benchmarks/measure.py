@@ -3,7 +3,9 @@
 from collections.abc import Callable, Sequence
 from statistics import median
 from time import perf_counter
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
+
+Clock: TypeAlias = Callable[[], float]
 
 
 class Row(NamedTuple):
@@ -16,26 +18,31 @@ class Row(NamedTuple):
     target: str
 
 
-def rates(competitors: dict[str, Callable[[], int]], rounds: int) -> dict[str, list[float]]:
+def rates(
+    competitors: dict[str, Callable[[], int]], rounds: int, clock: Clock = perf_counter
+) -> dict[str, list[float]]:
     """Return each competitor's rate in units of its work per second, by round; a first round warms up only."""
     measured: dict[str, list[float]] = {name: [] for name in competitors}
     for round_number in range(rounds + 1):
         for name, work in competitors.items():
-            begun = perf_counter()
+            begun = clock()
             units = work()
             if round_number:
-                measured[name].append(units / (perf_counter() - begun))
+                measured[name].append(units / (clock() - begun))
     return measured
 
 
 def compared(
-    competitors: dict[str, Callable[[], int]], pairs: Sequence[tuple[str, str, str]], rounds: int
+    competitors: dict[str, Callable[[], int]],
+    pairs: Sequence[tuple[str, str, str]],
+    rounds: int,
+    clock: Clock = perf_counter,
 ) -> list[Row]:
     """Return the median of the ratios in each round of pairs of competitors, whose third part is the target.
 
     Pairs of which a competitor is missing are left out.
     """
-    measured, rows = rates(competitors, rounds), []
+    measured, rows = rates(competitors, rounds, clock), []
     for one, to, target in pairs:
         if {one, to} <= measured.keys():
             ratio = median(ours / theirs for ours, theirs in zip(measured[one], measured[to], strict=True))

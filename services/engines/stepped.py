@@ -6,7 +6,6 @@ energy explode.
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache
 from itertools import pairwise
 from typing import Protocol, TypeAlias, TypeVar
 
@@ -16,11 +15,10 @@ from numpy.typing import NDArray
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.engines.base import SceneEngine, Warm
+from gaplab.services.engines.energy import energy_of
 from gaplab.services.world.controllers.parts import middles
 from gaplab.services.world.kinematics import (
     Placed,
-    chain,
-    clearances_m,
     inverse,
     observed_poses,
     placed,
@@ -221,86 +219,6 @@ def plausible(poses: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(((places > LOWEST) & (places < HIGHEST)).all(axis=(-2, -1)))
 
 
-CHECKED_S = 0.1
-"""Interval of the checks: what shakes faster moves no robot."""
-
-LEAST_PULL_M_S2 = 9.81
-"""Smallest gravity by which a robot's own size counts as a fall."""
-
-_TURNS = frozen(
-    [[0, 0, 0, 1], [1, 0, 0, 0], *(np.array([[1, 0, 0, 1], [-1, 0, 0, 1], [0, 1, 0, 1], [0, -1, 0, 1]]) / 2**0.5)]
-)
-"""Rotations that turn each side of a body down."""
-
-
-def checked_s(world: World, end_s: float) -> FloatArray:
-    """Return the times `(c,)` of the checks in a rollout, whole time steps apart; none if the base is fixed."""
-    times_s = np.arange(0.0, 0.0 if world.fixed else end_s, _interval_s(world))
-    return times_s[times_s <= end_s]
-
-
-def thrown(world: World, motion: Motion | Loop) -> float:
-    """Return the energy that a robot has when a motion begins, by its mass, m²/s²: all of it may become the base's."""
-    begun = None if motion.start is None else placed(world, motion)
-    if begun is None:
-        return 0.0
-    levers_m = _levers_m(world)
-    swept = (np.abs(begun.speeds_rad_s) @ levers_m[:, 1:].T).max()
-    turned = np.linalg.norm(begun.turning_rad_s) * levers_m[:, 0].max()
-    return float(np.linalg.norm(begun.velocity_m_s) + turned + swept) ** 2 / 2
-
-
-def explodes(
-    world: World,
-    poses: FloatArray,
-    angles_rad: FloatArray,
-    gravity_m_s2: FloatArray,
-    thrown_m2_s2: FloatArray | float = 0.0,
-) -> NDArray[np.bool_]:
-    """Return `(...)`: whether the base has more energy than its start, its fall and its joints can have given it.
-
-    A robot pushes itself off at most as fast as its joints sweep its feet past the base, and may fall over its own
-    size. Joints that only shake, since their motors are too strong for an engine, sweep nothing.
-
-    Args:
-        world: world as an engine built it, with any masses and motors.
-        poses: `(..., c, ≥ 3)`: positions of the base at the checks, and more.
-        angles_rad: `(..., c, joints)`, likewise.
-        gravity_m_s2: `(..., 3)`.
-        thrown_m2_s2: `(...)`: energy at the start, by mass: see `thrown`.
-    """
-    levers_m, interval_s = _levers_m(world), _interval_s(world)
-    with np.errstate(all="ignore"):  # physics that failed gives nan, or numbers without bounds
-        speeds = np.linalg.norm(np.diff(poses[..., :3], axis=-2), axis=-1) / interval_s
-        fallen = ((poses[..., 1:, :3] - poses[..., :1, :3]) @ gravity_m_s2[..., None])[..., 0]
-        swept = (np.abs(np.diff(angles_rad, axis=-2)) @ levers_m[:, 1:].T).max(axis=-1) / interval_s
-        pushed = np.maximum.accumulate(swept, axis=-1) ** 2 / 2
-        pull = np.maximum(np.linalg.norm(gravity_m_s2, axis=-1), LEAST_PULL_M_S2)[..., None]
-        given = pull * levers_m[:, 0].max() + np.asarray(thrown_m2_s2)[..., None]
-        return np.asarray((speeds**2 / 2 > fallen + pushed + given).any(axis=-1))
-
-
-def _interval_s(world: World) -> float:
-    return max(1, round(CHECKED_S / world.time_step_s)) * world.time_step_s
-
-
-@lru_cache
-def _levers_m(world: World) -> FloatArray:
-    """Return `(bodies, 1 + joints)`: how far each body reaches, outstretched, from the base and from each joint.
-
-    It is 0 from a joint that does not carry the body, and 1 from one that slides.
-    """
-    levers_m = np.zeros((len(world.bodies), 1 + len(world.joints)))
-    for row, body in zip(levers_m, world.bodies, strict=True):
-        length_m = -float(clearances_m(body, np.zeros((len(_TURNS), 3)), _TURNS).min()) if body.parts else 0.0
-        for number in chain(world, body.name):
-            joint = world.joints[number]
-            row[1 + number] = 1.0 if joint.slides else length_m
-            length_m += float(np.linalg.norm(joint.origin_m))
-        row[0] = length_m
-    return frozen(levers_m)
-
-
 def trajectory(motion: Motion | Loop, poses: FloatArray, encoders: FloatArray) -> Trajectory:
     """Return a Trajectory of poses `(..., t, 7)`, with encoders `(..., t, 3 · joints)` if the motion asks for them.
 
@@ -370,7 +288,8 @@ class SteppedEngine(SceneEngine[S]):
         All is nan if the poses of the checked rows are implausible, or the energy explodes.
         """
         built = world.built(self.in_place)
-        scene, checks_s = self._scenes[built], checked_s(world, float(motion.observe_s[-1]))
+        scene, able = self._scenes[built], energy_of(built)
+        checks_s = able.checks_s(float(motion.observe_s[-1]))
         often = motion.observed_at(np.union1d(motion.observe_s, checks_s))
         asked, checks = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, checks_s))
         look = scene.encoders if with_encoders else lambda: np.concatenate([scene.pose(), scene.angles()])
@@ -380,9 +299,9 @@ class SteppedEngine(SceneEngine[S]):
         except self.failures:
             watched = np.full((len(often.observe_s), 7 + (1 + 2 * with_encoders) * len(world.joints)), np.nan)
         watched[often.observe_s < world.time_step_s / 2, 7 + 2 * len(world.joints) :] = 0.0  # no step has ended yet
-        seen, energetic, energy = watched[asked], watched[checks], thrown(built, motion)
+        seen, energetic, energy = watched[asked], watched[checks], able.thrown(motion)
         is_plausible = plausible(seen[checked, :7]) and plausible(_observed(world, seen[checked]))
-        if not is_plausible or explodes(built, energetic, _angles(world, energetic), gravity_m_s2(world), energy):
+        if not is_plausible or able.explodes(energetic, _angles(world, energetic), gravity_m_s2(world), energy):
             self._scenes.drop(built)  # nan persists in a PhysX scene; Bullet drops bodies that are too far away
             return np.full_like(seen, np.nan)
         return seen

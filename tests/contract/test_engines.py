@@ -12,8 +12,9 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.engines import engines, stepped
+from gaplab.services.engines import engines
 from gaplab.services.engines.base import USES, WARM_SCENES, Engine
+from gaplab.services.engines.energy import Energy
 from gaplab.services.world.motions import NO_MEMORY, Loop, Motion, Start, Trajectory, open_loop
 from gaplab.services.world.robot_library import IMPORTED
 from gaplab.services.world.robots import robots
@@ -460,7 +461,8 @@ def test_a_rollout_whose_energy_explodes_is_nan_and_harms_no_later_one(
     expected = embodied.roll()
 
     with monkeypatch.context() as without_limbs:  # so nothing pushes the robot
-        without_limbs.setattr(stepped, "_levers_m", lambda world: np.zeros((len(world.bodies), 1 + len(world.joints))))
+        none = np.zeros((len(embodied.robot.world.bodies), 1 + len(embodied.robot.world.joints)))
+        without_limbs.setattr(Energy, "levers_m", property(lambda _: none))
         exploded = embodied.roll()
 
     assert np.all(np.isnan(exploded))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gaplab.services.engines.stepped import checked_s, explodes, thrown
+from gaplab.services.engines.energy import Energy
 from gaplab.services.world.motions import Motion, Start
 from gaplab.services.world.sensing import gravity_m_s2
 from gaplab.services.world.world import Body, Box, Joint, Sphere, World
@@ -12,7 +12,8 @@ HOPPER = World(
     bodies=(Body("base", 1.0, Box((0.2, 0.1, 0.1))), Body("leg", 0.1, Sphere(0.02), (0.0, 0.0, -0.28))),
     joints=(Joint("hip", "base", "leg", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),),
 )
-TIMES_S = checked_s(HOPPER, 1.0)
+ENERGY = Energy(HOPPER)
+TIMES_S = ENERGY.checks_s(1.0)
 
 
 @pytest.mark.parametrize(
@@ -33,7 +34,7 @@ def test_a_base_is_as_fast_as_its_joints_sweep_and_as_gravity_pulls(
     poses[:, 0], poses[:, 2] = speed_m_s * TIMES_S, climb_m_s * TIMES_S**2 / 2
     angles = joint_rad_s * TIMES_S[:, None]
 
-    assert explodes(HOPPER, poses, angles, gravity_m_s2(HOPPER)) == expected
+    assert ENERGY.explodes(poses, angles, gravity_m_s2(HOPPER)) == expected
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def test_a_base_is_as_fast_as_it_is_thrown(start: Start, expected: bool) -> None
     poses[:, 0] = 5.0 * TIMES_S
     motion = Motion(np.zeros(1), np.zeros((1, 0)), TIMES_S, start=start)
 
-    assert explodes(HOPPER, poses, angles, gravity_m_s2(HOPPER), thrown(HOPPER, motion)) == expected
+    assert ENERGY.explodes(poses, angles, gravity_m_s2(HOPPER), ENERGY.thrown(motion)) == expected
 
 
 def test_a_joint_that_only_shakes_makes_no_base_fast() -> None:
@@ -59,4 +60,4 @@ def test_a_joint_that_only_shakes_makes_no_base_fast() -> None:
     poses[:, 0] = 5.0 * TIMES_S
     angles[1::2] = 0.1
 
-    assert explodes(HOPPER, poses, angles, gravity_m_s2(HOPPER))
+    assert ENERGY.explodes(poses, angles, gravity_m_s2(HOPPER))

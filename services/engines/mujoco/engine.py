@@ -12,10 +12,11 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.engines.base import USUALLY_IN_PLACE, SceneEngine
+from gaplab.services.engines.energy import Energy
 from gaplab.services.engines.mujoco.callback import torque_teller
 from gaplab.services.engines.mujoco.pool import Looping, Pool
 from gaplab.services.engines.mujoco.worlds import POSITIONS, TIME, Controls, Models, Prepared, States, Steps
-from gaplab.services.engines.stepped import checked_s, consecutive, explodes, plausible, recording, thrown, trajectory
+from gaplab.services.engines.stepped import consecutive, plausible, recording, trajectory
 from gaplab.services.world.kinematics import observed_poses, observes_base
 from gaplab.services.world.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.world.sensing import gravity_m_s2
@@ -39,6 +40,7 @@ class MuJoCoScene:
         self.pool = Pool(mujoco, self.models.structure.model, threads)
         self._rows = ROWS * threads
         self._looping = Looping(self.pool, self.states, self.controls)
+        self._energy = Energy(world)
 
     def observed(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> FloatArray:
         """Return `(n, m, t, 7)`: positions and quaternions x, y, z, w of the observed body; nan if physics failed.
@@ -95,7 +97,7 @@ class MuJoCoScene:
 
     def _checks(self, observe_s: FloatArray) -> Steps:
         """Return the steps after which energy is checked."""
-        return self.steps(checked_s(self.world, float(observe_s[-1])))
+        return self.steps(self._energy.checks_s(float(observe_s[-1])))
 
     def _checked(self, rolled: "_Rolled", observe_s: FloatArray) -> FloatArray:
         """Return `(rows, t, 7)`: observed poses; nan if MuJoCo stopped, or a rollout failed."""
@@ -105,8 +107,8 @@ class MuJoCoScene:
         finished = states[:, -1, TIME] > (kept[-1] - 0.5) * self.world.time_step_s
         failed = ~(finished & plausible(poses))
         gravity = np.tile([gravity_m_s2(each.world) for each in prepared], (len(motions), 1))
-        energy = np.repeat([thrown(self.world, motion) for motion in motions], len(prepared))
-        failed |= explodes(self.world, self.states.base(checked), self.states.angles(checked), gravity, energy)
+        energy = np.repeat([self._energy.thrown(motion) for motion in motions], len(prepared))
+        failed |= self._energy.explodes(self.states.base(checked), self.states.angles(checked), gravity, energy)
         if not observes_base(self.world):
             rows = len(seen) * seen.shape[1]
             angles = self.states.angles(seen).reshape(rows, -1)
