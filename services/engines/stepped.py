@@ -1,7 +1,6 @@
 """The base of engines that advance a scene step by step, what is commanded in which step, and checks of rollouts.
 
-All times are whole time steps. A rollout whose numbers are not physics is nan: no motor and no fall can make its
-energy explode.
+All times are whole time steps. A rollout whose numbers are not physics is nan.
 """
 
 from abc import abstractmethod
