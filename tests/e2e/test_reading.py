@@ -29,7 +29,7 @@ from tests.e2e.reading import (
 )
 from tests.parameters import few
 
-WITHOUT_SERVICE = {"run", "tuning"}
+WITHOUT_SERVICE = {"own_row", "run", "tuning"}
 """Notebooks that need no service."""
 
 LEAVES = {
@@ -97,8 +97,8 @@ def test_a_notebook_runs_from_its_first_cell_to_its_last(path: Path, service: Lo
     assert not [output for output in shown if output["output_type"] == "stream" and output["name"] == "stderr"]
 
 
-def test_there_are_five_with_the_outputs_of_one_run_and_no_place_of_the_machine_that_ran_it() -> None:
-    assert [path.stem for path in NOTEBOOKS] == ["compare", "own_robot", "own_strategy", "run", "tuning"]
+def test_there_are_six_with_the_outputs_of_one_run_and_no_place_of_the_machine_that_ran_it() -> None:
+    assert [path.stem for path in NOTEBOOKS] == ["compare", "own_robot", "own_row", "own_strategy", "run", "tuning"]
     for path in NOTEBOOKS:
         notebook = nbformat.read(path, as_version=4)
         nbformat.validate(notebook)
