@@ -167,17 +167,19 @@ def _style(place: int) -> Style:
 
 
 def rows(found: Columns) -> str:
-    """Return the table: percent of direct, of transferred controllers alone and with equal chances."""
-    keys = [(reality, equal) for equal in EQUAL for reality in _realities(found)]
-    head = ["system", *(f"{TITLES[reality]}: {equal}" for reality, equal in keys)]
+    """Return the tables: percent of direct, of transferred controllers alone and with equal chances."""
+    return "\n\n".join(f"**Equal: {equal}**\n\n{_rows(found, equal)}" for equal in EQUAL)
+
+
+def _rows(found: Columns, equal: str) -> str:
     lines, group = [], ""
     for place, row in enumerate(ROWS):
         if row.group != group:
             group = row.group
-            lines.append([f"*{group}*", *[""] * len(keys)])
-        cells = [[found[(*key, kind)].cells.get(place) for kind in KINDS] for key in keys]
+            lines.append([f"*{group}*", *[""] * len(_realities(found))])
+        cells = [[found[each, equal, kind].cells.get(place) for kind in KINDS] for each in _realities(found)]
         lines.append([row.name, *(" · ".join(map(_percent, pair)) for pair in cells)])
-    return table(head, lines)
+    return table(["system", *(TITLES[each] for each in _realities(found))], lines)
 
 
 def _percent(cell: Cell | None) -> str:

@@ -40,9 +40,13 @@ class Claim:
     found: str
     holds: bool | None
 
+    @property
+    def verdict(self) -> str:
+        """Return whether it holds, in words."""
+        return {True: "holds", False: "does not hold", None: "open"}[self.holds]
+
     def __str__(self) -> str:
-        verdict = {True: "holds", False: "does not hold", None: "open"}[self.holds]
-        return f"{verdict.upper()}: {self.says}\n  {self.found}"
+        return f"{self.verdict.upper()}: {self.says}\n  {self.found}"
 
 
 def above(says: str, first: FloatArray, second: FloatArray, least: float = 0.0, unit: str = "m/s") -> Claim:
