@@ -15,6 +15,7 @@ from typing import Any
 
 import psutil
 import pytest
+from sqlalchemy import text
 
 from gaplab.schemas.lifecycle import Ending, State, Verb
 from gaplab.schemas.spec import ExperimentSpec
@@ -146,14 +147,22 @@ def test_two_supervisors_on_one_database_do_nothing_twice(store: Store) -> None:
 
 
 def stop_outside_transactions(store: Store, pid: int) -> None:
-    """Stop a process while it holds no lock of SQLite: one that slept while it read would let nobody write."""
+    """Stop a process while it holds no lock: one that slept while it read would let nobody write in SQLite."""
     if not store.file:
-        os.kill(pid, signal.SIGSTOP)
+        wait_until(lambda: stops_idle(store, pid), meanwhile=lambda: os.kill(pid, signal.SIGCONT))
         return
     with closing(sqlite3.connect(store.file, timeout=DEADLINE_S, isolation_level=None)) as connection:
         connection.execute("BEGIN EXCLUSIVE")
         os.kill(pid, signal.SIGSTOP)
         wait_until(lambda: psutil.Process(pid).status() == psutil.STATUS_STOPPED)
+
+
+def stops_idle(store: Store, pid: int) -> bool:
+    """Stop a process, and say whether nobody else is in a transaction of Postgres."""
+    os.kill(pid, signal.SIGSTOP)
+    busy = text("SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND xact_start < now()")
+    with store.reading() as session:
+        return not session.scalar(busy)
 
 
 @pytest.fixture
