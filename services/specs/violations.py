@@ -75,7 +75,7 @@ def strategy_violations(
         able = [name for name, each in robots.items() if each.example().sensors.size]
         message = (
             f"the {robot.label} has no sensors, and {strategy.name} with these options selects by readings; "
-            f"{' and '.join(able) or 'no robot'} has sensors"
+            f"robots with sensors: {', '.join(able) or 'none'}"
         )
         yield Violation("/strategy", strategy.name, message, able)
     tuned = [proper(ref.name) for ref in spec.tunables]
