@@ -58,12 +58,11 @@ class Driver:
         with open("commands", "a") as commands:
             while not self.stopped.wait(0.01):
                 print("command", file=commands, flush=True)
+            print("stopped", file=commands, flush=True)
         self.stopped.clear()
         return 0.5
     def stop(self):
         self.stopped.set()
-        with open("commands", "a") as commands:
-            print("stopped", file=commands, flush=True)
 """
 
 
@@ -253,8 +252,7 @@ def test_a_driver_that_wakes_beside_another_stops_its_robot_and_no_measurement_o
         driver.send_signal(signal.SIGCONT)
 
         wait_until(lambda: pending(sqlite_store)[0].takes > take)
-        wait_until(lambda: commands(tmp_path)[-1] == "stopped")
         told = commands(tmp_path)
         answer = answering.answer(sqlite_store, request.id, MeasurementSpec(values=(0.5,), take=take), FREELY).answer
-        assert (take, answer.state) == (2, "conflict")
+        assert (take, told[-1], answer.state) == (2, "stopped", "conflict")
         assert (commands(tmp_path), driver.poll()) == (told, None)  # it waits for its turn
