@@ -10,10 +10,10 @@ from benchmarks.systems.judging import DESK, Arm, Claim, Spec, above, check, not
 from benchmarks.systems.rows import compared
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.loop import repetition
+from gaplab.services.core.loop import belief_of, repetition
 from gaplab.services.core.optimizers.nsga2 import fronts
 from gaplab.services.core.strategies.transferability import Objectives, Transferability
-from gaplab.services.core.types import Belief, Step, Transferred
+from gaplab.services.core.types import Step, Transferred
 from gaplab.services.specs.assembly import reality_of, setting
 
 # Back-to-Reality
@@ -155,22 +155,11 @@ def transferability(
 def _correlation(spec: ResolvedSpec, number: int, log: Sequence[Step]) -> float:
     """Return the rank correlation of estimated and measured disparity over untested members of the last front."""
     found, strategy = setting(spec, number), Transferability()
-    history = found.history(log)
-    belief = Belief(
-        found.genomes,
-        found.known,
-        history.samples,
-        history.simulators,
-        found.parameters,
-        found.names,
-        members=history.members,
-        reading_times_s=found.reading_times_s,
-        reading_periods=found.reading_periods,
-    )
+    belief = belief_of(found, found.history(log))
     objectives = Objectives(belief, strategy.options)
     assert found.sense is not None
     outcomes = found.sense(objectives.start, belief.parameters[:1])
-    scores, tested = objectives(objectives.start, outcomes), {sample.genome.tobytes() for sample in history.samples}
+    scores, tested = objectives(objectives.start, outcomes), {sample.genome.tobytes() for sample in belief.samples}
     untested = np.array([genome.tobytes() not in tested for genome in objectives.start])
     front = np.flatnonzero(untested & np.isfinite(scores).all(axis=1))
     front = front[fronts(scores[front]) == 0]

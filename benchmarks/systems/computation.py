@@ -40,8 +40,8 @@ class _Timed:
 def share(spec: Spec, place: int) -> float:
     """Return processor time outside of rollouts over that of rollouts, of one experiment of a study."""
     experiment = resolve(StudySpec.model_validate({"name": "computation", "seed": 2026} | spec))[place]
-    next(repetition(setting(experiment, 0)))  # what a process does once, like compiling a motor's law, is not counted
     found, rollouts = setting(experiment, 0), _Timed()
+    found.reality(found.known)  # what a process does once, like compiling a motor's law, is not counted
     sense = found.sense and rollouts(found.sense)
     timed = replace(found, simulate=rollouts(found.simulate), sense=sense, reality=rollouts(found.reality))
     begun = process_time()

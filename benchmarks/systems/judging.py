@@ -180,6 +180,8 @@ def asked(prog: str, description: str | None, names: Collection[str]) -> Namespa
     parser.add_argument("--folder", type=Path, default=FOLDER, help="of the studies; default: docs/studies")
     parser.add_argument("--smoke", action="store_true", help="try the studies at a tiny size; name another folder too")
     given = parser.parse_args()
+    if given.smoke and given.folder == FOLDER:
+        parser.error("--smoke needs a --folder of its own: its studies have the names of those in docs/studies")
     if unknown := set(given.names) - set(names):
         parser.error(f"nothing is called {', '.join(sorted(unknown))}")
     return given

@@ -196,7 +196,8 @@ def _keeps(setting: Setting, history: History, kind: type[Step]) -> bool:
     return bool(newest) and not any(each is sample for each in lessons for sample in newest)
 
 
-def _belief(setting: Setting, history: History) -> Belief:
+def belief_of(setting: Setting, history: History) -> Belief:
+    """Return what the strategy may know after a history."""
     return Belief(
         space=setting.genomes,
         known=setting.known,
@@ -235,7 +236,7 @@ def _kept(strategy: Strategy, search: ControllerSearch) -> Genomes:
 def _select(setting: Setting, history: History, iteration: int, answers: Answers) -> Selected:
     """Return the controller that the strategy selects, from a search if it has one."""
     budget, strategy, learned = setting.budget, setting.strategy, bool(learnable(history.samples))
-    belief = _belief(setting, history)
+    belief = belief_of(setting, history)
     evaluations = belief.at_most(budget.selection_evaluations)
     allowance = Allowance.of_selection(strategy, evaluations, setting.parameters.size, learned=learned)
     if budget.reuse_transfer and strategy.selects_transferred and history.transferred is not None:
@@ -291,7 +292,7 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
     allowance = Allowance.of_transfer(strategy, evaluations, setting.parameters.size)
     if (last := history.transferred) is not None and _keeps(setting, history, Transferred):
         return Transferred(iteration, last.genome, last.fitness, Cost(saved=allowance.rollouts))
-    belief = _belief(setting, history)
+    belief = belief_of(setting, history)
     search = _search(setting, belief, answers, allowance, setting.stream(iteration, "transfer"))
     transferred = strategy.transfer(belief, search, setting.stream(iteration, "transfer draws"))
     genome = setting.genomes.check(transferred, f"strategy {strategy.name!r}")

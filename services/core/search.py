@@ -5,7 +5,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite, nan
-from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.random import Generator
@@ -41,15 +41,6 @@ Evaluate: TypeAlias = Callable[[Question], FloatArray]
 """A function that returns the fitness of each genome, `(n,)`, to be maximised; not finite if the physics failed."""
 
 
-@runtime_checkable
-class Rejecting(Protocol):
-    """An optimizer that knows beforehand which newcomers it will reject."""
-
-    def rejection_thresholds(self, state: Population, genomes: Genomes) -> FloatArray:
-        """Return the fitness, `(n,)`, below which each genome would leave the state as it is; -inf if unknown."""
-        ...
-
-
 def maximise(
     optimizer: Optimizer,
     space: Space,
@@ -73,7 +64,6 @@ def maximise(
         rng: all randomness of the search.
         start: `(n, g)`: genomes that are evaluated before those that the optimizer asks for; default: none.
     """
-    thresholds_of = optimizer.rejection_thresholds if isinstance(optimizer, Rejecting) else _unknown
     state = optimizer.init(space)
     known: dict[bytes, FloatArray] = {}
     while evaluations > 0:
@@ -85,7 +75,7 @@ def maximise(
         new = [index for index, key in enumerate(keys) if key not in known]
         answers: Iterator[FloatArray] = iter(())
         if new:
-            thresholds = thresholds_of(state, genomes)[new]
+            thresholds = optimizer.rejection_thresholds(state, genomes)[new]
             following = partial(_following, optimizer, state, thresholds, rng, evaluations - len(genomes))
             answers = iter(evaluate(Question(genomes[new], thresholds, following)))
         fitness = np.array([known[key] if key in known else next(answers) for key in keys])
@@ -118,10 +108,6 @@ def _asked(optimizer: Optimizer, state: Population, space: Space, rng: Generator
         msg = f"genomes of shape {np.shape(genomes)}; permitted: (n, {space.size})"
         raise PluginBroken(f"optimizer {optimizer.name!r} asks for {msg}")
     return genomes
-
-
-def _unknown(_: Population, genomes: Genomes) -> FloatArray:
-    return np.full(len(genomes), -np.inf)
 
 
 def _following(

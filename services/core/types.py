@@ -117,7 +117,7 @@ class Belief:
         tunables: space of simulators.
         names: `(p,)`, names of the tunables, in the order of simulators' parameters.
         scale: about the fitness that evolution in reality would reach, above 0. It is the fitness in simulation of the
-            first transferred controller.
+            first transferred controller; 1 for a strategy that searches for none.
         discrepancy: what `simulators` were tuned to minimise.
         candidates: `(n, g)`: the recordings that are left to select from, which have readings and no fitness; None if
             any genome of the space may be tried.

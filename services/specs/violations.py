@@ -144,9 +144,10 @@ def _place_violations(tunable: Tunable, robot: Robot, engine: type[Engine], poin
 def _reading_violations(tunable: Tunable, robot: Robot, pointer: str) -> Iterator[Violation]:
     """Yield a tunable of commands that are known in advance or of sensors, if the robot has none of these."""
     name = label_of(tunable)
-    if robot.loops and tunable.needs_motion:
-        message = f"{name} is of commands that are known in advance, and the controller of the {robot.label} is a loop"
-        yield Violation(pointer, name, message, "left out, or a controller whose motions are known in advance")
+    if tunable.of_loops not in {None, robot.loops}:
+        of, other = ("observations", "commands that are known in advance")[:: 1 if tunable.of_loops else -1]
+        message = f"{name} is of {of}, and the controller of the {robot.label} is of {other}"
+        yield Violation(pointer, name, message, f"left out, or a controller of {of}")
     sensors, read = tunable.sensors(robot.world), robot.sensors.names
     if sensors and not robot.loops and not {*sensors} & {*read}:
         message = f"{name} is of {' and '.join(sensors)}, and the {robot.label} reads {' and '.join(read) or 'nothing'}"
@@ -175,11 +176,19 @@ def reality_violations(
         message = f"{strategy.name} evolves in reality itself, and the engine {engine.name!r} may move hardware"
         yield Violation("/strategy", strategy.name, message, "another strategy, or an engine with `repeatable = True`")
     yield from parameter_violations(spec.reality.parameters, robot, engine, ("reality", "parameters"))
+    yield from _share_violations(spec, strategy)
+    if engine is not simulated and not engine.repeatable:
+        yield from _noise_violations(spec, f"the engine {engine.name!r} may move hardware")
+
+
+def _share_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Violation]:
+    """Yield noise as a share of the scale of fitness, if it has a size too, or there is no scale."""
     if spec.reality.noise and spec.reality.noise_unit:
         message = "noise is a share of the scale of fitness and noise_unit its size; a reality has one of them"
         yield Violation("/reality/noise", spec.reality.noise, message, "left out, or without noise_unit")
-    if engine is not simulated and not engine.repeatable:
-        yield from _noise_violations(spec, f"the engine {engine.name!r} may move hardware")
+    if spec.reality.noise and not strategy.transfer_simulators(1):
+        message = f"{strategy.name} searches for nothing to transfer, so fitness has no scale that noise is a share of"
+        yield Violation("/reality/noise", spec.reality.noise, message, "noise_unit, in the unit of fitness")
 
 
 def _noise_violations(spec: ExperimentSpec, why: str) -> Iterator[Violation]:

@@ -63,6 +63,15 @@ def test_each_cell_keeps_its_fittest_and_of_equals_the_older() -> None:
     assert state.fitness[:, 0].tolist() == [2.0, 0.5]
 
 
+def test_the_elite_of_a_single_cell_is_mutated() -> None:
+    state = elites([1.0, 0.0, 0.0])
+
+    newcomers = MapElites(MapElitesOptions()).ask(state, np.random.default_rng(0))
+
+    assert len(newcomers) == 20
+    assert np.median(np.abs(newcomers - state.genomes), axis=0).max() < 0.1
+
+
 def test_a_repertoire_is_described_by_how_long_sensors_are_above_and_below_their_noise() -> None:
     best, scores = asked("select", members=GENOMES[:0])
 

@@ -216,6 +216,7 @@ def test_everything_that_is_wrong_is_said_at_once() -> None:
         ),
         ({"reality": {"kind": "physical", "noise": 0.1}}, "/reality/noise", "left out"),
         ({"reality": {"noise": 0.1, "noise_unit": 0.02}}, "/reality/noise", "left out, or without noise_unit"),
+        ({"reality": {"noise": 0.1}, "strategy": "surrogate"}, "/reality/noise", "noise_unit, in the unit of fitness"),
         ({"strategy": {"name": "known_fit", "options": {"spred": 1}}}, "/strategy/options/spred", ("spread",)),
     ],
 )

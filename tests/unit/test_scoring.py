@@ -1,8 +1,12 @@
 """The paper's formulas against values computed by hand."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.contract.strategies import belief
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.scoring import (
     NO_FLOOR,
@@ -13,6 +17,7 @@ from gaplab.services.core.scoring import (
     weighted_mean,
 )
 from gaplab.services.core.space import Space
+from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import DiverseOptions
 from gaplab.services.core.types import Belief, Sample
 
@@ -136,3 +141,17 @@ def test_a_failed_rollout_makes_the_score_nan() -> None:
 
     assert np.isnan(weighted_mean(failed, WEIGHTS)).all()
     assert np.isnan(weighted_deviation(failed, WEIGHTS)).all()
+
+
+def test_farthest_without_a_sample_keeps_away_from_what_its_search_began_with() -> None:
+    asked: list[Any] = []
+
+    def search(score: Any, **_: Any) -> Any:
+        for readings in ([[0.0, 0.0], [0.0, 2.0]], [[3.0, 1.0]]):
+            asked.append(score(np.zeros((len(readings), 2)), np.insert(readings, 0, 0.5, axis=1)[:, None, :]))
+        return np.zeros(2)
+
+    farthest = strategies.create(PluginRef(name="farthest"))
+    farthest.select(belief(farthest), search, np.random.default_rng(0))
+
+    np.testing.assert_allclose(np.concatenate(asked), np.sqrt([0.5, 0.5, 4.5]))

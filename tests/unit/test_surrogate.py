@@ -93,3 +93,17 @@ def test_residual_corrects_what_no_simulator_reproduces() -> None:
     tuned = steps_of("simulated_fit", Transferred, iterations=8, simulate=tilted)
 
     assert away(corrected[-1].genome, TRUTH) < 0.1 < away(tuned[-1].genome, TRUTH)
+
+
+def test_residual_corrects_nothing_while_no_simulator_survives_the_samples() -> None:
+    asked: list[Any] = []
+
+    def search(score: Any, *, start: Any, **_: Any) -> Any:
+        asked.append(score(start, np.full((1, 1), np.nan)))
+        asked.append(score(start + 0.1, np.ones((1, 1))))
+        return start[0]
+
+    residual = strategies.create(PluginRef(name="residual"))
+    residual.transfer(belief(residual, [Sample(TRUTH, 5.0)]), search, np.random.default_rng(0))
+
+    assert [float(scores[0]) for scores in asked] == pytest.approx([np.nan, 1.0], nan_ok=True)

@@ -9,9 +9,9 @@ import pytest
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.core.loop import repetition
+from gaplab.services.core.loop import belief_of, repetition
 from gaplab.services.core.search import Allowance, ControllerSearch
-from gaplab.services.core.types import Belief, Budget, Measured, Outcome, Probed, Sample, Selected, Transferred
+from gaplab.services.core.types import Budget, Measured, Outcome, Probed, Sample, Selected, Transferred
 from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
 from gaplab.services.store.models import StepRow
 from gaplab.services.store.queries.logs import columns_of, step_of
@@ -94,17 +94,9 @@ def test_the_estimate_is_the_mean_of_disparities_weighted_by_distance(exponent: 
 def begun(setting: Any, samples: Any, kind: Any) -> Any:
     """What a first selection does with these samples."""
     drawn = next(repetition(setting)).simulators  # type: ignore[union-attr]
-    belief = Belief(
-        setting.genomes,
-        setting.known,
-        tuple(samples),
-        drawn,
-        setting.parameters,
-        setting.names,
-        members=setting.genomes.draw(18, np.random.default_rng(2)),
-        reading_times_s=setting.reading_times_s,
-        reading_periods=setting.reading_periods,
-    )
+    members = setting.genomes.draw(18, np.random.default_rng(2))
+    known = belief_of(setting, setting.history([]))
+    belief = replace(known, samples=tuple(samples), simulators=drawn, members=members)
     rng = np.random.default_rng(0)
     search = kind("transferability", setting.controller_optimizer, belief, setting.answers(), Allowance(80, 1), rng)
     return setting.strategy.select(belief, search, np.random.default_rng(1)), search

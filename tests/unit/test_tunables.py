@@ -82,7 +82,7 @@ def test_labels_are_separated_by_commas_outside_parentheses() -> None:
 
 
 def test_a_resolved_spec_has_proper_labels_and_reality_has_the_nominal_values() -> None:
-    labels = ["mass(of=trunk)", "mass(*_shin, as=value)", "slope", "noise(angle_rad)", "center_of_mass(trunk)"]
+    labels = ["mass(of=trunk)", "mass(*_shin, as=value)", "slope", "noise(start_tilt_rad)", "center_of_mass(trunk)"]
     spec = resolved(tunables=labels, reality={"parameters": {"mass( trunk )": 1.1}})
 
     assert [ref.name for ref in spec.tunables] == ["mass(trunk)", *labels[1:]]
@@ -92,7 +92,7 @@ def test_a_resolved_spec_has_proper_labels_and_reality_has_the_nominal_values() 
         "mass(trunk)": 1.1,
         "mass(*_shin, as=value)": 0.15,
         "slope": 0.0,
-        "noise(angle_rad)": 0.0,
+        "noise(start_tilt_rad)": 0.0,
         "center_of_mass(trunk)": 0.0,
     }
     assert resolve_experiment(ExperimentSpec.model_validate(spec.model_dump(mode="json"))) == spec
@@ -354,12 +354,15 @@ def test_the_frame_of_the_sensors_and_their_biases_are_set_one_by_one() -> None:
 def test_what_lies_between_physics_and_sensors_is_refused_where_there_is_none() -> None:
     unread = refusals(tunables=["bias(front_left_knee)", "bias(front_left_toe)"])
     looping = refusals(tunables=["time_offset"], controller="mlp")
+    planned = refusals(tunables=["latency", "noise(angle_rad)", "noise", "noise(start_tilt_rad)"])
     unmoved = refusals(robot="toy_function", engine="analytic", tunables=["time_offset", "ground_height"])
 
     assert "is of angle front_left_knee, and the quadruped reads roll and pitch" in unread["/tunables/0"].message
     assert unread["/tunables/0"].permitted == "a task that reads it"
     assert "matches no joint" in unread["/tunables/1"].message
-    assert "the controller of the quadruped is a loop" in looping["/tunables/0"].message
+    assert "the controller of the quadruped is of observations" in looping["/tunables/0"].message
+    assert [*planned] == ["/tunables/0", "/tunables/1"]
+    assert planned["/tunables/1"].permitted == "left out, or a controller of observations"
     assert "the robot has no motors" in unmoved["/tunables/0"].message
     assert "analytic does not honour ground_height" in unmoved["/tunables/1"].message
     assert resolved(tunables=["bias(front_left_knee)"], controller="mlp").tunables  # which observes it

@@ -1,6 +1,7 @@
 """No tuner spends more than its budget, however small, and the loop refuses one that does."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -179,3 +180,21 @@ def test_least_squares_stays_within_bounds_that_rounding_would_leave() -> None:
     tunings = [step for step in repetition(setting) if isinstance(step, Tuned)]
 
     assert max(simulator.parameters.max() for step in tunings for simulator in step.simulators) == 0.29
+
+
+@pytest.mark.parametrize("slopes", [[1.0], [1.0] * 30, [0.0]])
+def test_least_squares_has_an_answer_where_all_slopes_are_equal_and_where_nothing_differs(slopes: list[float]) -> None:
+    differences: Any = SimpleNamespace(
+        residuals=lambda parameters: (parameters - 0.3) * np.array(slopes),
+        of=lambda parameters: parameters[:, 0],
+        noise=0.0,
+    )
+    task = TuningTask(differences, Space.box([0.0], [1.0]), SteadyState(), 1, 60, ())
+
+    found = tuner("least_squares", {}).tune(task, np.random.default_rng(0))[0]
+
+    assert found.interval is not None
+    if slopes[0]:
+        assert [*found.parameters, *found.interval[0]] == pytest.approx([0.3] * 3, abs=1e-6)
+    else:
+        assert [*found.interval[0]] == [0.0, 1.0]

@@ -71,6 +71,10 @@ class Optimizer(Plugin):
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:
         """Return the population after learning the fitness `(n,)` of genomes `(n, g)`."""
 
+    def rejection_thresholds(self, state: Population, genomes: Genomes) -> FloatArray:  # noqa: ARG002 - it is unknown
+        """Return the fitness, `(n,)`, below which each genome would leave the state as it is; -inf if unknown."""
+        return np.full(len(genomes), -np.inf)
+
     @abstractmethod
     def diverse(self, size: int) -> "Optimizer":
         """Return the same optimizer, except that it keeps `size` members that differ from each other."""

@@ -33,10 +33,10 @@ class MapElites(Optimizer):
 
     It is for strategies whose score describes behaviour: `(n, 1 + d)`, fitness, then a descriptor of d numbers from 0
     to 1. The cell of a number x is the nearest of `bins` from 0 to 1. A newcomer has one parent, uniform over filled
-    cells, and mutates as those of `steady_state`. Of the authors' release, the tie within 0.05 of fitness is left out,
-    which has a unit. Do not use it to find one fittest controller or simulator: it spends most of its budget on other
-    behaviours. Where only fitness is scored, the genes, as shares of their extents, are the descriptor; diverse
-    simulators are those of `steady_state`.
+    cells, and mutates as those of `steady_state`. In the authors' release, a newcomer nearer to the middle of its cell
+    replaces an elite that is up to 0.05 fitter; that is left out, since fitness has other units here. Do not use it to
+    find one fittest controller or simulator: it spends most of its budget on other behaviours. Where only fitness is
+    scored, the genes, as shares of their extents, are the descriptor; diverse simulators are those of `steady_state`.
     """
 
     name = "map_elites"
@@ -56,7 +56,8 @@ class MapElites(Optimizer):
         if not state.size:
             return state.space.draw(self.options.population, rng)
         variation = SteadyStateOptions(population=2, tournament=1, crossover=0.0, offspring=self.options.population)
-        return SteadyState(variation).ask(Population(state.space, state.genomes, state.first), rng)
+        parents = np.resize(np.arange(state.size), max(state.size, variation.population))
+        return SteadyState(variation).ask(Population(state.space, state.genomes[parents], state.first[parents]), rng)
 
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:
         """Return the elites after learning the fitness `(n,)` or `(n, 1 + d)` of genomes; of equals, the older stays.

@@ -24,7 +24,8 @@ class BackToRealityOptions(Frozen):
     )
     learn_from_trials: bool = Field(
         default=False,
-        description="simulators are tuned on these too, not on the samples alone; the authors': no, as surveyed",
+        description="simulators are tuned on these too, after each, not on the samples alone; the authors': no, as "
+        "surveyed",
     )
     step: Scale = Field(
         default=0.05,
@@ -50,7 +51,7 @@ class BackToReality(Strategy):
     The best controller measured so far is the seed. It is transferred, and the next search in simulation begins with
     it. All trials count as real-world evaluations. The authors' discrepancy is `absolute_fitness`. Do not use it where
     real-world evaluations are few: a small step climbs the roughness of fitness, and its trials teach the simulator
-    nothing.
+    nothing. Nor with samples from before: rounds are counted from the first sample.
     """
 
     name = "back_to_reality"

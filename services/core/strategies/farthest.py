@@ -13,7 +13,7 @@ class Farthest(Strategy):
 
     Of recordings with commands, it is the root mean square difference of the commands, and costs no rollout. Of others,
     it is that between the readings in the best simulator and those of the samples. The first recording is random; the
-    first of other controllers is far from the mean.
+    first of other controllers is far from the mean of those that a search begins with.
     """
 
     name = "farthest"
@@ -32,10 +32,15 @@ class Farthest(Strategy):
             farthest: Genome = left[np.argmax(_apart(belief.commands[left[:, 0].astype(int)], chosen))]
             return farthest
 
+        known = list[FloatArray]()
+
         def score(_: Genomes, outcomes: Outcomes) -> FloatArray:
             points = outcomes[:, 0, 1:] if outcomes.shape[2] > 1 else outcomes[:, 0]  # fitness without sensors
-            rows = [each.readings if outcomes.shape[2] > 1 else each.outcome for each in samples]
-            known = [row for row in rows if row.size == points.shape[1]] or [np.nan_to_num(points).mean(axis=0)]
+            if not known:
+                rows = [each.readings if outcomes.shape[2] > 1 else each.outcome for each in samples]
+                known.extend(row for row in rows if row.size == points.shape[1])
+            if not known:
+                known.append(np.nan_to_num(points).mean(axis=0))
             return np.where(np.isnan(outcomes[:, 0, 0]), np.nan, _apart(points, np.array(known)))
 
         return search(score, parameters=belief.parameters[:1], senses=True)

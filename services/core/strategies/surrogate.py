@@ -50,7 +50,7 @@ class SurrogateOptions(Frozen):
 
 
 class Surrogate(Strategy):
-    """The controller with the best prediction of Kriging on the samples, or the least certain one if that is near one.
+    """The controller with the best prediction of Kriging on the samples; the least certain one if a sample is near it.
 
     No simulator is asked or tuned. Do not use it for many genes and few samples: ten samples say nothing of 24 genes.
     """
@@ -145,19 +145,23 @@ class Residual(Strategy):
 
     def _fittest(self, belief: Belief, search: Search) -> tuple[Genome, Posterior | None]:
         """Return the controller with the highest corrected fitness found, and the correction; None if none is known."""
-        corrections = list[Posterior]()
+        correction: Posterior | None = None
         samples = np.array([each.genome for each in belief.learnable])
         real = np.array([each.fitness for each in belief.learnable])
 
+        begun = False
+
         def score(genomes: Genomes, fitnesses: Fitnesses) -> FloatArray:
+            nonlocal correction, begun
             simulated = fitnesses[:, 0]
             first = np.flatnonzero(np.isfinite(simulated[: len(real)]))
-            if not corrections and len(first):  # the search evaluates the samples first
-                corrections.append(_kriging(belief.space, genomes[first], real[first] - simulated[first]))
-            return simulated + corrections[0].predict(genomes)[0] if corrections else simulated
+            if not begun and len(first):  # the search evaluates the samples first
+                correction = _kriging(belief.space, genomes[first], real[first] - simulated[first])
+            begun = True
+            return simulated + correction.predict(genomes)[0] if correction else simulated
 
         best = search(score, parameters=belief.parameters[:1], start=samples if len(samples) else None)
-        return best, corrections[0] if corrections else None
+        return best, correction
 
 
 def _kriging(space: Space, points: Genomes, values: FloatArray) -> Posterior:

@@ -87,12 +87,12 @@ class Transferability(Strategy):
 class Objectives:
     """The score of a search: fitness, minus the estimated disparity, and novelty, `(n, 3)`.
 
-    Its first call has the tested genomes, then the first population, which says what distances are usual.
+    Its first call has the tested genomes, then the members, which together say what distances are usual.
 
     Attributes:
         start: `(n, g)`: genomes to evaluate first.
         scores: scores `(3,)` of each genome so far.
-        usual: median distance of a member of the first population from its nearest neighbour.
+        usual: median distance of a tested genome or member from its nearest neighbour, as the search begins.
         fair: median disparity of the tests; inf without any.
     """
 

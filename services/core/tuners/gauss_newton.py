@@ -31,7 +31,9 @@ class GaussNewtonOptions(Frozen):
     """Options of the tuner `gauss_newton`."""
 
     evaluations: Annotated[int, Field(strict=True, ge=8, le=1_000_000)] = Field(
-        default=60, description="most simulators to evaluate; the rest of the budget is saved"
+        default=60,
+        description="most simulators to evaluate; the rest of the budget is saved; they say nothing unless each round "
+        "has three more than there are tunables, beside the ensemble",
     )
     rounds: Annotated[int, Field(strict=True, ge=1, le=20)] = Field(
         default=2, description="linear models, each in a smaller box around the estimate so far"
@@ -97,9 +99,10 @@ class LeastSquaresOptions(Frozen):
 class LeastSquares(Tuner):
     """Least squares from one place, with slopes by differences: for many tunables, and answers without much contact.
 
-    It starts from the tuning before, or in the middle of the bounds, and goes on until nothing gains or the budget is
-    spent. The first slopes cost one simulator for each tunable. Then tunables that move different answers, like those
-    of two joints, share one. Intervals come from the slopes at the end. In rough contact, `gauss_newton` is better.
+    It starts from the tuning before, or in the middle of the bounds, and goes on until nothing gains or the budget has
+    no slopes left. The first slopes cost one simulator for each tunable. Then tunables that move different answers,
+    like those of two joints, share one, and a slope counts if it is at least the root mean square of its tunable's.
+    Estimate and intervals are those of the last slopes. In rough contact, `gauss_newton` is better.
     """
 
     name = "least_squares"
@@ -134,7 +137,7 @@ class LeastSquares(Tuner):
             )
         place, level, jacobian = answers.best
         freedom = max(1, len(level) - size)
-        variance = max(float(level @ level) / freedom, task.misfit.noise)
+        variance = max(float(level @ level) / freedom, task.misfit.noise, LEAST_VARIANCE)
         covariance = np.linalg.inv(jacobian.T @ jacobian / variance + np.eye(size) / PRIOR_VARIANCE)
         return _simulators(task, LocalEstimate(place, frozen(covariance), freedom), rng)
 
@@ -175,7 +178,7 @@ class _Smooth:
                 own = slice(None) if self._moved is None else self._moved[:, column]
                 found[own, column] = change[own] / steps[column]
         if self._moved is None:
-            self._moved = np.abs(found) > OVERLAP * np.sqrt((found**2).mean(axis=0))
+            self._moved = (found != 0.0) & (np.abs(found) > OVERLAP * np.sqrt((found**2).mean(axis=0)))
             self._groups = _apart(self._moved)
         self.best = place.copy(), level, found
         return found
@@ -200,8 +203,11 @@ def _apart(moved: NDArray[np.bool_]) -> list[list[int]]:
     return groups
 
 
-OVERLAP = 1.0
-"""Slope of an answer, over the root mean square of a tunable's slopes, from which on the tunable moves it."""
+OVERLAP = 1.0 - 1e-9
+"""Slope of an answer, over the root mean square of a tunable's slopes, above which the tunable moves it; 1, rounded."""
+
+LEAST_VARIANCE = 1e-30
+"""Of a difference, where a simulator reproduces the samples to the last bit."""
 
 FAILED = 1e6
 """Difference of an answer where the physics failed."""
@@ -223,8 +229,8 @@ class LocalEstimate:
 
     @classmethod
     def unknown(cls, size: int) -> "LocalEstimate":
-        """Return the middle of the bounds, with both bounds as its errors."""
-        return cls(np.full(size, 0.5), np.full((size, size), 0.25), 1)
+        """Return the middle of the bounds, with half their width as the deviation of each tunable."""
+        return cls(np.full(size, 0.5), 0.25 * np.eye(size), 1)
 
     def interval(self) -> FloatArray:
         """Return `(p, 2)`: ends of the interval of each tunable, by Student's t."""

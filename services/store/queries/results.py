@@ -230,11 +230,13 @@ def iteration_costs(session: Session, experiments: Sequence[str]) -> Sequence[tu
     """Return the cost of each iteration, in the order of the log.
 
     Returns:
-        Experiment, repetition, iteration, rollouts, seconds, and whether the iteration has a recorded fitness.
+        Experiment, repetition, iteration, rollouts, seconds of simulation, which those of reality are not, and whether
+        the iteration has a recorded fitness.
     """
     row = StepRow
     key = RepetitionRow.experiment_id, RepetitionRow.number, row.iteration
-    sums = func.sum(row.rollouts), func.sum(row.seconds), func.count(row.recorded) > 0
+    seconds = func.sum(case((row.kind.in_([StepKind.MEASURED, StepKind.PROBED]), 0.0), else_=row.seconds))
+    sums = func.sum(row.rollouts), seconds, func.count(row.recorded) > 0
     query = of_experiments(row, experiments, *key, *sums).where(row.branch == LOG)
     return session.execute(query.group_by(*key).order_by(*key)).all()
 

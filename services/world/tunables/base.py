@@ -39,7 +39,8 @@ class Tunable(Plugin):
         order: when it edits, among the tunables of a spec: `REBUILDS`, before all others, if it replaces what engines
             build; `SHARES` if what it replaces is the same for all its values; `IN_PLACE` if it replaces only what it
             names to `World.edited`.
-        needs_motion: true if it means nothing for a controller in a loop, which sends its commands when it observes.
+        of_loops: true if it is of what a controller in a loop observes, false if it is of commands that are known in
+            advance, and means nothing for other controllers; None if it is of all.
     """
 
     field: str
@@ -51,7 +52,7 @@ class Tunable(Plugin):
     also: ClassVar[frozenset[str]] = frozenset()
     relative: bool = False
     order: ClassVar[int] = REBUILDS
-    needs_motion: ClassVar[bool] = False
+    of_loops: bool | None = None
 
     @abstractmethod
     def read(self, world: World) -> float:

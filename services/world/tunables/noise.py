@@ -46,6 +46,8 @@ class NoiseDeviation(Tunable):
         self.unit = UNITS[self.options.of]
         if self.options.of == "start_tilt_rad":
             self.field = "noise.start_tilt_rad"
+        elif self.options.of != "target":
+            self.of_loops = True
 
     def read(self, world: World) -> float:
         """Return the standard deviation."""
@@ -71,6 +73,7 @@ class Latency(Tunable):
     field = "noise"
     also = frozenset({"latency_s"})
     unit = "s"
+    of_loops = True
     lower, upper = 0.0, 0.05
     least, greatest = 0.0, 10.0
 
@@ -95,7 +98,7 @@ class TimeOffset(WorldTunable):
     unit = "s"
     lower, upper = -0.1, 0.4
     least, greatest = -10.0, 10.0
-    needs_motion = True
+    of_loops = False
 
     def lack(self, world: World) -> tuple[str, tuple[str, ...]] | None:
         """Return, if the robot has no motor that follows commands, a sentence."""
