@@ -78,8 +78,12 @@ class Trace:
         return transform.Slerp(self.times_s, transform.Rotation.from_quat(self.orientations))
 
     def at(self, times_s: FloatArray) -> Trajectory:
-        """Return what it says at times `(t,)` within the trace, interpolated; poses that it does not say are nan."""
-        turns = np.full((len(times_s), 4), np.nan) if self.orientations is None else self._turns(times_s).as_quat()
+        """Return what it says at times `(t,)`, interpolated; poses that it does not say are nan.
+
+        Before and after the trace, it is as at its ends.
+        """
+        inside_s = np.clip(times_s, self.times_s[0], self.times_s[-1])
+        turns = np.full((len(times_s), 4), np.nan) if self.orientations is None else self._turns(inside_s).as_quat()
         place = self._between(times_s, self.positions_m)
         others = (self.angles_rad, self.speeds_rad_s, self.torques_nm, self.commands)
         found = (self._between(times_s, each) for each in others)

@@ -155,7 +155,7 @@ def placed(
     There a motion begins above the origin, with the base turned as `world.start_turn`; only a turn about z is removed.
     What the trace does not say is nan.
     """
-    seen = trace.at(np.clip(times_s + lag_s, trace.times_s[0], trace.times_s[-1]))
+    seen = trace.at(times_s + lag_s)
     if world.fixed:
         poses = np.tile([0.0, 0.0, world.start_height_m, *world.start_turn], (len(times_s), 1))
     elif trace.positions_m is None:
@@ -184,7 +184,7 @@ def _features(trace: Trace, times_s: FloatArray, other: Trace) -> FloatArray:
 
     They are speed over ground, vertical speed and tilt of the base, and the angles of the joints.
     """
-    seen = trace.at(np.clip(times_s, trace.times_s[0], trace.times_s[-1]))
+    seen = trace.at(times_s)
     angles = None if other.angles_rad is None else seen.angles_rad
     joints = np.empty((0, len(times_s))) if angles is None else angles.T
     if trace.positions_m is None or other.positions_m is None or not np.all(np.isfinite(trace.positions_m)):
@@ -239,7 +239,7 @@ def _unlike(
 ) -> Iterator[str]:
     """Yield how the motion of a base differs from the expected one more than a wrong simulator explains."""
     yield from _jump(trace.times_s[inside], positions_m[inside], wanted)
-    seen = trace.at(np.clip(lag_s + wanted.times_s, trace.times_s[0], trace.times_s[-1]))
+    seen = trace.at(lag_s + wanted.times_s)
     yield from _start(seen.positions_m[0, 2], wanted.positions_m[0, 2], seen.orientations, wanted.orientations)
     far, expected = (
         float(np.linalg.norm(places_m[:, :2] - places_m[0, :2], axis=1).max())

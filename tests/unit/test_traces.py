@@ -195,6 +195,17 @@ def test_a_trace_is_read_with_any_order_units_and_more_columns() -> None:
     assert trace.at(frozen([0.625])).positions_m.tolist() == [[1.5, 2, 3]]
 
 
+def test_a_trace_of_rounded_times_is_aligned_to_its_last_row(expected: Trace) -> None:
+    """390.97 + 1046 · 0.005 lies one rounding after 396.2."""
+    times = frozen(np.round(390.97 + np.arange(524) * 0.01, 2))
+    seen = expected.at(times - 392.0)
+
+    found = align(Trace(times, seen.positions_m, seen.orientations), expected)
+
+    assert times[0] + 1046 * 0.005 > times[-1]
+    assert found.lag_s == pytest.approx(392.0, abs=0.011)
+
+
 ENDLESS = '"' + "0123456789\n" * 20_000
 """A cell whose quote is not closed."""
 
