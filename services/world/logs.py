@@ -90,7 +90,7 @@ class Trace:
         return Trajectory(times_s, np.full((len(times_s), 3), np.nan) if place is None else place, turns, *found)
 
     def _between(self, times_s: FloatArray, values: FloatArray | None) -> FloatArray | None:
-        if values is None:
+        if values is None or not values.size:
             return None
         return np.stack([np.interp(times_s, self.times_s, column) for column in values.T], axis=-1)
 

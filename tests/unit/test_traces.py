@@ -131,6 +131,12 @@ def test_a_weak_match_without_rest_is_uncertain(expected: Trace) -> None:
     assert any("the recording does not begin at rest" in each for each in unlikely(trace, expected, found, ROBOT.world))
 
 
+def test_a_robot_without_joints_has_traces(expected: Trace) -> None:
+    simulated = replace(expected, angles_rad=np.empty((len(expected.times_s), 0)))
+
+    assert align(shifted(expected, 5.0), simulated) == align(shifted(expected, 5.0), expected)
+
+
 @pytest.mark.parametrize("turn_rad", [0.0, 2.5, -1.0])
 def test_fitness_and_readings_depend_on_no_place_and_no_heading(expected: Trace, turn_rad: float) -> None:
     trace = shifted(expected, 5.0, turn_rad)
