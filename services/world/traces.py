@@ -88,7 +88,7 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None, motion: Mot
             failed.
         lag_s: the lag if it is known; None: it is found. If the expected motion does not change, the trace begins with
             the motion.
-        motion: that of the robot; if the trace has its commands, they alone show when it began.
+        motion: that of the robot; if the trace has commands that change, they alone show when it began.
 
     Raises:
         TooShort: the trace does not contain the whole motion.
@@ -103,11 +103,10 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None, motion: Mot
         return Alignment(float(np.clip(lag_s, first, max(first, latest))))
     if latest < first - STEP_S:
         raise TooShort(f"it lasts {last - first:g} s, and the motion {duration:g} s")
-    sent = trace.commands is not None and isinstance(motion, Motion)
-    scores = _scores(trace, expected, motion if sent else None)
+    scores, by_commands = _scores(trace, expected, motion)
     if scores is None:
         return Alignment(float(first))
-    near, begun = np.ones(len(scores), dtype=bool), None if sent else _onset(trace)
+    near, begun = np.ones(len(scores), dtype=bool), None if by_commands else _onset(trace)
     if begun is not None and (expected_to := _onset(expected, at_once=True)) is not None:
         away = np.abs(first + np.arange(len(scores)) * STEP_S - (begun - expected_to))
         near = away <= max(AROUND_S, float(away.min()))
@@ -116,16 +115,16 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None, motion: Mot
     return Alignment(lag_s, float(min(scores[best], 1.0)), after_rest=not near.all())
 
 
-def _scores(trace: Trace, expected: Trace, motion: Motion | Loop | None) -> FloatArray | None:
-    """Return how well each shift `(shifts,)` fits: of the commands, if the motion is given; None if nothing changes."""
+def _scores(trace: Trace, expected: Trace, motion: Motion | Loop | None) -> tuple[FloatArray | None, bool]:
+    """Return how well each shift `(shifts,)` fits, None if nothing changes, and whether that is of the commands."""
     first, last = trace.times_s[0], trace.times_s[-1]
     count = int((last - first) / STEP_S + 1e-6) + 1
     length = min(count, int(float(expected.times_s[-1]) / STEP_S + 1e-6) + 1)
     times_s, elapsed_s = frozen(first + np.arange(count) * STEP_S), frozen(np.arange(length) * STEP_S)
     sent, logged = None if motion is None else commands_at(motion, elapsed_s), trace.at(times_s).commands
-    if sent is not None and logged is not None:
-        return _correlations(logged.T, sent.T)
-    return _correlations(_features(trace, times_s, expected), _features(expected, elapsed_s, trace))
+    if sent is not None and logged is not None and (found := _correlations(logged.T, sent.T)) is not None:
+        return found, True
+    return _correlations(_features(trace, times_s, expected), _features(expected, elapsed_s, trace)), False
 
 
 def _onset(trace: Trace, *, at_once: bool = False) -> float | None:

@@ -57,9 +57,11 @@ def rated(robot: Robot, trace: Trace) -> Any:
     return evaluated(robot, robot.known, [trace], expected, TracesSpec(traces=("a" * 64,)))
 
 
-@pytest.mark.parametrize("commands", [True, False])
-def test_encoders_of_an_arm_give_fitness_and_readings(arm: Robot, commands: bool) -> None:
+@pytest.mark.parametrize(("commands", "share"), [(True, 1.0), (True, 0.0), (False, 1.0)])
+def test_encoders_of_an_arm_give_fitness_and_readings(arm: Robot, commands: bool, share: float) -> None:
+    """Commands that never change say nothing about time."""
     log = Log(arm)
+    log.commands *= share
     found = rated(arm, read_trace(log.text(commands=commands), "/traces/0", arm.world))
 
     real = MuJoCo().rollout(arm.world, open_loop(arm.motion(arm.known)))
