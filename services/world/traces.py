@@ -219,9 +219,11 @@ def unlikely(
     The expected motion, of a simulator, is nan if its physics failed. Commands `(k, a)` are those of the motion at the
     trace's times; None if they are not known.
     """
-    inside = (trace.times_s >= alignment.lag_s) & (trace.times_s <= alignment.lag_s + expected.times_s[-1])
+    begin_s, end_s = alignment.lag_s, alignment.lag_s + expected.times_s[-1]
+    inside = (trace.times_s >= begin_s) & (trace.times_s <= end_s)
     parts = [each for each in (trace.positions_m, trace.orientations, trace.angles_rad) if each is not None]
-    yield from _holes(trace.times_s[inside], np.hstack(parts)[inside])
+    yield from _gap(trace.times_s, begin_s, end_s)
+    yield from _still(trace.times_s[inside], np.hstack(parts)[inside])
     yield from unlikely_joints(trace, world, commands)
     if expected.positions_m is None or not np.all(np.isfinite(expected.positions_m)):
         return
@@ -305,15 +307,19 @@ def _wrong(joint: Joint, angles: FloatArray, targets: FloatArray | None, lines: 
     return ""
 
 
-def _holes(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
-    """Yield sentences: where rows are missing or stay the same for too long, or that nothing ever moves."""
+def _gap(times_s: FloatArray, begin_s: float, end_s: float) -> Iterator[str]:
+    """Yield where rows are missing for too long of a motion, which may begin or end in the gap."""
+    steps = np.diff(np.clip(times_s, begin_s, end_s))
+    at = int(np.argmax(steps))
+    if steps[at] > max(LONGEST_GAP_S, 4.0 * float(np.median(np.diff(times_s)))):
+        yield f"there is no row from {times_s[at]:.10g} to {times_s[at + 1]:.10g} s"
+
+
+def _still(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
+    """Yield where rows stay the same for too long, or that nothing ever moves; what is nan says neither."""
     if len(times_s) < 2:
         return
-    steps = np.diff(times_s)
-    at = int(np.argmax(steps))
-    if steps[at] > max(LONGEST_GAP_S, 4.0 * float(np.median(steps))):
-        yield f"there is no row from {times_s[at]:.10g} to {times_s[at + 1]:.10g} s"
-    changes = np.flatnonzero(np.any(np.diff(poses, axis=0) != 0.0, axis=1))
+    changes = np.flatnonzero(np.any(np.abs(np.diff(poses, axis=0)) > 0.0, axis=1))
     if not changes.size:
         yield "nothing moves"
         return
