@@ -217,14 +217,15 @@ def unlikely(
     """Yield what is unlikely about a trace, each as a clause.
 
     The expected motion, of a simulator, is nan if its physics failed. Commands `(k, a)` are those of the motion at the
-    trace's times; None if they are not known.
+    trace's times, by default the trace's own; they count during the motion alone.
     """
     begin_s, end_s = alignment.lag_s, alignment.lag_s + expected.times_s[-1]
     inside = (trace.times_s >= begin_s) & (trace.times_s <= end_s)
     parts = [each for each in (trace.positions_m, trace.orientations, trace.angles_rad) if each is not None]
     yield from _gap(trace.times_s, begin_s, end_s)
     yield from _still(trace.times_s[inside], np.hstack(parts)[inside])
-    yield from unlikely_joints(trace, world, commands)
+    sent = trace.commands if commands is None else commands
+    yield from unlikely_joints(trace, world, None if sent is None else np.where(inside[:, None], sent, np.nan))
     if expected.positions_m is None or not np.all(np.isfinite(expected.positions_m)):
         return
     if trace.positions_m is not None:
@@ -253,13 +254,14 @@ def _unlike(
 def unlikely_joints(trace: Trace, world: World, commands: FloatArray | None = None) -> Iterator[str]:
     """Yield which joints move as they cannot, or against their commands, with the column and the likely mistake.
 
-    Commands `(k, a)`, at the trace's times, are by default its own.
+    Commands `(k, a)`, at the trace's times, are by default its own; nan where they do not count.
     """
     if trace.angles_rad is None:
         return
     commands, targets = trace.commands if commands is None else commands, {}
     if commands is not None:
-        targets = {joint.name: column for joint, column in zip(world.actuators, commands.T, strict=True)}
+        pairs = zip(world.actuators, commands.T, strict=True)
+        targets = {joint.name: column for joint, column in pairs if np.any(np.isfinite(column))}
     for joint, angles in zip(world.joints, trace.angles_rad.T, strict=True):
         told = targets.get(joint.name) if joint.follows == "position" else None
         if not (wrong := _wrong(joint, angles, told, trace.lines)):

@@ -71,6 +71,16 @@ def test_encoders_of_an_arm_give_fitness_and_readings(arm: Robot, commands: bool
     assert found.doubts == ()
 
 
+@pytest.mark.parametrize("commands", [True, False])
+def test_an_arm_that_sags_after_its_motion_is_not_against_its_commands(arm: Robot, commands: bool) -> None:
+    log, rows = Log(arm), 900
+    log.times_s = np.append(log.times_s, log.times_s[-1] + np.arange(1, rows + 1) * 0.02)
+    log.angles = np.vstack([log.angles, np.full((rows, 2), -0.9)])
+    log.commands = np.vstack([log.commands, np.tile(log.commands[-1], (rows, 1))])
+
+    assert rated(arm, read_trace(log.text(commands=commands), "/traces/0", arm.world)).doubts == ()
+
+
 def test_columns_are_mapped_with_sign_unit_and_zero(arm: Robot) -> None:
     log = Log(arm)
     plain = read_trace(log.text(commands=True), "/traces/0", arm.world)
@@ -121,7 +131,7 @@ def test_a_joint_that_cannot_have_moved_so_is_told_with_its_column(
 
 
 def test_a_joint_beyond_its_limits_is_told_with_its_line(arm: Robot) -> None:
-    text = "time_s,shoulder,elbow\n0,0.1,0.2\n0.1,0.2,57\n0.2,0.3,-12\n"
+    text = "time_s,shoulder,elbow,command shoulder\n0,0.1,0.2,1\n0.1,0.2,57,1\n0.2,0.3,-12,1\n"
 
     (told,) = unlikely_joints(read_trace(text, "/traces/0", arm.world), arm.world)
 
