@@ -2,6 +2,7 @@
 
 import json
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +152,10 @@ def test_a_plain_table_in_parquet_is_a_pool_whose_errors_have_lines_as_in_csv(tm
 
     with pytest.raises(InvalidSpec, match="/4: line 5, elbow: '' is not a finite number"):
         import_pool(file, str(arm), "runs")
+    for cell, said in ((datetime(2024, 1, 1, tzinfo=UTC), "'2024-01-01 00:00:00"), ([0.0, 0.1], r"'\[0.0, 0.1\]")):
+        pq.write_table(pa.table(columns | {"elbow": [cell] * 4}), tmp_path / "odd.parquet")
+        with pytest.raises(InvalidSpec, match=f"/3: line 2, elbow: {said}.* is not a finite number"):
+            import_pool(tmp_path / "odd.parquet", str(arm), "runs")
 
     pool = import_pool(file, str(arm), "runs", PoolOptions(skip=True))
     assert [each.name for each in pool.recordings] == ["3"]
