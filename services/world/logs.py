@@ -166,9 +166,7 @@ def _columns(headings: Sequence[str], world: World) -> Iterator[_Column]:
             yield _counted(_Column(name, name, heading, place), how, _POSE[name], None)
         elif rest in joints:
             joint, what = joints[rest], quantity or "angle"
-            units = _units(what, joint)
-            limits = joint.limits if units is _ANGLES or units is _LENGTHS else None
-            yield _counted(_Column(f"{what} {rest}", name, heading, place), how, units, limits)
+            yield _counted(_Column(f"{what} {rest}", name, heading, place), how, _units(what, joint), joint.limits)
         elif name.startswith(f"{quantity} "):
             wrong = f"the robot has no joint {rest!r}; permitted: {', '.join(joints) or 'none'}"
             yield _Column(name, name, heading, place, wrong=wrong)
@@ -178,7 +176,9 @@ def _units(quantity: str, joint: Joint) -> Mapping[str, float]:
     """Return the units in which a quantity of a joint may be, with how many of each are one in the joint's own."""
     if quantity == "command":
         quantity = {"position": "angle", "velocity": "speed", "torque": "torque"}[joint.follows]
-    own = _LENGTHS if joint.slides else _ANGLES
+    own, (low, high) = _LENGTHS if joint.slides else _ANGLES, joint.limits or (0.0, 0.0)
+    if low < high:
+        own = {**own, "%": 100.0 / (high - low), "±%": 200.0 / (high - low)}
     speeds = {f"{unit}/s" if unit else "": share for unit, share in own.items()}
     return {"angle": own, "speed": speeds, "torque": _TORQUES}[quantity]
 
@@ -186,11 +186,8 @@ def _units(quantity: str, joint: Joint) -> Mapping[str, float]:
 def _counted(column: _Column, how: str, units: Mapping[str, float], limits: tuple[float, float] | None) -> _Column:
     """Return a column with sign, unit and zero from its heading; percent are of the limits of its joint."""
     sign, unit, text = how_parts(how)
-    zero, base = 0.0 if text is None else finite(text), 0.0
-    if limits is not None and limits[0] < limits[1]:
-        low, high = limits
-        units = {**units, "%": 100.0 / (high - low), "±%": 200.0 / (high - low)}
-        base = {"%": high if sign else low, "±%": (low + high) / 2}.get(unit, 0.0)
+    zero, (low, high) = 0.0 if text is None else finite(text), limits or (0.0, 0.0)
+    base = {"%": high if sign else low, "±%": (low + high) / 2}.get(unit, 0.0)
     if zero is None:
         return column._replace(wrong=f"{text!r} is not a number, where the joint is at zero")
     if unit not in units:
