@@ -102,7 +102,8 @@ def mapped(table: Table, columns: Mapping[str, str]) -> Table:
             joint, wanted = named.get(key, (rest, ""))
             what, joint = said_of(joint)
             counted = _counted(wanted or how or usual, what or quantity)
-            heading = f"{what or quantity or 'angle'} {joint}{f' [{counted}]' if counted else ''}"
+            called = f"{what or quantity or 'angle'} {joint}" if key in named else name  # a column may be of no joint
+            heading = f"{called}{f' [{counted}]' if counted else ''}"
         headings.append(heading)
     for name in named.keys() - met:
         found = ", ".join(filter(None, there))[:500]

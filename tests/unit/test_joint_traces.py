@@ -96,6 +96,9 @@ def test_columns_are_mapped_with_sign_unit_and_zero(arm: Robot) -> None:
         read_csv(log.text("s", "e", elbow=(log.angles[:, 1] + 1.6) / 0.032)), {"shoulder": "s", "elbow": "e [%]"}
     )
     assert np.allclose(read_trace(percent, "/traces/0", arm.world).angles_rad, plain.angles_rad, atol=1e-9)
+    speeds = read_csv("time_s,shoulder,elbow,velocity_elbow,battery,pos_error\n0,50,50,10,99,5\n1,50,50,10,98,5\n")
+    shares = read_trace(mapped(speeds, {"*": "[%]"}), "/traces/0", arm.world)
+    assert (shares.angles_rad[0].tolist(), shares.speeds_rad_s[0, 1]) == ([0.0, 0.0], pytest.approx(0.32))
     goals = read_csv("time_s,s,e,goal_e\n0,1,1,3\n1,1,1,3\n")
     goals = mapped(goals, {"shoulder": "s", "elbow": "e", "command elbow": "goal_e"})
     assert read_trace(goals, "/traces/0", arm.world).commands[:, 1].tolist() == [3.0, 3.0]
