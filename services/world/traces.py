@@ -1,6 +1,6 @@
-"""Traces: the recorded motion of a physical robot's base, from which the robot's code computes fitness and readings.
+"""Traces: the recorded motion of a physical robot, from which the robot's code computes fitness and readings.
 
-A trace in CSV has a line for each moment, with the pose of the base.
+A trace has a line for each moment, with the pose of the base, the angles of the joints, or both.
 
 A trace has its own clock and its own place on the ground. A recording that begins at rest shows when the motion
 begins; around that moment, else anywhere, the clock is aligned by cross-correlation with the motion that a simulator
@@ -67,7 +67,7 @@ class Alignment:
     Attributes:
         lag_s: time on that clock.
         match: correlation with the expected motion, at most 1; None if nothing was correlated.
-        after_rest: whether the trace begins at rest, so that its start is where the base begins to move.
+        after_rest: whether the trace begins at rest, so that its start is where the base or a joint begins to move.
     """
 
     lag_s: float
