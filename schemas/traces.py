@@ -1,4 +1,4 @@
-"""Attachments, and traces: the recorded motion of a robot's base, from which its code computes fitness and readings."""
+"""Attachments, and traces: the recorded motion of a robot, from which its code computes fitness and readings."""
 
 import re
 from typing import Annotated, ClassVar

@@ -87,7 +87,7 @@ def finite(cell: str | float) -> float | None:
     """Return the finite number of a cell; None if it has none. Decimals have a point, and digits have no groups."""
     try:
         number = float(cell)
-    except ValueError:
+    except (ValueError, TypeError):  # dates and lists of Parquet, too
         return None
     return number if isfinite(number) and "_" not in str(cell) else None
 

@@ -167,7 +167,8 @@ class Bench(Connected):
         """Store a recording as a trace in CSV, and return its hash.
 
         Args:
-            file: CSV; MCAP, for the extra `gaplab[mcap]`; the folder of a LeRobot data set, for `gaplab[lerobot]`.
+            file: CSV; MCAP, for the extra `gaplab[mcap]`; Parquet or the folder of a LeRobot data set, for
+                `gaplab[lerobot]`.
             columns: what each joint is called there, and in brackets how it counts: sign, unit, and what is read where
                 the joint is at zero; by `*`, how all others count: `{"elbow": "Elbow [-deg @ 90]", "*": "[deg]"}`.
             chosen: `topic` of the base's pose or the joints' states in MCAP, if there are several; `body`: its
@@ -175,7 +176,7 @@ class Bench(Connected):
 
         Raises:
             ExtraMissing: the libraries for this format are not installed.
-            ValueError: the recording has no such topic, body, episode or column, or several.
+            ValueError: the recording cannot be read, or has no such topic, body, episode or column, or several.
         """
         name = Path(file).with_suffix(".csv").name
         return self._attach(name, trace_csv(file, columns, **chosen), "text/csv")

@@ -5,6 +5,7 @@ They are read here, so that the service parses CSV alone.
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import chain, groupby
 from operator import itemgetter
 from pathlib import Path
@@ -66,7 +67,7 @@ def recording(path: Path, **chosen: Unpack[Chosen]) -> Table:
     if suffix == ".mcap":
         return mcap_table(path, chosen.get("topic"), chosen.get("body"))
     if suffix == ".parquet" and _root(path) is None:
-        table = library("pyarrow.parquet", "lerobot").read_table(path)
+        table = _parquet(path)
         return Table.of(table.column_names, [*zip(*(each.to_pylist() for each in table.columns), strict=True)])
     if suffix != ".parquet" and not path.is_dir():
         return read_csv(path.read_text("utf-8", "replace"))
@@ -101,7 +102,8 @@ def mapped(table: Table, columns: Mapping[str, str]) -> Table:
             joint, wanted = named.get(key, (rest, ""))
             what, joint = said_of(joint)
             counted = _counted(wanted or how or usual, what or quantity)
-            heading = f"{what or quantity or 'angle'} {joint}{f' [{counted}]' if counted else ''}"
+            called = f"{what or quantity or 'angle'} {joint}" if key in named else name  # a column may be of no joint
+            heading = f"{called}{f' [{counted}]' if counted else ''}"
         headings.append(heading)
     for name in named.keys() - met:
         found = ", ".join(filter(None, there))[:500]
@@ -158,17 +160,19 @@ def lerobot_tables(path: Path, episode: int | None = None) -> dict[int, Table]:
 
 def _frames(files: Sequence[Path], episode: int | None) -> list[dict[str, Any]]:
     """Return the frames of an episode, or of all."""
+    chosen = None if episode is None else [("episode_index", "=", episode)]
+    columns = ("episode_index", "frame_index", "timestamp", *COLUMNS)
+    return [row for file in files for row in _parquet(file, columns, chosen).to_pylist()]
+
+
+def _parquet(file: Path, columns: Sequence[str] | None = None, chosen: Any = None) -> Any:  # noqa: ANN401 - of pyarrow
+    """Return the table of a file: of its columns, those that are wanted; of its rows, the chosen ones."""
     parquet, arrow = library("pyarrow.parquet", "lerobot"), library("pyarrow", "lerobot")
-    rows = list[dict[str, Any]]()
-    for file in files:
-        try:
-            there = set(parquet.read_schema(file).names)
-            wanted = [each for each in ("episode_index", "frame_index", "timestamp", *COLUMNS) if each in there]
-            chosen = None if episode is None else [("episode_index", "=", episode)]
-            rows += parquet.read_table(file, columns=wanted, filters=chosen).to_pylist()
-        except (arrow.ArrowException, OSError) as error:
-            raise ValueError(f"{file.name} cannot be read: {error}") from error
-    return rows
+    try:
+        wanted = columns and [each for each in columns if each in parquet.read_schema(file).names]
+        return parquet.read_table(file, columns=wanted, filters=chosen)
+    except (arrow.ArrowException, OSError) as error:
+        raise ValueError(f"{file.name} cannot be read: {error}") from error
 
 
 def _names(feature: Mapping[str, Any]) -> list[str]:
@@ -181,21 +185,28 @@ def _names(feature: Mapping[str, Any]) -> list[str]:
 def mcap_table(file: Path, topic: str | None = None, body: str | None = None) -> Table:
     """Return the trace of an MCAP file as a table; see `Bench.attach_trace`."""
     mcap, ros = library("mcap.reader", "mcap"), library("mcap_ros2.decoder", "mcap")
-    errors = library("mcap.exceptions", "mcap")
-    try:
-        with file.open("rb") as stream:
-            factories: list[Any] = [ros.DecoderFactory(), _Json()]
+    with file.open("rb") as stream:
+        factories: list[Any] = [ros.DecoderFactory(), _Json()]
+        with _readable(file):
             reader = mcap.make_reader(stream, decoder_factories=factories)
-            chosen, schema = _chosen(reader.get_summary(), topic, file)
+            summary = reader.get_summary()
+        chosen, schema = _chosen(summary, topic, file)
+        poses: dict[str, list[list[float]]] = {}
+        with _readable(file):
             messages = reader.iter_decoded_messages(topics=[chosen])
             if schema == JOINTS:
                 return _joints((_time_s(decoded, message.log_time), decoded) for _, _, message, decoded in messages)
-            poses: dict[str, list[list[float]]] = {}
             for _, _, message, decoded in messages:
                 name = getattr(decoded, "child_frame_id", "")
                 poses.setdefault(name, []).append(_pose(decoded, message.log_time))
-            return Table.of(TRACE_COLUMNS, _of_body(poses, body, f"{file.name} has {{}} on {chosen!r}"))
-    except errors.McapError as error:
+    return Table.of(TRACE_COLUMNS, _of_body(poses, body, f"{file.name} has {{}} on {chosen!r}"))
+
+
+@contextmanager
+def _readable(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:  # mcap and its decoders raise anything for a broken file
         raise ValueError(f"{file.name} is not an MCAP file that can be read: {error}") from error
 
 
@@ -233,7 +244,8 @@ def _joints(messages: Iterator[tuple[float, Any]]) -> Table:
     """Return the trace of states of joints, whose order may change from one message to the next."""
     rows = []
     for time_s, message in messages:
-        told = (("angle", message.position), ("speed", message.velocity), ("torque", message.effort))
+        quantities = ("angle", "position"), ("speed", "velocity"), ("torque", "effort")  # JSON may leave some out
+        told = ((what, getattr(message, name, ())) for what, name in quantities)
         said = ((f"{what} {name}", value) for what, values in told for name, value in zip(message.name, values))  # noqa: B905 - lists may be empty
         rows.append({"time_s": time_s, **dict(said)})
     headings = list(dict.fromkeys(name for row in rows for name in row)) or ["time_s"]
@@ -255,8 +267,11 @@ def _pose(message: Any, log_time_ns: int) -> list[float]:  # noqa: ANN401 - of a
     inner = message
     while (deeper := next(_fields(inner, _NESTED), None)) is not None:
         inner = deeper
-    place, turn = next(_fields(inner, _PLACES)), next(_fields(inner, _TURNS))
-    return [_time_s(message, log_time_ns), place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
+    time_s = _time_s(message, log_time_ns)
+    place, turn = (next(_fields(inner, names), None) for names in (_PLACES, _TURNS))
+    if place is None or turn is None:
+        raise ValueError(f"the pose at {time_s:.10g} s has no {' or '.join(_PLACES if place is None else _TURNS)}")
+    return [time_s, place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
 
 
 def _time_s(message: Any, log_time_ns: int) -> float:  # noqa: ANN401 - of any schema

@@ -102,7 +102,8 @@ def traces(  # noqa: PLR0913, PLR0917 - each is an option of the command
     client: Client,
     id: RequestId,
     files: Annotated[
-        list[Path], typer.Argument(help="recorded motion: CSV, MCAP, or a LeRobot data set; one for each repeat")
+        list[Path],
+        typer.Argument(help="recorded motion: CSV, MCAP, Parquet, or a LeRobot data set; one for each repeat"),
     ],
     topic: Annotated[str | None, typer.Option(help="topic in MCAP of the base's pose, or of the joints")] = None,
     body: Annotated[str | None, typer.Option(help="child_frame_id of the base, if it has several")] = None,

@@ -68,14 +68,16 @@ def said_by_files(
 
     `files` are contents by hash; each is read once, however often the spec names it.
     """
-    robot = robot_of(received(sent_spec))
+    robot, read, wrong = robot_of(received(sent_spec)), dict[str, Trace](), list[Violation]()
+    for digest in dict.fromkeys(spec.traces):
+        text, pointer = files[digest].decode("utf-8", "replace"), f"/traces/{spec.traces.index(digest)}"
+        try:
+            read[digest] = read_trace(text, pointer, robot.world)
+        except InvalidSpec as error:
+            wrong += error.violations
+    if wrong:
+        return tuple(wrong)
     try:
-        read = {
-            digest: read_trace(
-                files[digest].decode("utf-8", "replace"), f"/traces/{spec.traces.index(digest)}", robot.world
-            )
-            for digest in dict.fromkeys(spec.traces)
-        }
         expected, _ = expected_motion(sent_spec, genes, parameters)
         return evaluated(robot, frozen(genes), [read[digest] for digest in spec.traces], expected, spec)
     except InvalidSpec as error:

@@ -78,15 +78,19 @@ class Trace:
         return transform.Slerp(self.times_s, transform.Rotation.from_quat(self.orientations))
 
     def at(self, times_s: FloatArray) -> Trajectory:
-        """Return what it says at times `(t,)` within the trace, interpolated; poses that it does not say are nan."""
-        turns = np.full((len(times_s), 4), np.nan) if self.orientations is None else self._turns(times_s).as_quat()
+        """Return what it says at times `(t,)`, interpolated; poses that it does not say are nan.
+
+        Before and after the trace, it is as at its ends.
+        """
+        inside_s = np.clip(times_s, self.times_s[0], self.times_s[-1])
+        turns = np.full((len(times_s), 4), np.nan) if self.orientations is None else self._turns(inside_s).as_quat()
         place = self._between(times_s, self.positions_m)
         others = (self.angles_rad, self.speeds_rad_s, self.torques_nm, self.commands)
         found = (self._between(times_s, each) for each in others)
         return Trajectory(times_s, np.full((len(times_s), 3), np.nan) if place is None else place, turns, *found)
 
     def _between(self, times_s: FloatArray, values: FloatArray | None) -> FloatArray | None:
-        if values is None:
+        if values is None or not values.size:
             return None
         return np.stack([np.interp(times_s, self.times_s, column) for column in values.T], axis=-1)
 
@@ -162,9 +166,7 @@ def _columns(headings: Sequence[str], world: World) -> Iterator[_Column]:
             yield _counted(_Column(name, name, heading, place), how, _POSE[name], None)
         elif rest in joints:
             joint, what = joints[rest], quantity or "angle"
-            units = _units(what, joint)
-            limits = joint.limits if units is _ANGLES or units is _LENGTHS else None
-            yield _counted(_Column(f"{what} {rest}", name, heading, place), how, units, limits)
+            yield _counted(_Column(f"{what} {rest}", name, heading, place), how, _units(what, joint), joint.limits)
         elif name.startswith(f"{quantity} "):
             wrong = f"the robot has no joint {rest!r}; permitted: {', '.join(joints) or 'none'}"
             yield _Column(name, name, heading, place, wrong=wrong)
@@ -174,7 +176,9 @@ def _units(quantity: str, joint: Joint) -> Mapping[str, float]:
     """Return the units in which a quantity of a joint may be, with how many of each are one in the joint's own."""
     if quantity == "command":
         quantity = {"position": "angle", "velocity": "speed", "torque": "torque"}[joint.follows]
-    own = _LENGTHS if joint.slides else _ANGLES
+    own, (low, high) = _LENGTHS if joint.slides else _ANGLES, joint.limits or (0.0, 0.0)
+    if low < high:
+        own = {**own, "%": 100.0 / (high - low), "±%": 200.0 / (high - low)}
     speeds = {f"{unit}/s" if unit else "": share for unit, share in own.items()}
     return {"angle": own, "speed": speeds, "torque": _TORQUES}[quantity]
 
@@ -182,11 +186,8 @@ def _units(quantity: str, joint: Joint) -> Mapping[str, float]:
 def _counted(column: _Column, how: str, units: Mapping[str, float], limits: tuple[float, float] | None) -> _Column:
     """Return a column with sign, unit and zero from its heading; percent are of the limits of its joint."""
     sign, unit, text = how_parts(how)
-    zero, base = 0.0 if text is None else finite(text), 0.0
-    if limits is not None and limits[0] < limits[1]:
-        low, high = limits
-        units = {**units, "%": 100.0 / (high - low), "±%": 200.0 / (high - low)}
-        base = {"%": high if sign else low, "±%": (low + high) / 2}.get(unit, 0.0)
+    zero, (low, high) = 0.0 if text is None else finite(text), limits or (0.0, 0.0)
+    base = {"%": high if sign else low, "±%": (low + high) / 2}.get(unit, 0.0)
     if zero is None:
         return column._replace(wrong=f"{text!r} is not a number, where the joint is at zero")
     if unit not in units:

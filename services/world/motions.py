@@ -79,7 +79,7 @@ class Loop:
 
     Attributes:
         act: function that all loops of a call share: see Act.
-        senses: groups of `observations.GROUPS` that it observes, in that order.
+        senses: groups of `sensing.GROUPS` that it observes, in that order.
         genome: `(g,)`: its row of the genomes.
         memory: `(m,)`: its memory at time 0.
         period_s: time between two calls of `act`, the first at time 0, rounded to whole time steps.

@@ -1,6 +1,6 @@
-"""Traces: the recorded motion of a physical robot's base, from which the robot's code computes fitness and readings.
+"""Traces: the recorded motion of a physical robot, from which the robot's code computes fitness and readings.
 
-A trace in CSV has a line for each moment, with the pose of the base.
+A trace has a line for each moment, with the pose of the base, the angles of the joints, or both.
 
 A trace has its own clock and its own place on the ground. A recording that begins at rest shows when the motion
 begins; around that moment, else anywhere, the clock is aligned by cross-correlation with the motion that a simulator
@@ -67,7 +67,7 @@ class Alignment:
     Attributes:
         lag_s: time on that clock.
         match: correlation with the expected motion, at most 1; None if nothing was correlated.
-        after_rest: whether the trace begins at rest, so that its start is where the base begins to move.
+        after_rest: whether the trace begins at rest, so that its start is where the base or a joint begins to move.
     """
 
     lag_s: float
@@ -88,7 +88,7 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None, motion: Mot
             failed.
         lag_s: the lag if it is known; None: it is found. If the expected motion does not change, the trace begins with
             the motion.
-        motion: that of the robot; if the trace has its commands, they alone show when it began.
+        motion: that of the robot; if the trace has commands that change, they alone show when it began.
 
     Raises:
         TooShort: the trace does not contain the whole motion.
@@ -103,11 +103,10 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None, motion: Mot
         return Alignment(float(np.clip(lag_s, first, max(first, latest))))
     if latest < first - STEP_S:
         raise TooShort(f"it lasts {last - first:g} s, and the motion {duration:g} s")
-    sent = trace.commands is not None and isinstance(motion, Motion)
-    scores = _scores(trace, expected, motion if sent else None)
+    scores, by_commands = _scores(trace, expected, motion)
     if scores is None:
         return Alignment(float(first))
-    near, begun = np.ones(len(scores), dtype=bool), None if sent else _onset(trace)
+    near, begun = np.ones(len(scores), dtype=bool), None if by_commands else _onset(trace)
     if begun is not None and (expected_to := _onset(expected, at_once=True)) is not None:
         away = np.abs(first + np.arange(len(scores)) * STEP_S - (begun - expected_to))
         near = away <= max(AROUND_S, float(away.min()))
@@ -116,16 +115,16 @@ def align(trace: Trace, expected: Trace, lag_s: float | None = None, motion: Mot
     return Alignment(lag_s, float(min(scores[best], 1.0)), after_rest=not near.all())
 
 
-def _scores(trace: Trace, expected: Trace, motion: Motion | Loop | None) -> FloatArray | None:
-    """Return how well each shift `(shifts,)` fits: of the commands, if the motion is given; None if nothing changes."""
+def _scores(trace: Trace, expected: Trace, motion: Motion | Loop | None) -> tuple[FloatArray | None, bool]:
+    """Return how well each shift `(shifts,)` fits, None if nothing changes, and whether that is of the commands."""
     first, last = trace.times_s[0], trace.times_s[-1]
     count = int((last - first) / STEP_S + 1e-6) + 1
     length = min(count, int(float(expected.times_s[-1]) / STEP_S + 1e-6) + 1)
     times_s, elapsed_s = frozen(first + np.arange(count) * STEP_S), frozen(np.arange(length) * STEP_S)
     sent, logged = None if motion is None else commands_at(motion, elapsed_s), trace.at(times_s).commands
-    if sent is not None and logged is not None:
-        return _correlations(logged.T, sent.T)
-    return _correlations(_features(trace, times_s, expected), _features(expected, elapsed_s, trace))
+    if sent is not None and logged is not None and (found := _correlations(logged.T, sent.T)) is not None:
+        return found, True
+    return _correlations(_features(trace, times_s, expected), _features(expected, elapsed_s, trace)), False
 
 
 def _onset(trace: Trace, *, at_once: bool = False) -> float | None:
@@ -155,7 +154,7 @@ def placed(
     There a motion begins above the origin, with the base turned as `world.start_turn`; only a turn about z is removed.
     What the trace does not say is nan.
     """
-    seen = trace.at(np.clip(times_s + lag_s, trace.times_s[0], trace.times_s[-1]))
+    seen = trace.at(times_s + lag_s)
     if world.fixed:
         poses = np.tile([0.0, 0.0, world.start_height_m, *world.start_turn], (len(times_s), 1))
     elif trace.positions_m is None:
@@ -184,7 +183,7 @@ def _features(trace: Trace, times_s: FloatArray, other: Trace) -> FloatArray:
 
     They are speed over ground, vertical speed and tilt of the base, and the angles of the joints.
     """
-    seen = trace.at(np.clip(times_s, trace.times_s[0], trace.times_s[-1]))
+    seen = trace.at(times_s)
     angles = None if other.angles_rad is None else seen.angles_rad
     joints = np.empty((0, len(times_s))) if angles is None else angles.T
     if trace.positions_m is None or other.positions_m is None or not np.all(np.isfinite(trace.positions_m)):
@@ -218,12 +217,15 @@ def unlikely(
     """Yield what is unlikely about a trace, each as a clause.
 
     The expected motion, of a simulator, is nan if its physics failed. Commands `(k, a)` are those of the motion at the
-    trace's times; None if they are not known.
+    trace's times, by default the trace's own; they count during the motion alone.
     """
-    inside = (trace.times_s >= alignment.lag_s) & (trace.times_s <= alignment.lag_s + expected.times_s[-1])
+    begin_s, end_s = alignment.lag_s, alignment.lag_s + expected.times_s[-1]
+    inside = (trace.times_s >= begin_s) & (trace.times_s <= end_s)
     parts = [each for each in (trace.positions_m, trace.orientations, trace.angles_rad) if each is not None]
-    yield from _holes(trace.times_s[inside], np.hstack(parts)[inside])
-    yield from unlikely_joints(trace, world, commands)
+    yield from _gap(trace.times_s, begin_s, end_s)
+    yield from _still(trace.times_s[inside], np.hstack(parts)[inside])
+    sent = trace.commands if commands is None else commands
+    yield from unlikely_joints(trace, world, None if sent is None else np.where(inside[:, None], sent, np.nan))
     if expected.positions_m is None or not np.all(np.isfinite(expected.positions_m)):
         return
     if trace.positions_m is not None:
@@ -239,7 +241,7 @@ def _unlike(
 ) -> Iterator[str]:
     """Yield how the motion of a base differs from the expected one more than a wrong simulator explains."""
     yield from _jump(trace.times_s[inside], positions_m[inside], wanted)
-    seen = trace.at(np.clip(lag_s + wanted.times_s, trace.times_s[0], trace.times_s[-1]))
+    seen = trace.at(lag_s + wanted.times_s)
     yield from _start(seen.positions_m[0, 2], wanted.positions_m[0, 2], seen.orientations, wanted.orientations)
     far, expected = (
         float(np.linalg.norm(places_m[:, :2] - places_m[0, :2], axis=1).max())
@@ -252,13 +254,14 @@ def _unlike(
 def unlikely_joints(trace: Trace, world: World, commands: FloatArray | None = None) -> Iterator[str]:
     """Yield which joints move as they cannot, or against their commands, with the column and the likely mistake.
 
-    Commands `(k, a)`, at the trace's times, are by default its own.
+    Commands `(k, a)`, at the trace's times, are by default its own; nan where they do not count.
     """
     if trace.angles_rad is None:
         return
     commands, targets = trace.commands if commands is None else commands, {}
     if commands is not None:
-        targets = {joint.name: column for joint, column in zip(world.actuators, commands.T, strict=True)}
+        pairs = zip(world.actuators, commands.T, strict=True)
+        targets = {joint.name: column for joint, column in pairs if np.any(np.isfinite(column))}
     for joint, angles in zip(world.joints, trace.angles_rad.T, strict=True):
         told = targets.get(joint.name) if joint.follows == "position" else None
         if not (wrong := _wrong(joint, angles, told, trace.lines)):
@@ -306,15 +309,19 @@ def _wrong(joint: Joint, angles: FloatArray, targets: FloatArray | None, lines: 
     return ""
 
 
-def _holes(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
-    """Yield sentences: where rows are missing or stay the same for too long, or that nothing ever moves."""
+def _gap(times_s: FloatArray, begin_s: float, end_s: float) -> Iterator[str]:
+    """Yield where rows are missing for too long of a motion, which may begin or end in the gap."""
+    steps = np.diff(np.clip(times_s, begin_s, end_s))
+    at = int(np.argmax(steps))
+    if steps[at] > max(LONGEST_GAP_S, 4.0 * float(np.median(np.diff(times_s)))):
+        yield f"there is no row from {times_s[at]:.10g} to {times_s[at + 1]:.10g} s"
+
+
+def _still(times_s: FloatArray, poses: FloatArray) -> Iterator[str]:
+    """Yield where rows stay the same for too long, or that nothing ever moves; what is nan says neither."""
     if len(times_s) < 2:
         return
-    steps = np.diff(times_s)
-    at = int(np.argmax(steps))
-    if steps[at] > max(LONGEST_GAP_S, 4.0 * float(np.median(steps))):
-        yield f"there is no row from {times_s[at]:.10g} to {times_s[at + 1]:.10g} s"
-    changes = np.flatnonzero(np.any(np.diff(poses, axis=0) != 0.0, axis=1))
+    changes = np.flatnonzero(np.any(np.abs(np.diff(poses, axis=0)) > 0.0, axis=1))
     if not changes.size:
         yield "nothing moves"
         return

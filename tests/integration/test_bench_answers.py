@@ -169,3 +169,13 @@ def test_a_trace_is_read_once_and_in_the_line_of_rollouts(store: Store) -> None:
     assert said.values == (0.5, 0.5, 0.5)
     assert sorted(files.opened) == ["a" * 64, "b" * 64]
     assert rollouts.pid is None
+
+
+def test_all_traces_that_cannot_be_read_are_named(store: Store) -> None:
+    spec = spec_of(submit_one(store, bench(reality={"repeats": 2})).spec)
+    asked = TracesSpec(traces=("a" * 64, "b" * 64))
+
+    said = said_by_files(sent_spec(spec), (), (), asked, {"a" * 64: b"no trace", "b" * 64: b"nor this"})
+
+    assert not isinstance(said, TracesRead)
+    assert [each.pointer for each in said] == ["/traces/0", "/traces/1"]

@@ -57,9 +57,11 @@ def rated(robot: Robot, trace: Trace) -> Any:
     return evaluated(robot, robot.known, [trace], expected, TracesSpec(traces=("a" * 64,)))
 
 
-@pytest.mark.parametrize("commands", [True, False])
-def test_encoders_of_an_arm_give_fitness_and_readings(arm: Robot, commands: bool) -> None:
+@pytest.mark.parametrize(("commands", "share"), [(True, 1.0), (True, 0.0), (False, 1.0)])
+def test_encoders_of_an_arm_give_fitness_and_readings(arm: Robot, commands: bool, share: float) -> None:
+    """Commands that never change say nothing about time."""
     log = Log(arm)
+    log.commands *= share
     found = rated(arm, read_trace(log.text(commands=commands), "/traces/0", arm.world))
 
     real = MuJoCo().rollout(arm.world, open_loop(arm.motion(arm.known)))
@@ -67,6 +69,16 @@ def test_encoders_of_an_arm_give_fitness_and_readings(arm: Robot, commands: bool
     assert found.values[0] == pytest.approx(float(arm.fitness(real)), abs=0.005)
     assert np.shape(found.readings) == (1, 8, 3)
     assert found.doubts == ()
+
+
+@pytest.mark.parametrize("commands", [True, False])
+def test_an_arm_that_sags_after_its_motion_is_not_against_its_commands(arm: Robot, commands: bool) -> None:
+    log, rows = Log(arm), 900
+    log.times_s = np.append(log.times_s, log.times_s[-1] + np.arange(1, rows + 1) * 0.02)
+    log.angles = np.vstack([log.angles, np.full((rows, 2), -0.9)])
+    log.commands = np.vstack([log.commands, np.tile(log.commands[-1], (rows, 1))])
+
+    assert rated(arm, read_trace(log.text(commands=commands), "/traces/0", arm.world)).doubts == ()
 
 
 def test_columns_are_mapped_with_sign_unit_and_zero(arm: Robot) -> None:
@@ -84,6 +96,9 @@ def test_columns_are_mapped_with_sign_unit_and_zero(arm: Robot) -> None:
         read_csv(log.text("s", "e", elbow=(log.angles[:, 1] + 1.6) / 0.032)), {"shoulder": "s", "elbow": "e [%]"}
     )
     assert np.allclose(read_trace(percent, "/traces/0", arm.world).angles_rad, plain.angles_rad, atol=1e-9)
+    speeds = read_csv("time_s,shoulder,elbow,velocity_elbow,battery,pos_error\n0,50,50,10,99,5\n1,50,50,10,98,5\n")
+    shares = read_trace(mapped(speeds, {"*": "[%]"}), "/traces/0", arm.world)
+    assert (shares.angles_rad[0].tolist(), shares.speeds_rad_s[0, 1]) == ([0.0, 0.0], pytest.approx(0.32))
     goals = read_csv("time_s,s,e,goal_e\n0,1,1,3\n1,1,1,3\n")
     goals = mapped(goals, {"shoulder": "s", "elbow": "e", "command elbow": "goal_e"})
     assert read_trace(goals, "/traces/0", arm.world).commands[:, 1].tolist() == [3.0, 3.0]
@@ -119,7 +134,7 @@ def test_a_joint_that_cannot_have_moved_so_is_told_with_its_column(
 
 
 def test_a_joint_beyond_its_limits_is_told_with_its_line(arm: Robot) -> None:
-    text = "time_s,shoulder,elbow\n0,0.1,0.2\n0.1,0.2,57\n0.2,0.3,-12\n"
+    text = "time_s,shoulder,elbow,command shoulder\n0,0.1,0.2,1\n0.1,0.2,57,1\n0.2,0.3,-12,1\n"
 
     (told,) = unlikely_joints(read_trace(text, "/traces/0", arm.world), arm.world)
 

@@ -58,7 +58,11 @@ def ros(file: Path, *, stamped: bool = True) -> Path:
 
 
 def foxglove(
-    file: Path, *topics: str, schema: str = "foxglove.PoseInFrame", bodies: tuple[str | None, ...] = (None,)
+    file: Path,
+    *topics: str,
+    schema: str = "foxglove.PoseInFrame",
+    bodies: tuple[str | None, ...] = (None,),
+    parts: tuple[str, ...] = ("position", "orientation"),
 ) -> Path:
     with file.open("wb") as stream:
         writer = Writer(stream)
@@ -67,7 +71,8 @@ def foxglove(
         for topic in topics:
             channel = writer.register_channel(topic, "json", kind)
             for second, (place, name) in product(range(2), enumerate(bodies)):
-                body = {"timestamp": {"sec": second, "nsec": 250_000_000}, "frame_id": "map", "pose": pose(1.0 * place)}
+                told = {part: pose(1.0 * place)[part] for part in parts}
+                body = {"timestamp": {"sec": second, "nsec": 250_000_000}, "frame_id": "map", "pose": told}
                 body |= {"child_frame_id": name} if name else {}
                 writer.add_message(channel, log_time=1, data=json.dumps(body).encode(), publish_time=0)
         writer.finish()
@@ -110,6 +115,16 @@ def test_what_has_no_poses_is_told(tmp_path: Path) -> None:
     (tmp_path / "no.mcap").write_bytes(b"time_s,x\n0,0\n" * 20)
     with pytest.raises(ValueError, match=r"no\.mcap is not an MCAP file that can be read"):
         mcap_table(tmp_path / "no.mcap")
+
+
+def test_what_is_cut_or_lacks_a_part_is_told_with_its_file(tmp_path: Path) -> None:
+    whole, cut = ros(tmp_path / "run.mcap").read_bytes(), tmp_path / "cut.mcap"
+    for length in range(0, len(whole), 7):
+        cut.write_bytes(whole[:length])
+        with pytest.raises(ValueError, match=r"^cut\.mcap "):
+            mcap_table(cut)
+    with pytest.raises(ValueError, match=r"^part\.mcap .*: the pose at 0\.25 s has no orientation or rotation"):
+        mcap_table(foxglove(tmp_path / "part.mcap", "/base", parts=("position",)))
 
 
 def test_without_the_extra_its_command_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

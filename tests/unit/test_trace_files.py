@@ -2,6 +2,7 @@
 
 import json
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +94,7 @@ def states(file: Path, *topics: str) -> Path:
             channel = writer.register_channel(topic, "json", kind)
             for second, names in enumerate((["pan", "elbow"], ["elbow", "pan"])):
                 stamp = {"sec": second, "nanosec": 500_000_000}
-                body = {"header": {"stamp": stamp}, "name": names, "position": [1.0, 2.0], "velocity": [], "effort": []}
+                body = {"header": {"stamp": stamp}, "name": names, "position": [1.0, 2.0], "effort": []}
                 if topic == "/all":
                     body |= {"velocity": [3.0, 4.0], "effort": [5.0, 6.0]}
                 writer.add_message(channel, log_time=1, data=json.dumps(body).encode(), publish_time=0)
@@ -151,6 +152,14 @@ def test_a_plain_table_in_parquet_is_a_pool_whose_errors_have_lines_as_in_csv(tm
 
     with pytest.raises(InvalidSpec, match="/4: line 5, elbow: '' is not a finite number"):
         import_pool(file, str(arm), "runs")
+    for cell, said in ((datetime(2024, 1, 1, tzinfo=UTC), "'2024-01-01 00:00:00"), ([0.0, 0.1], r"'\[0.0, 0.1\]")):
+        pq.write_table(pa.table(columns | {"elbow": [cell] * 4}), tmp_path / "odd.parquet")
+        with pytest.raises(InvalidSpec, match=f"/3: line 2, elbow: {said}.* is not a finite number"):
+            import_pool(tmp_path / "odd.parquet", str(arm), "runs")
+
+    (tmp_path / "odd.parquet").write_bytes(b"PAR1")
+    with pytest.raises(ValueError, match=r"odd\.parquet cannot be read"):
+        import_pool(tmp_path / "odd.parquet", str(arm), "runs")
 
     pool = import_pool(file, str(arm), "runs", PoolOptions(skip=True))
     assert [each.name for each in pool.recordings] == ["3"]

@@ -77,6 +77,11 @@ def still(trace: Trace) -> Trace:
     return Trace(trace.times_s, np.tile(trace.positions_m[:1], (count, 1)), np.tile(trace.orientations[:1], (count, 1)))
 
 
+def without_joints(trace: Trace) -> Trace:
+    """As of a recording whose joints have no column."""
+    return replace(trace, angles_rad=np.full((len(trace.times_s), len(ROBOT.world.joints)), np.nan))
+
+
 @pytest.mark.parametrize(("lag_s", "noise"), [(0.0, 0.0), (12.34, 0.0), (1.7e9, 0.0), (-3.0, 0.0005)])
 def test_the_clock_of_a_trace_is_found(expected: Trace, lag_s: float, noise: float) -> None:
     found = align(shifted(expected, lag_s, 1.0, noise), expected)
@@ -103,12 +108,18 @@ def test_the_start_is_where_a_base_at_rest_begins_to_move_however_it_moves_then(
     [
         (lambda trace: trace, ""),
         (lambda trace: cut(trace, 6.0, 7.0), "there is no row from 6 to 7 s"),
+        (lambda trace: cut(trace, 4.98, 6.0), "there is no row from 4.98 to 6 s"),
+        (lambda trace: cut(trace, 7.2, 8.2), "there is no row from 7.2 to 8.2 s"),
+        (lambda trace: cut(trace, 4.9, 8.2), "there is no row from 4.9 to 8.2 s"),
+        (lambda trace: cut(trace, 3.0, 5.0), ""),
         (lambda trace: frozen_from(trace, 6.0, 7.0), "everything stays the same from 6 s for 1 s"),
         (lambda trace: moved(trace, [0.0, 0.0, 230.0]), "the base begins 230 m high, and the simulators expect 0.17 m"),
         (lambda trace: scaled(trace, 1000.0), "are these millimetres (`x [mm]`)?"),
         (lambda trace: jumping(trace, 6.5), "the base jumps by 0.3 m at 6.5 s"),
         (lambda trace: on_its_side(trace), "the base begins tilted by 90° from what the simulators expect"),
         (lambda trace: still(trace), "nothing moves"),
+        (lambda trace: without_joints(still(trace)), "nothing moves"),
+        (lambda trace: without_joints(frozen_from(trace, 6.0, 7.0)), "everything stays the same from 6 s for 1 s"),
     ],
 )
 def test_what_is_unlikely_beside_the_expected_motion_is_said(expected: Trace, wrong: Any, said: str) -> None:
@@ -129,6 +140,12 @@ def test_a_weak_match_without_rest_is_uncertain(expected: Trace) -> None:
 
     assert not found.after_rest
     assert any("the recording does not begin at rest" in each for each in unlikely(trace, expected, found, ROBOT.world))
+
+
+def test_a_robot_without_joints_has_traces(expected: Trace) -> None:
+    simulated = replace(expected, angles_rad=np.empty((len(expected.times_s), 0)))
+
+    assert align(shifted(expected, 5.0), simulated) == align(shifted(expected, 5.0), expected)
 
 
 @pytest.mark.parametrize("turn_rad", [0.0, 2.5, -1.0])
@@ -193,6 +210,17 @@ def test_a_trace_is_read_with_any_order_units_and_more_columns() -> None:
     assert trace.times_s.tolist() == [0.5, 0.75]
     assert trace.positions_m.tolist() == [[1, 2, 3], [2, 2, 3]]
     assert trace.at(frozen([0.625])).positions_m.tolist() == [[1.5, 2, 3]]
+
+
+def test_a_trace_of_rounded_times_is_aligned_to_its_last_row(expected: Trace) -> None:
+    """390.97 + 1046 · 0.005 lies one rounding after 396.2."""
+    times = frozen(np.round(390.97 + np.arange(524) * 0.01, 2))
+    seen = expected.at(times - 392.0)
+
+    found = align(Trace(times, seen.positions_m, seen.orientations), expected)
+
+    assert times[0] + 1046 * 0.005 > times[-1]
+    assert found.lag_s == pytest.approx(392.0, abs=0.011)
 
 
 ENDLESS = '"' + "0123456789\n" * 20_000
