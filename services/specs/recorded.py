@@ -24,8 +24,12 @@ HELD_OUT = 0.2
 WITH_OPTIONS = "estimation_exploration with select: disagreement, or weighted with information_weight alone"
 """Strategies that need no fitness with some options."""
 
-OF_OTHERS = ("engine", "parameters", "noise", "noise_unit", "bench", "repeats", "samples", "probes", "limits", "beyond")
-"""Fields of other realities."""
+OF_KINDS = {
+    "simulated": ("engine", "parameters", "noise", "noise_unit"),
+    "physical": ("bench", "repeats", "samples", "limits", "beyond"),
+    RECORDED: ("pool", "held_out"),
+}
+"""Fields of a reality that one kind alone has."""
 
 
 def is_recorded(spec: ExperimentSpec) -> bool:
@@ -41,6 +45,17 @@ def pool_of(spec: ExperimentSpec) -> Pool:
     """
     ref = spec.reality.pool or PoolRef(name="none")
     return robot_library.pool(ref.sha256 or "unknown", ref.name)
+
+
+def kind_violations(reality: RealitySpec) -> Iterator[Violation]:
+    """Yield fields of a reality of another kind, unless they say what is so anyway."""
+    usual = RealitySpec()
+    for kind, names in OF_KINDS.items():
+        for name in names if kind != reality.kind else ():
+            if getattr(reality, name) not in (getattr(usual, name), 0):
+                message = f"{name} is of a {kind} reality, and this one is {reality.kind}"
+                value = reality.model_dump(mode="json")[name]
+                yield Violation(f"/reality/{name}", value, message, f"left out, or kind: {kind}")
 
 
 def with_recordings(spec: ExperimentSpec) -> ExperimentSpec:
@@ -77,14 +92,10 @@ def check_recordings(spec: ExperimentSpec, robot: Robot) -> None:
 
 
 def recorded_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Violation]:
-    """Yield what a recorded reality does not have: fitness, fields of other realities, iterations."""
-    pool, reality = pool_of(spec), spec.reality
-    usual = RealitySpec()
-    for name in OF_OTHERS:
-        if (given := getattr(reality, name)) != getattr(usual, name):
-            value = reality.model_dump(mode="json")[name]
-            if not (name == "probes" and given == "never"):
-                yield Violation(f"/reality/{name}", value, f"{name} is not of a recorded reality", "left out")
+    """Yield what a recorded reality does not have: fitness, probes, more recordings than its pool."""
+    pool, probes = pool_of(spec), spec.reality.probes
+    if probes not in (None, "never"):
+        yield Violation("/reality/probes", probes, "a recorded reality has no probes", "left out")
     if spec.held_out:
         message = "reality/held_out is the share of the pool that no tuning sees"
         yield Violation("/held_out", spec.held_out, message, "0, or left out")
