@@ -79,9 +79,10 @@ def with_recordings(spec: ExperimentSpec) -> ExperimentSpec:
     ]:
         raise InvalidSpec(wrong)
     changes = {"controller": own, "task": own}
-    if "discrepancy" not in spec.model_fields_set:
-        seconds = {"seconds": float(max(0.001, pool.times_s[-1] - pool.times_s[0]))}
-        changes["discrepancy"] = PluginRef(name="readings", options=seconds)
+    compared = spec.discrepancy if "discrepancy" in spec.model_fields_set else PluginRef(name="readings")
+    if compared.name == "readings":
+        seconds = float(max(0.001, pool.times_s[-1] - pool.times_s[0]))
+        changes["discrepancy"] = compared.model_copy(update={"options": {"seconds": seconds, **compared.options}})
     return spec.model_copy(update=changes)
 
 

@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 import gaplab
 from gaplab.api.app import create_app
 from gaplab.api.commands import tables
+from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives.rerunning import verify
 from gaplab.services.core.errors import InvalidSpec
@@ -190,6 +191,10 @@ def test_a_stored_spec_has_the_hash_of_its_pool_and_resolves_to_itself(files: tu
     assert found.reality.pool.sha256 == pool.sha256
     assert found.iterations == 6  # all that are not held out
     assert resolve(found)[0] == found
+    named = spec.model_copy(update={"discrepancy": PluginRef(name="readings", options={"absolute_weight": 0.5})})
+    options = stored_files.resolved_here(store, named, resolve_experiment).discrepancy.options
+    assert options == found.discrepancy.options | {"absolute_weight": 0.5}  # up to the last reading
+    assert options["seconds"] == pytest.approx(0.9)
 
 
 def test_a_joint_begins_where_a_biased_encoder_that_read_its_start_was_wrong(tmp_path: Path) -> None:
