@@ -110,8 +110,10 @@ def recorded_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Vi
         message = message if strategy.needs_fitness else f"{strategy.name} tunes nothing"
         permitted = f"{', '.join(able)}, {WITH_OPTIONS}"
         yield Violation("/strategy", strategy.name, message, permitted)
-    most = selectable(spec)
-    if spec.iterations is not None and spec.iterations > most:
+    if not (most := selectable(spec)):
+        message = f"the pool {pool.name} has one recording, and none is left to tune on without it"
+        yield Violation("/reality/held_out", spec.reality.held_out, message, "0, or a pool of at least 2 recordings")
+    elif spec.iterations is not None and spec.iterations > most:
         message = f"the pool {pool.name} has {most} recordings to select, besides those held out"
         yield Violation("/iterations", spec.iterations, message, f"at most {most}")
 

@@ -21,7 +21,7 @@ from gaplab.services.world import robot_library
 from gaplab.services.world.motions import Start
 from gaplab.services.world.pools import Channel, Pool, Recorded
 from tests.drawn_arm import imported
-from tests.recordings import TRUTH, arm_and_pool, simulated
+from tests.recordings import TRUTH, arm_and_pool, simulated, written
 
 pytest.importorskip("mujoco")
 
@@ -137,9 +137,19 @@ REFUSED: dict[str, tuple[dict[str, Any], str, str]] = {
     "held-out samples": ({"held_out": 0.2}, "/held_out", "0, or left out"),
     "a bench": ({"reality": {"bench": "desk"}}, "/reality/bench", "left out"),
     "hidden parameters": ({"reality": {"parameters": {"joint_damping": 1.0}}}, "/reality/parameters", "left out"),
+    "probes": ({"reality": {"probes": "each"}}, "/reality/probes", "left out"),
     "no pool": ({"reality": {"pool": None}}, "/reality/pool", "a pool that is stored"),
     "another robot": ({"robot": "quadruped"}, "/reality/pool", "which the quadruped lacks"),
 }
+
+
+def test_the_only_recording_of_a_pool_cannot_be_held_out(files: tuple[Path, Path], tmp_path: Path) -> None:
+    pool = Pool.read(files[1].read_bytes())
+    alone = written(tmp_path, pool.model_copy(update={"recordings": pool.recordings[:1]}))
+
+    with pytest.raises(InvalidSpec, match="/reality/held_out: the pool swings has one recording"):
+        gaplab.Tuning(files[0], pool=alone, engine="mujoco", reality={"held_out": "each"})
+    assert gaplab.Tuning(files[0], pool=alone, engine="mujoco").spec.iterations == 1
 
 
 @pytest.mark.parametrize("case", REFUSED)
