@@ -1,6 +1,7 @@
 """Recorded reality: a pool that an engine made in place of a robot, and what strategies and users do with it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from fastapi.testclient import TestClient
 import gaplab
 from gaplab.api.app import create_app
 from gaplab.api.commands import tables
+from gaplab.api.library.robots import read_robot
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives.rerunning import verify
@@ -19,7 +21,7 @@ from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.services.world import robot_library
 from gaplab.services.world.motions import Start
-from gaplab.services.world.pools import Channel, Pool, Recorded
+from gaplab.services.world.pools import Channel, Pool, Recorded, fit_violations
 from tests.drawn_arm import imported
 from tests.recordings import TRUTH, arm_and_pool, simulated, written
 
@@ -229,8 +231,31 @@ BROKEN: dict[str, tuple[dict[str, Any], str, str]] = {
     "commands without times": ({"times_s": [0.0]}, "/recordings/0/commands", "2 commands at 1 times"),
     "too many readings": ({"readings": [[0, 0, 0]] * 11}, "/recordings/0/readings", "at most 10"),
     "nan": ({"readings": [[0, float("nan"), 0]]}, "/recordings/0/readings/0/1", "finite"),
+    "commands from later on": ({"times_s": [0.1, 0.4]}, "/recordings/0/times_s/0", "begin at 0.1 s"),
+    "a turn of nothing": ({"start": {"turn": [0, 0, 0, 0]}}, "/recordings/0/start/turn", "x, y, z, w of norm 1"),
+    "a turn of norm 2": ({"start": {"turn": [1, 1, 1, 1]}}, "/recordings/0/start/turn", "has norm 2"),
     "a start of other joints": ({"start": {"angles_rad": [0.1]}}, "/recordings/0/start", "exactly 0"),
 }
+
+
+def test_a_sensor_that_read_nothing_is_refused(files: tuple[Path, Path]) -> None:
+    content = json.loads(files[1].read_bytes())
+    for each in content["recordings"]:
+        each["readings"] = [[*row[:2], None] for row in each["readings"]]
+
+    with pytest.raises(InvalidSpec, match="/sensors/2: the sensor z has no reading in any recording"):
+        Pool.read(json.dumps(content))
+
+
+def test_a_base_that_never_moves_begins_nowhere_else(files: tuple[Path, Path]) -> None:
+    pool = Pool.read(files[1].read_bytes())
+    moved = pool.recordings[1].model_copy(update={"start": Start(velocity_m_s=(1.0, 0.0, 0.0))})
+    pool, world = pool.model_copy(update={"recordings": (pool.recordings[0], moved)}), read_robot(files[0]).world
+
+    (found,) = fit_violations(pool, replace(world, fixed=True), "arm", "/reality/pool")
+
+    assert (found.pointer, found.value) == ("/reality/pool", "swing 1")
+    assert not [*fit_violations(pool, replace(world, fixed=False), "arm", "/reality/pool")]
 
 
 @pytest.mark.parametrize("case", BROKEN)
