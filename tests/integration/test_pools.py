@@ -15,7 +15,7 @@ from gaplab.api.library.robots import read_robot
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives.rerunning import verify
-from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.errors import Conflict, InvalidSpec
 from gaplab.services.experiments import stored_files
 from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.store.session import Store
@@ -104,6 +104,8 @@ def test_a_tuning_on_a_pool_identifies_what_made_it(files: tuple[Path, Path]) ->
     assert found.values == pytest.approx(TRUTH, rel=0.05)
     assert found.held_out_error is not None
     assert found.held_out_error < 1.5  # times the noise of the sensors
+    with pytest.raises(Conflict, match="/strategy: random is not of a tuning; permitted: `direct`"):
+        gaplab.Tuning(arm, list(TRUTH), pool=pool, engine="mujoco", strategy="random")
 
 
 def test_a_repetition_gives_the_same_bits_again(result: Any, tmp_path: Path) -> None:

@@ -290,8 +290,9 @@ def test_it_refuses_in_the_words_of_the_service(tmp_path: Path) -> None:
     (tmp_path / "bad.csv").write_text("gene_0,value\n0.5,fast\n")
     with pytest.raises(InvalidSamples, match="'fast' is not a number"):
         tuning.tell(tmp_path / "bad.csv")
-    with pytest.raises(Conflict, match="one repetition, a physical reality"):
-        tuning_of(repetitions=2)
+    with pytest.raises(Conflict, match="/repetitions: 2 is not of a tuning; permitted: 1"):
+        tuning_of(path=tmp_path / "refused.db", repetitions=2)
+    assert tuning_of(path=tmp_path / "refused.db").spec.repetitions == 1
     assert tuning._log() == ()
 
 
