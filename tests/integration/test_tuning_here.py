@@ -279,6 +279,7 @@ def test_it_refuses_in_the_words_of_the_service(tmp_path: Path) -> None:
         "is in m/s, not in km/h": lambda: tuning.tell([0.5], 0.3, unit="km/h"),
         "/1/values: values is missing": lambda: tuning.tell([{"genome": [0.5], "values": [0.3]}, {"genome": [0.6]}]),
         "/reality/held_out: held_out must be at most 0.9, not 7.0": lambda: tuning_of(reality={"held_out": 7.0}),
+        "/seed: of a spec, robot, controller, task, engine": lambda: Tuning({"robot": "toy_function", "seed": 3}),
     }
     for words, call in refused.items():
         with pytest.raises(InvalidSpec, match=words.replace("(", r"\(")):
