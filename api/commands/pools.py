@@ -12,7 +12,6 @@ from gaplab.api.commands.bench import pair
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.tables import minute, table
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.csv_tables import finite
 
 MOST_TOLD = 100
 """Most errors that are printed."""
@@ -52,19 +51,16 @@ def import_(  # noqa: PLR0913, PLR0917 - each is an option of the command
     force: Annotated[bool, typer.Option("--force", help="replace the file that is written, if it exists")] = False,
 ) -> Answer:
     """Write a pool of recordings, checked line by line, and print what was found and left out."""
-    from gaplab.api.library.pools import NOISES, PoolOptions, import_pool
+    from gaplab.api.library.pools import PoolOptions, import_pool
 
     written = output or Path(f"{name}.json")
     if written.exists() and not force:
         raise FileExistsError(None, "a file of this name is there already; --force replaces it", str(written))
-    given = dict(pair(each) for each in noises or ())
-    if wrong := [each for each, value in given.items() if each not in NOISES or not (finite(value) or 0) > 0]:
-        raise typer.BadParameter(f"{wrong[0]}: a positive number of {', '.join(NOISES)}", param_hint="--noise")
     options = PoolOptions(
         columns=dict(pair(each) for each in columns or ()),
         recording=recording,
         sensors=[each.strip() for each in sensors.split(",")],
-        noises={each: float(value) for each, value in given.items()},
+        noises=dict(pair(each) for each in noises or ()),
         seconds=seconds,
         every_s=every,
         confirmed=confirmed,

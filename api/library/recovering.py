@@ -76,7 +76,8 @@ def recover(  # noqa: PLR0913 - each is an option of the command too
     by `Tuning`. Equal arguments give equal numbers, whatever `workers` is.
 
     Args:
-        robot: its name; its robot file, URDF or MJCF; or a spec.
+        robot: its name; its robot file, URDF or MJCF; or a spec of its `robot`, `controller`, `task` and `engine`; all
+            else is an argument.
         tunables: labels, or objects with bounds as in a spec; left out: the robot's usual ones.
         draws: number of truths.
         samples: motions that each is tuned on.

@@ -25,6 +25,9 @@ T = TypeVar("T", ExperimentSpec, StudySpec)
 AnyRobot: TypeAlias = str | Path | Mapping[str, Any] | SharedSettings
 """A robot's name; its robot file, URDF or MJCF, which is imported as by `gaplab robot import`; or a spec."""
 
+SIMULATED = ("robot", "controller", "task", "engine")
+"""Fields that are read of a spec."""
+
 Named: TypeAlias = str | Mapping[str, Any] | PluginRef | None
 """A plug-in by its name, or as an object with its options; None: that of the spec, or the robot's."""
 
@@ -47,13 +50,17 @@ def read_robot(robot: AnyRobot, *, controller: Named = None, task: Named = None)
 def settings(kind: type[S], robot: AnyRobot, **others: Any) -> S:  # noqa: ANN401 - as in a spec
     """Return what a robot, or a spec, says about what is simulated; others that are not None replace it.
 
+    Other fields of an experiment are arguments: an object with some is refused; of a complete spec, they are not read.
     Errors are those of `read_robot`.
     """
     folders.load()
     spec = {"robot": robot} if isinstance(robot, str | Path) else robot
     if not isinstance(spec, Mapping | SharedSettings):
         raise TypeError(f"a robot is its name, its file or a spec, not {robot!r:.100}")
-    said = {name: each for name, each in dict(spec).items() if name in {"robot", "controller", "task", "engine"}}
+    said = {name: each for name, each in dict(spec).items() if name in SIMULATED}
+    if issubclass(kind, ExperimentSpec) and isinstance(spec, Mapping) and (ignored := spec.keys() - said.keys()):
+        message = f"of a spec, {', '.join(SIMULATED)} are read here; give the others as arguments"
+        raise InvalidSpec(Violation(f"/{each}", spec[each], message, SIMULATED) for each in sorted(ignored))
     if isinstance(named := said.get("robot"), str | Path):
         said["robot"] = _of_file(Path(named)) if Path(named).suffix else _of_name(str(named))
     said |= {name: each for name, each in others.items() if each is not None}

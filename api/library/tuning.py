@@ -70,7 +70,8 @@ class Tuning(Result):
     returns has the other methods: `save` writes a file for `Tuning.load`, or for the bench of a service.
 
     Args:
-        robot: its name; its robot file, URDF or MJCF, which is imported as by `gaplab robot import`; or a spec.
+        robot: its name; its robot file, URDF or MJCF, which is imported as by `gaplab robot import`; or a spec of its
+            `robot`, `controller`, `task` and `engine`; all else is an argument.
         tunables: labels, or objects with bounds as in a spec; left out: the robot's usual ones.
         pool: a file of recordings, as `gaplab pool import` writes; the simulator is tuned on all that are not held out
             (`reality={"held_out": 0.2}`), and nothing is asked for or told.
@@ -109,11 +110,11 @@ class Tuning(Result):
         self._open_at(path, Path(robot).parent if isinstance(robot, str | Path) else Path(), progress)
         spec = with_files(self._store, spec)
         resolved = resolved_here(self._store, spec, resolve_experiment)
+        _check(resolved)
         try:
             self.id = study_of(self._store, self.path, self.path)
         except FileNotFoundError:
             self.id = submit(self._store, spec).id
-        self._check()
         given, here = resolved.model_dump(exclude={"iterations", "name"}), self.spec.model_dump()
         if differing := [name for name, value in given.items() if value != here[name]]:
             raise Conflict(f"{path} has a tuning with another {', '.join(differing)}: load it, or use a new path")
@@ -137,7 +138,7 @@ class Tuning(Result):
             raise FileExistsError(f"{path} exists, and the tuning in it goes on by itself: Tuning.load({str(path)!r})")
         found._open_at(file if begins(file, SQLITE) else path, file.parent, progress)
         found.id = study_of(found._store, found.path, file)
-        found._check()
+        _check(found.spec)
         return found
 
     def _open_at(self, path: str | Path | None, folder: Path, progress: bool | None) -> None:
@@ -148,15 +149,6 @@ class Tuning(Result):
         super().__init__(Store(url_of(file)), file, "")
         if path is None:
             finalize(self, rmtree, file.parent, ignore_errors=True)
-
-    def _check(self) -> None:
-        spec = self.spec
-        selects = spec.strategy.name not in strategies or strategies[spec.strategy.name].takes_samples
-        whole = spec.reality.kind == "recorded" and not selects
-        if spec.repetitions != 1 or not (whole or (spec.reality.kind == "physical" and selects)):
-            raise Conflict(
-                "a tuning has one repetition, a physical reality with a strategy that selects samples, or a pool"
-            )
 
     def ask(self, *, timeout_s: float = math.inf) -> Genome:
         """Return the controller to try next in reality; the same one until it, or another one, is told.
@@ -327,3 +319,17 @@ class Tuning(Result):
                 if sha256((folder / file.source.file).read_bytes()).hexdigest() == file.source.sha256:
                     return folder / file.source.file
         return None
+
+
+def _check(spec: ResolvedSpec) -> None:
+    """Raise Conflict if a spec is not that of a tuning."""
+    physical, name = spec.reality.kind == "physical", spec.strategy.name
+    selects = name not in strategies or strategies[name].takes_samples
+    permitted = "one that selects samples" if physical else "`direct`: it is tuned on the whole pool"
+    for place, value, fits, wanted in (
+        ("/repetitions", spec.repetitions, spec.repetitions == 1, "1"),
+        ("/reality/kind", spec.reality.kind, spec.reality.kind != "simulated", "physical, or recorded"),
+        ("/strategy", name, selects == physical, permitted),
+    ):
+        if not fits:
+            raise Conflict(f"{place}: {value} is not of a tuning; permitted: {wanted}")

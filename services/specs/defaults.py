@@ -159,16 +159,11 @@ def resolved_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine:
         return recorded_reality(spec)
     if spec.reality.kind == "physical":
         return _physical_reality(spec, robot)
-    return ResolvedReality(
-        kind="simulated",
+    return ResolvedReality.filled_from(
+        spec.reality,
         engine=completed(engines, ref),
         parameters=_truth(spec, robot, engine),
-        bench=None,
-        repeats=1,
         probes=spec.reality.probes or SIMULATED_PROBES,
-        samples=(),
-        limits=None,
-        beyond="warn",
         noise=spec.reality.noise or None,
         noise_unit=spec.reality.noise_unit or None,
     )

@@ -24,8 +24,12 @@ HELD_OUT = 0.2
 WITH_OPTIONS = "estimation_exploration with select: disagreement, or weighted with information_weight alone"
 """Strategies that need no fitness with some options."""
 
-OF_OTHERS = ("engine", "parameters", "noise", "noise_unit", "bench", "repeats", "samples", "probes", "limits", "beyond")
-"""Fields of other realities."""
+OF_KINDS = {
+    "simulated": ("engine", "parameters", "noise", "noise_unit"),
+    "physical": ("bench", "repeats", "samples", "limits", "beyond"),
+    RECORDED: ("pool", "held_out"),
+}
+"""Fields of a reality that one kind alone has."""
 
 
 def is_recorded(spec: ExperimentSpec) -> bool:
@@ -41,6 +45,17 @@ def pool_of(spec: ExperimentSpec) -> Pool:
     """
     ref = spec.reality.pool or PoolRef(name="none")
     return robot_library.pool(ref.sha256 or "unknown", ref.name)
+
+
+def kind_violations(reality: RealitySpec) -> Iterator[Violation]:
+    """Yield fields of a reality of another kind, unless they say what is so anyway."""
+    usual = RealitySpec()
+    for kind, names in OF_KINDS.items():
+        for name in names if kind != reality.kind else ():
+            if getattr(reality, name) not in (getattr(usual, name), 0):
+                message = f"{name} is of a {kind} reality, and this one is {reality.kind}"
+                value = reality.model_dump(mode="json")[name]
+                yield Violation(f"/reality/{name}", value, message, f"left out, or kind: {kind}")
 
 
 def with_recordings(spec: ExperimentSpec) -> ExperimentSpec:
@@ -64,9 +79,10 @@ def with_recordings(spec: ExperimentSpec) -> ExperimentSpec:
     ]:
         raise InvalidSpec(wrong)
     changes = {"controller": own, "task": own}
-    if "discrepancy" not in spec.model_fields_set:
-        seconds = {"seconds": float(max(0.001, pool.times_s[-1] - pool.times_s[0]))}
-        changes["discrepancy"] = PluginRef(name="readings", options=seconds)
+    compared = spec.discrepancy if "discrepancy" in spec.model_fields_set else PluginRef(name="readings")
+    if compared.name == "readings":
+        seconds = float(max(0.001, pool.times_s[-1] - pool.times_s[0]))
+        changes["discrepancy"] = compared.model_copy(update={"options": {"seconds": seconds, **compared.options}})
     return spec.model_copy(update=changes)
 
 
@@ -77,14 +93,10 @@ def check_recordings(spec: ExperimentSpec, robot: Robot) -> None:
 
 
 def recorded_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Violation]:
-    """Yield what a recorded reality does not have: fitness, fields of other realities, iterations."""
-    pool, reality = pool_of(spec), spec.reality
-    usual = RealitySpec()
-    for name in OF_OTHERS:
-        if (given := getattr(reality, name)) != getattr(usual, name):
-            value = reality.model_dump(mode="json")[name]
-            if not (name == "probes" and given == "never"):
-                yield Violation(f"/reality/{name}", value, f"{name} is not of a recorded reality", "left out")
+    """Yield what a recorded reality does not have: fitness, probes, more recordings than its pool."""
+    pool, probes = pool_of(spec), spec.reality.probes
+    if probes not in (None, "never"):
+        yield Violation("/reality/probes", probes, "a recorded reality has no probes", "left out")
     if spec.held_out:
         message = "reality/held_out is the share of the pool that no tuning sees"
         yield Violation("/held_out", spec.held_out, message, "0, or left out")
@@ -98,8 +110,10 @@ def recorded_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Vi
         message = message if strategy.needs_fitness else f"{strategy.name} tunes nothing"
         permitted = f"{', '.join(able)}, {WITH_OPTIONS}"
         yield Violation("/strategy", strategy.name, message, permitted)
-    most = selectable(spec)
-    if spec.iterations is not None and spec.iterations > most:
+    if not (most := selectable(spec)):
+        message = f"the pool {pool.name} has one recording, and none is left to tune on without it"
+        yield Violation("/reality/held_out", spec.reality.held_out, message, "0, or a pool of at least 2 recordings")
+    elif spec.iterations is not None and spec.iterations > most:
         message = f"the pool {pool.name} has {most} recordings to select, besides those held out"
         yield Violation("/iterations", spec.iterations, message, f"at most {most}")
 

@@ -61,7 +61,7 @@ class Simulation:
         fitnesses = self._fitnesses(_at(seen, times.observed), len(genomes), len(parameters))
         if not sensors.size:
             return fitnesses[..., None]
-        values = self._robot.sense(_at(seen, times.sensed))
+        values = self._robot.sense(replace(_at(seen, times.sensed), worlds=worlds))
         expected = (len(genomes), len(parameters), len(sensors.times_s), len(sensors.names))
         if np.shape(values) != expected:
             found = f"robot {self._robot.label!r} returned readings of shape {np.shape(values)}"

@@ -17,7 +17,7 @@ from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.defaults import bounds_of, honoured, runs
-from gaplab.services.specs.recorded import is_recorded, recorded_violations
+from gaplab.services.specs.recorded import is_recorded, kind_violations, recorded_violations
 from gaplab.services.world.robots import robots
 from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.tunables.base import Tunable
@@ -157,31 +157,30 @@ def _reading_violations(tunable: Tunable, robot: Robot, pointer: str) -> Iterato
 def reality_violations(
     spec: ExperimentSpec, strategy: Strategy, robot: Robot, *, simulated: type[Engine], engine: type[Engine]
 ) -> Iterator[Violation]:
-    """Yield parameters of reality that are unknown, out of range, or ignored by its engine; direct use of hardware.
+    """Yield fields of reality of another kind; parameters that are unknown or out of range; direct use of hardware.
 
     `simulated` is the engine of the simulators, `engine` that of reality.
     """
+    yield from kind_violations(spec.reality)
     if is_recorded(spec):
         yield from recorded_violations(spec, strategy)
         return
     if spec.reality.kind == "physical":
         yield from _physical_violations(spec, strategy)
         return
-    for name in ("bench", "repeats", "samples", "limits", "beyond"):
-        if name in spec.reality.model_fields_set and getattr(spec.reality, name) not in (None, 1, (), "warn"):
-            message = f"{name} is of a physical reality, and this one is simulated"
-            value = spec.reality.model_dump(mode="json")[name]
-            yield Violation(f"/reality/{name}", value, message, "left out, or kind: physical")
     if strategy.in_reality and engine is not simulated and not engine.repeatable:
         message = f"{strategy.name} evolves in reality itself, and the engine {engine.name!r} may move hardware"
         yield Violation("/strategy", strategy.name, message, "another strategy, or an engine with `repeatable = True`")
     yield from parameter_violations(spec.reality.parameters, robot, engine, ("reality", "parameters"))
-    yield from _share_violations(spec, strategy)
+    yield from _noise_violations(spec, strategy)
     if engine is not simulated and not engine.repeatable:
-        yield from _noise_violations(spec, f"the engine {engine.name!r} may move hardware")
+        for name in ("noise", "noise_unit"):
+            if given := getattr(spec.reality, name):
+                message = f"the engine {engine.name!r} may move hardware, whose measurements have noise of their own"
+                yield Violation(f"/reality/{name}", given, message, "left out")
 
 
-def _share_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Violation]:
+def _noise_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Violation]:
     """Yield noise as a share of the scale of fitness, if it has a size too, or there is no scale."""
     if spec.reality.noise and spec.reality.noise_unit:
         message = "noise is a share of the scale of fitness and noise_unit its size; a reality has one of them"
@@ -189,13 +188,6 @@ def _share_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Viol
     if spec.reality.noise and not strategy.transfer_simulators(1):
         message = f"{strategy.name} searches for nothing to transfer, so fitness has no scale that noise is a share of"
         yield Violation("/reality/noise", spec.reality.noise, message, "noise_unit, in the unit of fitness")
-
-
-def _noise_violations(spec: ExperimentSpec, why: str) -> Iterator[Violation]:
-    for name in ("noise", "noise_unit"):
-        if given := getattr(spec.reality, name):
-            message = f"{name} is of a simulated reality, and {why}, whose measurements have noise of their own"
-            yield Violation(f"/reality/{name}", given, message, "left out")
 
 
 def parameter_violations(
@@ -221,13 +213,6 @@ def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[V
     if strategy.in_reality:
         message = f"{strategy.name} evolves in reality itself, in thousands of evaluations of the physical robot"
         yield Violation("/strategy", strategy.name, message, "another strategy, or a simulated reality")
-    if reality.engine is not None:
-        message = "a physical reality has no engine; the engine of the simulators is `/engine`"
-        yield Violation("/reality/engine", reality.engine.name, message, "left out")
-    for name, value in reality.parameters.items():
-        message = "a physical reality has no hidden parameters; leave them out"
-        yield Violation(pointer_to(["reality", "parameters", name]), value, message, "left out")
-    yield from _noise_violations(spec, "this one is physical")
     if reality.probes == "never" and not strategy.takes_samples:
         message = f"{strategy.name} takes no samples, so without probes nothing would be measured"
         yield Violation("/reality/probes", reality.probes, message, ["each", "last"])

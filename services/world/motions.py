@@ -3,12 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray, Genome, frozen, no_readings
-from gaplab.services.world.world import Quaternion, Vector
+from gaplab.services.world.world import Quaternion, Vector, World
 
 Act: TypeAlias = Callable[[FloatArray, FloatArray, FloatArray, float], tuple[FloatArray, FloatArray]]
 """Genomes `(n, g)`, observations `(n, s)`, memories `(n, m)` and seconds to targets `(n, a)` and memories `(n, m)`.
@@ -148,6 +148,7 @@ class Trajectory:
         torques_nm: `(..., t, joints)`: torques of their motors in the time step before; 0 at time 0.
         commands: `(..., t, a)`: targets that the controller asks for; axes of size 1 stand for any size; None, too, if
             they are not known in advance.
+        worlds: that of each item of the axis before t, when sensors are read; empty: all are the robot's own.
     """
 
     times_s: FloatArray
@@ -157,6 +158,7 @@ class Trajectory:
     speeds_rad_s: FloatArray | None = None
     torques_nm: FloatArray | None = None
     commands: FloatArray | None = None
+    worlds: Sequence[World] = field(default=(), kw_only=True)
 
     def mapped(
         self, change: Callable[..., FloatArray], *others: "Trajectory", times_s: FloatArray | None = None
@@ -165,7 +167,7 @@ class Trajectory:
 
         `change` gets the array of each of the others, too.
         """
-        changed = {
+        changed: dict[str, Any] = {
             name: change(*(getattr(each, name) for each in (self, *others)))
             for name in ("positions_m", "orientations", "angles_rad", "speeds_rad_s", "torques_nm", "commands")
             if getattr(self, name) is not None

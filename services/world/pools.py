@@ -27,10 +27,16 @@ PLACES = AXES
 DIRECTIONS = tuple(f"{body} axis {axis}" for body in AXES[:2] for axis in AXES)
 """Sensors of a free base, in metres and without unit."""
 
+OF_BASE = ("position_m", "turn", "velocity_m_s", "turning_rad_s")
+"""Parts of a start that are of the base."""
+
 MOST_BYTES = 8_000_000
 """Largest size of a pool: an archive has it as one row. Fewer readings, or fewer decimals, make it smaller."""
 
 MOST_RECORDINGS = 10_000
+
+NOT_UNIT = 0.01
+"""How far the norm of a rotation may be from 1, as in traces."""
 
 _Text: TypeAlias = Annotated[str, Field(min_length=1, max_length=200)]
 _Row: TypeAlias = tuple[float, ...]
@@ -121,6 +127,11 @@ class Pool(NamedFile):
                 if count > 1:
                     yield Violation(f"/{place}", name, f"{count} {place} are named {name}; each name is permitted once")
         yield from _time_violations("/times_s", self.times_s)
+        for column, sensor in enumerate(self.sensors):
+            read = (cell for each in self.recordings for row in each.readings for cell in row[column : column + 1])
+            if all(cell is None for cell in read):
+                message = f"the sensor {sensor.name} has no reading in any recording"
+                yield Violation(f"/sensors/{column}", sensor.name, message, "a sensor that was read, or left out")
         for number, each in enumerate(self.recordings):
             for violation in _recording_violations(self, each):
                 yield violation.moved("", f"/recordings/{number}")
@@ -159,6 +170,12 @@ EXAMPLE = Pool(
 
 def _recording_violations(pool: Pool, each: Recorded) -> Iterator[Violation]:
     yield from _time_violations("/times_s", each.times_s)
+    if each.times_s and each.times_s[0] > 0:
+        message = f"the commands of recording {each.name} begin at {each.times_s[0]:g} s; before that, none is known"
+        yield Violation("/times_s/0", each.times_s[0], message, "0")
+    if each.start.turn is not None and abs((size := float(np.linalg.norm(each.start.turn))) - 1.0) > NOT_UNIT:
+        message = f"the turn at the start of recording {each.name} has norm {size:.3g}, and a rotation has 1"
+        yield Violation("/start/turn", each.start.turn, message, "x, y, z, w of norm 1")
     began = [each.start.angles_rad or pool.joints, each.start.speeds_rad_s or pool.joints]
     tables: tuple[tuple[str, Sequence[Sequence[Any]], int], ...] = (
         ("readings", each.readings, len(pool.sensors)),
@@ -187,7 +204,7 @@ def _time_violations(pointer: str, times_s: Sequence[float]) -> Iterator[Violati
 
 
 def fit_violations(pool: Pool, world: World, robot: str, pointer: str) -> Iterator[Violation]:
-    """Yield sensors, joints and actuators of a pool that a robot lacks."""
+    """Yield sensors, joints and actuators of a pool that a robot lacks, and starts of a base that never moves."""
     joints, actuators = ([each.name for each in some] for some in (world.joints, world.actuators))
     sensors = {*PLACES, *DIRECTIONS, *(f"{what} {joint}" for what in JOINTS for joint in joints)}
     named = (
@@ -200,6 +217,11 @@ def fit_violations(pool: Pool, world: World, robot: str, pointer: str) -> Iterat
             if name not in there:
                 message = f"the pool {pool.name} has the {what} {name!r}, which the {robot} lacks"
                 yield Violation(pointer, name, message, there)
+    for each in pool.recordings if world.fixed else ():
+        if any(getattr(each.start, name) is not None for name in OF_BASE):
+            message = f"recording {each.name} of the pool {pool.name} starts the base of the {robot}, which never moves"
+            yield Violation(pointer, each.name, message, f"starts without {', '.join(OF_BASE)}")
+            return
 
 
 def said(names: Sequence[str], seen: Trajectory, world: World) -> FloatArray:

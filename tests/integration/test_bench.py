@@ -662,7 +662,7 @@ def test_specs_that_make_no_sense_on_a_bench_are_refused() -> None:
     with pytest.raises(InvalidSpec) as refused:
         resolve_experiment(toy(strategy="direct", reality=physical))
     pointers = {each.pointer for each in refused.value.violations}
-    assert pointers == {"/strategy", "/reality/engine", "/reality/parameters/restitution"}
+    assert pointers == {"/strategy", "/reality/engine", "/reality/parameters"}
     with pytest.raises(InvalidSpec, match="physical reality"):
         resolve_experiment(toy(reality={"repeats": 3}))
 

@@ -1,6 +1,7 @@
 """Recorded reality: a pool that an engine made in place of a robot, and what strategies and users do with it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +11,19 @@ from fastapi.testclient import TestClient
 import gaplab
 from gaplab.api.app import create_app
 from gaplab.api.commands import tables
+from gaplab.api.library.robots import read_robot
+from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives.rerunning import verify
-from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.errors import Conflict, InvalidSpec
 from gaplab.services.experiments import stored_files
 from gaplab.services.specs.resolution import resolve, resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.services.world import robot_library
 from gaplab.services.world.motions import Start
-from gaplab.services.world.pools import Channel, Pool, Recorded
+from gaplab.services.world.pools import Channel, Pool, Recorded, fit_violations
 from tests.drawn_arm import imported
-from tests.recordings import TRUTH, arm_and_pool, simulated
+from tests.recordings import TRUTH, arm_and_pool, simulated, written
 
 pytest.importorskip("mujoco")
 
@@ -101,6 +104,8 @@ def test_a_tuning_on_a_pool_identifies_what_made_it(files: tuple[Path, Path]) ->
     assert found.values == pytest.approx(TRUTH, rel=0.05)
     assert found.held_out_error is not None
     assert found.held_out_error < 1.5  # times the noise of the sensors
+    with pytest.raises(Conflict, match="/strategy: random is not of a tuning; permitted: `direct`"):
+        gaplab.Tuning(arm, list(TRUTH), pool=pool, engine="mujoco", strategy="random")
 
 
 def test_a_repetition_gives_the_same_bits_again(result: Any, tmp_path: Path) -> None:
@@ -136,9 +141,19 @@ REFUSED: dict[str, tuple[dict[str, Any], str, str]] = {
     "held-out samples": ({"held_out": 0.2}, "/held_out", "0, or left out"),
     "a bench": ({"reality": {"bench": "desk"}}, "/reality/bench", "left out"),
     "hidden parameters": ({"reality": {"parameters": {"joint_damping": 1.0}}}, "/reality/parameters", "left out"),
+    "probes": ({"reality": {"probes": "each"}}, "/reality/probes", "left out"),
     "no pool": ({"reality": {"pool": None}}, "/reality/pool", "a pool that is stored"),
     "another robot": ({"robot": "quadruped"}, "/reality/pool", "which the quadruped lacks"),
 }
+
+
+def test_the_only_recording_of_a_pool_cannot_be_held_out(files: tuple[Path, Path], tmp_path: Path) -> None:
+    pool = Pool.read(files[1].read_bytes())
+    alone = written(tmp_path, pool.model_copy(update={"recordings": pool.recordings[:1]}))
+
+    with pytest.raises(InvalidSpec, match="/reality/held_out: the pool swings has one recording"):
+        gaplab.Tuning(files[0], pool=alone, engine="mujoco", reality={"held_out": "each"})
+    assert gaplab.Tuning(files[0], pool=alone, engine="mujoco").spec.iterations == 1
 
 
 @pytest.mark.parametrize("case", REFUSED)
@@ -190,6 +205,10 @@ def test_a_stored_spec_has_the_hash_of_its_pool_and_resolves_to_itself(files: tu
     assert found.reality.pool.sha256 == pool.sha256
     assert found.iterations == 6  # all that are not held out
     assert resolve(found)[0] == found
+    named = spec.model_copy(update={"discrepancy": PluginRef(name="readings", options={"absolute_weight": 0.5})})
+    options = stored_files.resolved_here(store, named, resolve_experiment).discrepancy.options
+    assert options == found.discrepancy.options | {"absolute_weight": 0.5}  # up to the last reading
+    assert options["seconds"] == pytest.approx(0.9)
 
 
 def test_a_joint_begins_where_a_biased_encoder_that_read_its_start_was_wrong(tmp_path: Path) -> None:
@@ -214,8 +233,31 @@ BROKEN: dict[str, tuple[dict[str, Any], str, str]] = {
     "commands without times": ({"times_s": [0.0]}, "/recordings/0/commands", "2 commands at 1 times"),
     "too many readings": ({"readings": [[0, 0, 0]] * 11}, "/recordings/0/readings", "at most 10"),
     "nan": ({"readings": [[0, float("nan"), 0]]}, "/recordings/0/readings/0/1", "finite"),
+    "commands from later on": ({"times_s": [0.1, 0.4]}, "/recordings/0/times_s/0", "begin at 0.1 s"),
+    "a turn of nothing": ({"start": {"turn": [0, 0, 0, 0]}}, "/recordings/0/start/turn", "x, y, z, w of norm 1"),
+    "a turn of norm 2": ({"start": {"turn": [1, 1, 1, 1]}}, "/recordings/0/start/turn", "has norm 2"),
     "a start of other joints": ({"start": {"angles_rad": [0.1]}}, "/recordings/0/start", "exactly 0"),
 }
+
+
+def test_a_sensor_that_read_nothing_is_refused(files: tuple[Path, Path]) -> None:
+    content = json.loads(files[1].read_bytes())
+    for each in content["recordings"]:
+        each["readings"] = [[*row[:2], None] for row in each["readings"]]
+
+    with pytest.raises(InvalidSpec, match="/sensors/2: the sensor z has no reading in any recording"):
+        Pool.read(json.dumps(content))
+
+
+def test_a_base_that_never_moves_begins_nowhere_else(files: tuple[Path, Path]) -> None:
+    pool = Pool.read(files[1].read_bytes())
+    moved = pool.recordings[1].model_copy(update={"start": Start(velocity_m_s=(1.0, 0.0, 0.0))})
+    pool, world = pool.model_copy(update={"recordings": (pool.recordings[0], moved)}), read_robot(files[0]).world
+
+    (found,) = fit_violations(pool, replace(world, fixed=True), "arm", "/reality/pool")
+
+    assert (found.pointer, found.value) == ("/reality/pool", "swing 1")
+    assert not [*fit_violations(pool, replace(world, fixed=False), "arm", "/reality/pool")]
 
 
 @pytest.mark.parametrize("case", BROKEN)

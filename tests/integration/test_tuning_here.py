@@ -279,6 +279,7 @@ def test_it_refuses_in_the_words_of_the_service(tmp_path: Path) -> None:
         "is in m/s, not in km/h": lambda: tuning.tell([0.5], 0.3, unit="km/h"),
         "/1/values: values is missing": lambda: tuning.tell([{"genome": [0.5], "values": [0.3]}, {"genome": [0.6]}]),
         "/reality/held_out: held_out must be at most 0.9, not 7.0": lambda: tuning_of(reality={"held_out": 7.0}),
+        "/seed: of a spec, robot, controller, task, engine": lambda: Tuning({"robot": "toy_function", "seed": 3}),
     }
     for words, call in refused.items():
         with pytest.raises(InvalidSpec, match=words.replace("(", r"\(")):
@@ -290,8 +291,9 @@ def test_it_refuses_in_the_words_of_the_service(tmp_path: Path) -> None:
     (tmp_path / "bad.csv").write_text("gene_0,value\n0.5,fast\n")
     with pytest.raises(InvalidSamples, match="'fast' is not a number"):
         tuning.tell(tmp_path / "bad.csv")
-    with pytest.raises(Conflict, match="one repetition, a physical reality"):
-        tuning_of(repetitions=2)
+    with pytest.raises(Conflict, match="/repetitions: 2 is not of a tuning; permitted: 1"):
+        tuning_of(path=tmp_path / "refused.db", repetitions=2)
+    assert tuning_of(path=tmp_path / "refused.db").spec.repetitions == 1
     assert tuning._log() == ()
 
 

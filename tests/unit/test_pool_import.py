@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaplab.api.library import pools
 from gaplab.api.library.pools import PoolOptions, import_pool
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.world.pools import Pool
@@ -100,6 +101,11 @@ WRONG: dict[str, tuple[list[str], str]] = {
     "shorter than a time step": ([*LINES, row("tap", 0), row("tap", 0).replace("100.00", "100.001")], "a time step"),
     "shorter than the interval": ([*LINES, row("tap", 0), row("tap", 2)], "it lasts 0.04 s"),
     "one line": ([*LINES, row("tap", 0)], "at least 2 are needed"),
+    "a recording without a name": (
+        [*LINES, *(row("", tick) for tick in range(26))],
+        "line 79: the name of a recording",
+    ),
+    "a header alone": ([HEADER], "motions.csv has no recording"),
     "no column of recordings": ([line.partition(",")[2] for line in LINES], "no column 'motion' names the recordings"),
 }
 
@@ -119,12 +125,54 @@ def test_what_is_wrong_is_told_with_its_line(case: str, read: Callable[..., Pool
     [
         ({"every_s": -1.0}, "/every_s: must be a number above 0, not -1"),
         ({"seconds": float("nan")}, "/seconds: must be a number above 0, not nan"),
+        ({"noises": {"angle": 0}}, "/noises/angle: must be a number above 0, not 0"),
+        ({"noises": {"speed": "fast"}}, "/noises/speed: must be a number above 0, not fast"),
+        ({"noises": {"angles": 0.1}}, "unknown 'angles'; permitted: place, direction, angle, speed, torque"),
+        ({"sensors": ("angle", "torque")}, "no column says the torque; there are columns of angle, speed"),
         ({"sensors": ("base", "angles")}, "unknown 'angles'; permitted: base, place, direction, angle, speed, torque"),
     ],
 )
 def test_options_that_cannot_be_are_refused(options: Any, words: str, read: Callable[..., Pool]) -> None:
     with pytest.raises(InvalidSpec, match=words):
         read(LINES, replace(OPTIONS, **options))
+
+
+def test_a_recording_shorter_than_the_interval_of_the_first_is_refused(read: Callable[..., Pool]) -> None:
+    short = [row("tap", 0), row("tap", 0).replace("100.00", "100.01")]
+
+    with pytest.raises(InvalidSpec, match=r"/tap: it lasts 0.01 s, and the interval of readings, 0.02 s, is longer"):
+        read([*LINES, *short], replace(OPTIONS, every_s=None))
+
+
+def test_what_no_file_may_be_is_refused_in_the_words_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, table, empty = imported(tmp_path), tmp_path / "motions.csv", tmp_path / "empty"
+    table.write_text("\n".join(LINES), encoding="utf-8")
+    empty.mkdir()
+
+    with pytest.raises(InvalidSpec, match=r'/name: name must match .* not "My Pool"'):
+        import_pool(table, str(arm), "My Pool", OPTIONS)
+    with pytest.raises(InvalidSpec, match="empty has no recording: it needs a CSV or MCAP file for each"):
+        import_pool(empty, str(arm), "empty", OPTIONS)
+    monkeypatch.setattr(Pool, "most_bytes", 500)
+    with pytest.raises(InvalidSpec, match=r"the pool has .* bytes, but at most 500 are permitted"):
+        import_pool(table, str(arm), "motions", OPTIONS)
+
+
+def test_of_many_gaps_the_first_are_told(read: Callable[..., Pool], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pools, "MOST_LOSSES", 2)
+    gaps = {*range(5, 12), *range(15, 22), *range(25, 32)}
+
+    pool = read([line for number, line in enumerate(LINES) if number not in gaps], CONFIRMED)
+
+    assert pool.lost == ("wave: nothing for 0.16 s after 0.06 s", "and 2 more")
+
+
+def test_a_joint_without_a_column_of_torque_has_no_sensor_of_it(read: Callable[..., Pool]) -> None:
+    lines = [f"{HEADER},effort_elbow", *(f"{each},0.1" for each in LINES[1:])]
+
+    pool = read(lines, replace(OPTIONS, sensors=("angle", "torque")))
+
+    assert [each.name for each in pool.sensors] == ["angle shoulder", "angle elbow", "torque elbow"]
 
 
 def test_a_wrong_recording_may_be_left_out_and_is_told(read: Callable[..., Pool]) -> None:
@@ -158,25 +206,78 @@ def test_a_file_with_other_columns_than_the_first_is_refused(tmp_path: Path) -> 
         import_pool(folder, str(arm), "runs", PoolOptions(every_s=0.1))
 
 
-def test_a_thrown_body_begins_moving_and_its_directions_are_read(tmp_path: Path) -> None:
-    cube = tmp_path / "cube.urdf"
+def cube_of(folder: Path) -> str:
+    cube = folder / "cube.urdf"
     inertia = '<inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/>'
     cube.write_text(
         f'<robot name="cube"><link name="cube"><inertial><mass value="0.37"/>{inertia}</inertial>'
         '<collision><geometry><box size=".1 .1 .1"/></geometry></collision></link></robot>'
     )
+    return str(cube)
+
+
+POSE = "toss,time_s,x_m,y_m,z_m,qx,qy,qz,qw"
+VELOCITIES = {
+    "vx,vy,vz": "1,0,0.5",
+    "vx [m/s],vy [m/s],vz [m/s]": "1,0,0.5",
+    "vx [mm/s],vy (cm/s),vz_m_s": "1000,0,0.5",
+    "vx_mm_s,vy_mm_s,vz_mm_s": "1000,0,500",
+}
+NO_VELOCITIES = {
+    "vx,vz": ("1,0.5", "/3: vy has no column, beside others of vx, vy, vz"),
+    "vx,vy,vz": ("nan,0,0.5", "/3: line 2, vx: 'nan' is not a finite number"),
+    "vx [km/h],vy,vz": ("1,0,0.5", "/3: vx: the unit 'km/h' is not known; permitted: m/s, cm/s, mm/s"),
+    "wx [deg/s],wy,wz [m/s]": ("1,0,0.5", "/3: wz: the unit 'm/s' is not known; permitted: rad/s, deg/s, °/s"),
+}
+TOSS = PoolOptions(recording="toss", every_s=0.1)
+
+
+def tossed(folder: Path, header: str, cells: str) -> Path:
+    table = folder / "tosses.csv"
+    table.write_text("\n".join([f"{POSE},{header}", *(f"3,{k * 0.01},0,0,0.3,0,0,0,1,{cells}" for k in range(21))]))
+    return table
+
+
+@pytest.mark.parametrize("header", VELOCITIES)
+def test_velocities_are_read_in_their_units(header: str, tmp_path: Path) -> None:
+    pool = import_pool(tossed(tmp_path, header, VELOCITIES[header]), cube_of(tmp_path), "tosses", TOSS)
+
+    assert pool.recordings[0].start.velocity_m_s == (1.0, 0.0, 0.5)
+    assert pool.recordings[0].start.turning_rad_s is None
+
+
+@pytest.mark.parametrize("header", NO_VELOCITIES)
+def test_a_velocity_that_is_incomplete_is_refused(header: str, tmp_path: Path) -> None:
+    cells, words = NO_VELOCITIES[header]
+
+    with pytest.raises(InvalidSpec) as refused:
+        import_pool(tossed(tmp_path, header, cells), cube_of(tmp_path), "tosses", TOSS)
+
+    assert str(refused.value) == words
+
+
+def test_what_a_table_says_of_a_base_that_never_moves_is_not_read(read: Callable[..., Pool]) -> None:
+    header = "x [mm],y,z,qx,qy,qz,qw,vx [km/h],vz"
+
+    pool = read([f"{HEADER},{header}", *(f"{each},0,0,0,0,0,0,1,nan,3" for each in LINES[1:])])
+
+    assert pool == read(LINES)
+
+
+def test_a_thrown_body_begins_moving_and_its_directions_are_read(tmp_path: Path) -> None:
+    cube = cube_of(tmp_path)
     table = tmp_path / "tosses.csv"
     names = "toss,time_s,x_m,y_m,z_m,qw,qx,qy,qz,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s"
     half = 0.5**0.5
     rows = [f"3,{k * 0.01},{k * 0.01},0,0.3,{half},0,0,{half},1,0,0.5,0,0,2" for k in range(21)]
     table.write_text("\n".join([names, *rows]))
 
-    pool = import_pool(table, str(cube), "tosses", PoolOptions(recording="toss", every_s=0.1, noises={"place": 0.001}))
+    pool = import_pool(table, cube, "tosses", PoolOptions(recording="toss", every_s=0.1, noises={"place": 0.001}))
 
     (toss,) = pool.recordings
     assert (toss.start.position_m, toss.start.velocity_m_s) == ((0.0, 0.0, 0.3), (1.0, 0.0, 0.5))
     assert toss.start.turning_rad_s == (0.0, 0.0, 2.0)
     assert toss.readings[0] == pytest.approx((0.1, 0, 0.3, 0, 1, 0, -1, 0, 0), abs=1e-6)  # a quarter turn about z
     assert [each.noise for each in pool.sensors[:4]] == [0.001, 0.001, 0.001, 0.02]
-    places = import_pool(table, str(cube), "tosses", PoolOptions(recording="toss", every_s=0.1, sensors=["place"]))
+    places = import_pool(table, cube, "tosses", PoolOptions(recording="toss", every_s=0.1, sensors=["place"]))
     assert [each.name for each in places.sensors] == ["x", "y", "z"]

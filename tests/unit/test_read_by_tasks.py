@@ -11,6 +11,7 @@ from gaplab.services.contract.robots import arm, trajectories
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec, PluginBroken
 from gaplab.services.engines.mujoco.engine import MuJoCo
+from gaplab.services.specs.assembly import edits_of
 from gaplab.services.specs.defaults import completed
 from gaplab.services.specs.robots import Driven, robot_of, sensors
 from gaplab.services.specs.simulation import Simulation
@@ -139,6 +140,18 @@ def test_contacts_tell_which_feet_are_on_the_ground() -> None:
     assert set(np.unique(contacts)) == {0.0, 1.0}
     together = np.asarray(np.corrcoef(contacts.T))
     assert together[0, 3] > 0.5 > together[0, 1] + 0.5  # in its trot, diagonal legs move together
+
+
+@pytest.mark.parametrize(("label", "values"), [("ground_height", (0.0, 0.005, -0.05)), ("length_scale", (1.0, 1.2))])
+def test_contacts_are_those_with_the_ground_and_the_feet_of_each_simulator(label: str, values: Any) -> None:
+    robot = robot_of(Driven(QUADRUPED, None, PluginRef(name="walk", options={"sensors": "contacts", "every_s": 0.05})))
+    simulation, simulators = Simulation(robot, MuJoCo(), edits_of([label])), frozen([[each] for each in values])
+
+    outcomes = simulation.sense(robot.known[None], simulators)
+
+    shares = robot.sensors.values(outcomes[0, :, 1:]).mean(axis=(1, 2))
+
+    assert shares == pytest.approx(shares[0], abs=0.12)
 
 
 def test_contacts_are_refused_where_not_the_base_is_observed() -> None:

@@ -167,13 +167,13 @@ class ReadingTask(Task):
         return np.asarray(values[..., self._places])
 
     def _contacts(self, trajectory: Trajectory) -> FloatArray:
-        shape = trajectory.positions_m.shape[:-1]
-        if trajectory.angles_rad is None:
-            return np.full((*shape, len(feet(self._world))), np.nan)
-        poses = np.concatenate([trajectory.positions_m, trajectory.orientations], axis=-1).reshape(-1, 7)
-        angles = trajectory.angles_rad.reshape(len(poses), -1)
-        seen = observations(self._world, ["contacts"], Bearing(poses, np.zeros((len(poses), 3)), angles, angles))
-        return seen.reshape(*shape, -1)
+        poses = np.concatenate([trajectory.positions_m, trajectory.orientations], axis=-1)
+        if (angles := trajectory.angles_rad) is None:
+            return np.full((*poses.shape[:-1], len(feet(self._world))), np.nan)
+        if not trajectory.worlds:
+            return _touching(self._world, poses, angles)
+        each = enumerate(trajectory.worlds)
+        return np.stack([_touching(world, poses[..., m, :, :], angles[..., m, :, :]) for m, world in each], axis=-3)
 
     def _sensors(self, group: str, world: World) -> Sequence[Sensor]:
         if group == "base":
@@ -183,3 +183,10 @@ class ReadingTask(Task):
         name = group.removesuffix("s")
         units = JOINTS[name][1]
         return [(f"{name} {joint.name}", units[joint.slides], self.noise(name), 0.0) for joint in world.actuators]
+
+
+def _touching(world: World, poses: FloatArray, angles_rad: FloatArray) -> FloatArray:
+    """Return `(..., feet)`: which feet are on the ground of a world, given poses `(..., 7)` of its base, and angles."""
+    rows, angles = poses.reshape(-1, 7), angles_rad.reshape(-1, angles_rad.shape[-1])
+    seen = observations(world, ["contacts"], Bearing(rows, np.zeros((len(rows), 3)), angles, angles))
+    return seen.reshape(*poses.shape[:-1], -1)
