@@ -154,6 +154,20 @@ def test_contacts_are_those_with_the_ground_and_the_feet_of_each_simulator(label
     assert shares == pytest.approx(shares[0], abs=0.12)
 
 
+def test_contacts_of_a_base_that_begins_turned_are_those_of_the_turned_base() -> None:
+    world, turn = robot_of(Driven(QUADRUPED)).world, (np.sin(0.2), 0.0, 0.0, np.cos(0.2))
+    level, begun = task("walk", sensors="contacts"), task("walk", sensors="contacts")
+    level.prepare(world)
+    begun.prepare(replace(world, start_turn=turn))
+
+    def contacts(walk: Any, orientation: Any) -> Any:
+        pose = np.array([[0.0, 0.0, world.start_height_m]])
+        return walk.sense(Trajectory(np.zeros(1), pose, np.array([orientation]), np.zeros((1, len(world.joints)))))
+
+    assert contacts(begun, (0.0, 0.0, 0.0, 1.0)).tolist() == contacts(level, turn).tolist()
+    assert contacts(level, turn).tolist() != contacts(level, (0.0, 0.0, 0.0, 1.0)).tolist()
+
+
 def test_contacts_are_refused_where_not_the_base_is_observed() -> None:
     with pytest.raises(InvalidSpec, match="contacts need the motion of the base, and front_left_shin is observed"):
         task("walk", sensors="contacts").prepare(replace(robot_of(Driven(QUADRUPED)).world, observed="front_left_shin"))

@@ -12,9 +12,10 @@ from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.registry import Plugin
+from gaplab.services.world.kinematics import product
 from gaplab.services.world.motions import Trajectory
 from gaplab.services.world.sensing import JOINTS, Bearing, Sensors, feet, in_order, listed, observations
-from gaplab.services.world.world import World
+from gaplab.services.world.world import UNTURNED, World
 
 
 class Task(Plugin):
@@ -167,7 +168,10 @@ class ReadingTask(Task):
         return np.asarray(values[..., self._places])
 
     def _contacts(self, trajectory: Trajectory) -> FloatArray:
-        poses = np.concatenate([trajectory.positions_m, trajectory.orientations], axis=-1)
+        turns, start = trajectory.orientations, self._world.start_turn
+        if self.turned and start != UNTURNED:  # it was told to be level at the start
+            turns = product(turns, np.array(start))
+        poses = np.concatenate([trajectory.positions_m, turns], axis=-1)
         if (angles := trajectory.angles_rad) is None:
             return np.full((*poses.shape[:-1], len(feet(self._world))), np.nan)
         if not trajectory.worlds:
