@@ -45,7 +45,7 @@ class Simulation:
         """
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._motion(genome) for genome in genomes]
-        return self._fitnesses(self._rollouts(genomes, worlds, motions), len(genomes), len(parameters))
+        return self._fitnesses(self._rollouts(genomes, worlds, motions), len(genomes), worlds)
 
     def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
         """Return fitness and readings `(n, m, 1 + q)`: the fitness of a call, then each reading over its noise.
@@ -58,7 +58,7 @@ class Simulation:
         times = _all_times(*(frozen(each).tobytes() for each in (motions[0].observe_s, sensors.times_s)))
         longer = [motion.observed_at(times.all_s) for motion in motions]
         seen = self._rollouts(genomes, worlds, longer)
-        fitnesses = self._fitnesses(_at(seen, times.observed), len(genomes), len(parameters))
+        fitnesses = self._fitnesses(_at(seen, times.observed), len(genomes), worlds)
         if not sensors.size:
             return fitnesses[..., None]
         values = self._robot.sense(replace(_at(seen, times.sensed), worlds=worlds))
@@ -78,10 +78,10 @@ class Simulation:
             outcomes[failed] = np.nan
         return outcomes
 
-    def _fitnesses(self, seen: Trajectory, genomes: int, simulators: int) -> Fitnesses:
-        fitnesses = np.asarray(self._robot.fitness(seen), dtype=np.float64)
-        if np.shape(fitnesses) != (genomes, simulators):
-            expected = f"the fitness of {genomes} genomes in {simulators} simulators"
+    def _fitnesses(self, seen: Trajectory, genomes: int, worlds: Sequence[World]) -> Fitnesses:
+        fitnesses = np.asarray(self._robot.fitness(replace(seen, worlds=worlds)), dtype=np.float64)
+        if np.shape(fitnesses) != (genomes, len(worlds)):
+            expected = f"the fitness of {genomes} genomes in {len(worlds)} simulators"
             raise PluginBroken(f"robot {self._robot.label!r} returned {np.shape(fitnesses)} numbers for {expected}")
         return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
 

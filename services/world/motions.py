@@ -148,7 +148,7 @@ class Trajectory:
         torques_nm: `(..., t, joints)`: torques of their motors in the time step before; 0 at time 0.
         commands: `(..., t, a)`: targets that the controller asks for; axes of size 1 stand for any size; None, too, if
             they are not known in advance.
-        worlds: that of each item of the axis before t, when sensors are read; empty: all are the robot's own.
+        worlds: that of each item of the axis before t; empty: all are the robot's own.
     """
 
     times_s: FloatArray

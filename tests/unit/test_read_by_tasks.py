@@ -98,6 +98,9 @@ def test_tracking_is_minus_the_root_mean_square_of_angle_less_command() -> None:
 
     assert made.observe_s.tolist() == [0.0, 0.02, 0.04]
     assert float(made.fitness(seen)) == pytest.approx(-np.sqrt(0.02 / 3))
+    encoder = replace(JOINTS, biases=((f"angle {JOINTS.joints[0].name}", -0.1),))
+    read = replace(seen, angles_rad=angles[None], commands=commands, worlds=[encoder])
+    assert float(made.fitness(read)[0]) == pytest.approx(-np.sqrt(0.05 / 3))
     assert task("track").observe_s[-1] == 2.0
     assert task("track", counted_s=0.05).observe_s.tolist() == [0.0, 0.02, 0.04, 0.05]
     described = sensors(Driven(QUADRUPED, None, PluginRef(name="track")))

@@ -151,7 +151,7 @@ def test_farthest_without_a_sample_keeps_away_from_what_its_search_began_with() 
             asked.append(score(np.zeros((len(readings), 2)), np.insert(readings, 0, 0.5, axis=1)[:, None, :]))
         return np.zeros(2)
 
-    farthest = strategies.create(PluginRef(name="farthest"))
+    farthest: Any = strategies.create(PluginRef(name="farthest"))
     farthest.select(belief(farthest), search, np.random.default_rng(0))
 
     np.testing.assert_allclose(np.concatenate(asked), np.sqrt([0.5, 0.5, 4.5]))

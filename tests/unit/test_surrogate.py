@@ -103,7 +103,7 @@ def test_residual_corrects_nothing_while_no_simulator_survives_the_samples() -> 
         asked.append(score(start + 0.1, np.ones((1, 1))))
         return start[0]
 
-    residual = strategies.create(PluginRef(name="residual"))
+    residual: Any = strategies.create(PluginRef(name="residual"))
     residual.transfer(belief(residual, [Sample(TRUTH, 5.0)]), search, np.random.default_rng(0))
 
     assert [float(scores[0]) for scores in asked] == pytest.approx([np.nan, 1.0], nan_ok=True)

@@ -9,6 +9,7 @@ from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.world.motions import Trajectory
+from gaplab.services.world.sensing import biases
 from gaplab.services.world.tasks.base import ReadingTask, ReadOptions
 from gaplab.services.world.world import World
 
@@ -27,6 +28,8 @@ class TrackOptions(ReadOptions):
 
 class Track(ReadingTask):
     """Minus the root mean square of angle − command, over the hinges that follow positions, in the counted time.
+
+    An angle is what the encoder reads.
 
     By default the sensors are the angles of all joints with a motor, at 50 Hz.
     """
@@ -64,6 +67,7 @@ class Track(ReadingTask):
             message = "the task track compares angles with commands, and no hinge of this robot follows positions"
             raise InvalidSpec([Violation("/task", self.name, message, "a robot with such motors, or another task")])
         self._angles, self._targets = map(list, zip(*followers, strict=True))
+        self._encoders = [f"angle {world.joints[place].name}" for place in self._angles]
 
     def fitness(self, trajectory: Trajectory) -> FloatArray:
         """Return `(...)`: minus the root mean square error, rad."""
@@ -71,4 +75,6 @@ class Track(ReadingTask):
         if angles is None or commands is None:
             return np.full(trajectory.positions_m.shape[:-2], np.nan)
         errors = angles[..., self._angles] - commands[..., self._targets]
+        if any(world.biases for world in trajectory.worlds):
+            errors += np.array([biases(world, self._encoders) for world in trajectory.worlds])[:, None]
         return np.asarray(-np.sqrt((errors * errors).mean(axis=(-2, -1))))
