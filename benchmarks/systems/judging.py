@@ -52,9 +52,10 @@ class Claim:
 def above(says: str, first: FloatArray, second: FloatArray, least: float = 0.0, unit: str = "m/s") -> Claim:
     """Return the claim that the mean of one is above that of the other by `least`; each `(r,)` by repetition."""
     away = _difference(first, second)
-    means = f"{np.nanmean(first):.3f} and {np.nanmean(second):.3f} {unit}, n = {len(first)} and {len(second)}"
-    found = f"{means}; difference {away[0]:.3f} ({away[1]:.3f} to {away[2]:.3f})" + (
-        f"; limit {least:.3f}" * bool(least)
+    means = f"{np.nanmean(first):.3f} and {np.nanmean(second):.3f} {unit}".rstrip()
+    found = (
+        f"{means}, n = {len(first)} and {len(second)}; difference {away[0]:.3f} ({away[1]:.3f} to {away[2]:.3f})"
+        + (f"; limit {least:.3f}" * bool(least))
     )
     return Claim(says, found, True if away[1] > least else False if away[2] < least else None)
 
