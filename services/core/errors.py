@@ -123,7 +123,7 @@ def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -
     """Return the violation of an unknown name, with the nearest permitted one."""
     nearest = next(iter(get_close_matches(name, permitted, n=1, cutoff=0.5)), None)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
-    message = f"unknown {kind} {name!r}{hint}; permitted: {', '.join(permitted)}"
+    message = f"unknown {kind} {name!r}{hint}; permitted: {', '.join(permitted) or 'none is known'}"
     return Violation(pointer, name, message, tuple(permitted), nearest)
 
 

@@ -24,6 +24,10 @@ from gaplab.services.world.tunables.base import Tunable
 from gaplab.services.world.tunables.labels import label_of, proper, tunable_of
 
 
+OF_LOOPS = {True: "observes while it acts", False: "plans its commands in advance"}
+"""What a controller does that is a loop, and one that is not."""
+
+
 def tunable_violations(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> Iterator[Violation]:
     """Yield tunables that are unknown, repeated, or of what the robot lacks or the engine ignores; bounds out of range.
 
@@ -145,9 +149,9 @@ def _reading_violations(tunable: Tunable, robot: Robot, pointer: str) -> Iterato
     """Yield a tunable of commands that are known in advance or of sensors, if the robot has none of these."""
     name = label_of(tunable)
     if tunable.of_loops not in {None, robot.loops}:
-        of, other = ("observations", "commands that are known in advance")[:: 1 if tunable.of_loops else -1]
-        message = f"{name} is of {of}, and the controller of the {robot.label} is of {other}"
-        yield Violation(pointer, name, message, f"left out, or a controller of {of}")
+        of, other = OF_LOOPS[bool(tunable.of_loops)], OF_LOOPS[robot.loops]
+        message = f"{name} is of a controller that {of}, and that of the {robot.label} {other}"
+        yield Violation(pointer, name, message, f"left out, or a controller that {of}")
     sensors, read = tunable.sensors(robot.world), robot.sensors.names
     if sensors and not robot.loops and not {*sensors} & {*read}:
         message = f"{name} is of {' and '.join(sensors)}, and the {robot.label} reads {' and '.join(read) or 'nothing'}"

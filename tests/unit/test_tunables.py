@@ -360,9 +360,9 @@ def test_what_lies_between_physics_and_sensors_is_refused_where_there_is_none() 
     assert "is of angle front_left_knee, and the quadruped reads roll and pitch" in unread["/tunables/0"].message
     assert unread["/tunables/0"].permitted == "a task that reads it"
     assert "matches no joint" in unread["/tunables/1"].message
-    assert "the controller of the quadruped is of observations" in looping["/tunables/0"].message
+    assert "that of the quadruped observes while it acts" in looping["/tunables/0"].message
     assert [*planned] == ["/tunables/0", "/tunables/1"]
-    assert planned["/tunables/1"].permitted == "left out, or a controller of observations"
+    assert planned["/tunables/1"].permitted == "left out, or a controller that observes while it acts"
     assert "the robot has no motors" in unmoved["/tunables/0"].message
     assert "analytic does not honour ground_height" in unmoved["/tunables/1"].message
     assert resolved(tunables=["bias(front_left_knee)"], controller="mlp").tunables  # which observes it
