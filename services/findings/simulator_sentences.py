@@ -12,7 +12,7 @@ from gaplab.services.findings.wording import many, number, share, spread
 from gaplab.services.world.sensing import Sensors
 
 LACKING = (
-    "Often missing in a model: the height or slope of the ground, a weak or slow motor, mass, latency; or a tunable is "
+    "Often missing in a model: the height or slope of the ground, a weak or slow motor, mass, delay; or a tunable is "
     "at its bound"
 )
 

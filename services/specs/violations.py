@@ -23,7 +23,6 @@ from gaplab.services.world.robots.base import Robot
 from gaplab.services.world.tunables.base import Tunable
 from gaplab.services.world.tunables.labels import label_of, proper, tunable_of
 
-
 OF_LOOPS = {True: "observes while it acts", False: "plans its commands in advance"}
 """What a controller does that is a loop, and one that is not."""
 

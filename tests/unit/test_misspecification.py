@@ -146,7 +146,7 @@ def test_it_is_said_how_far_off_and_where_most_and_identified_is_not() -> None:
         "no simulator reproduces the samples: the best err by 10 × noise a sample, where noise and rough physics would "
         "leave 2 (2 of 3 repetitions say so); most differs roll, by 6 × noise or 0.12 rad, most at 1 s, then height, "
     )
-    assert "the height or slope of the ground, a weak or slow motor, mass, latency" in said
+    assert "the height or slope of the ground, a weak or slow motor, mass, delay" in said
     points = [misfit_point(1, tunings, ["grip", "mass"], SPACE)]
     grip, mass = verdicts(points, [2], Means(), doubt(tunings, simulated=True))
     assert (grip.verdict, mass.verdict) == (Identification.DOUBTFUL, Identification.NOT)
