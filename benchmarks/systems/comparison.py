@@ -24,7 +24,8 @@ from gaplab.services.findings.wording import MISSING, listed
 from gaplab.services.results.comparisons import compare
 from gaplab.services.store.session import Store
 
-KINDS = (Fitness.TRANSFERRED, Fitness.EQUAL_CHANCES)
+IN_SHORT = {Fitness.TRANSFERRED: "transferred alone", Fitness.EQUAL_CHANCES: "equal chances"}
+KINDS = tuple(IN_SHORT)
 EQUAL: dict[str, tuple[CostModel, float | None]] = {
     "ten evaluations": (CostModel(), None),
     "7,000 rollouts": (CostModel(x="rollouts"), 7_000.0),
@@ -121,6 +122,11 @@ def columns(folder: Path, realities: Iterable[str] = REALITIES) -> dict[tuple[st
     return found
 
 
+def _systems() -> range:
+    """Return the places of all but `direct`."""
+    return range(len(ROWS) - 1)
+
+
 def _realities(found: Columns) -> list[str]:
     return list(dict.fromkeys(reality for reality, *_ in found))
 
@@ -191,7 +197,7 @@ def _percent(cell: Cell | None) -> str:
 def reversals(found: Columns) -> list[str]:
     """Return the pairs of which each is shown to be better than the other in some column, in words."""
     told = []
-    for first, second in combinations(range(len(ROWS) - 1), 2):
+    for first, second in combinations(_systems(), 2):
         wins, losses = (
             [_where(key) for key, one in found.items() if pair in one.above]
             for pair in ((first, second), (second, first))
@@ -210,35 +216,48 @@ def _where(key: tuple[str, str, Fitness]) -> str:
 def page(found: Columns) -> str:
     """Return the document."""
     text = (Path(__file__).parent / "comparison.txt").read_text("utf-8")
-    best = "\n".join(f"- {line}" for line in answers(found))
     turned = "\n".join(f"- {line}" for line in reversals(found)) or "- No pair of systems is shown in both directions."
     left = [title for reality, title in TITLES.items() if reality not in _realities(found)]
     missing = f"\nNot computed: {listed(left)}.\n" if left else ""
-    return text.format(table=rows(found), answers=best, reversals=turned, missing=missing)
+    return text.format(
+        table=rows(found),
+        answers=answers(found),
+        undecided=undecided(found),
+        systems=len(_systems()),
+        reversals=turned,
+        missing=missing,
+    )
 
 
-def answers(found: Columns) -> Iterator[str]:
-    """Yield, for each reality at ten evaluations, the best system and how many none is shown to beat."""
-    for reality in _realities(found):
-        told = []
+def answers(found: Columns) -> str:
+    """Return which system has the best mean: a row for what is equal and whose fitness counts, a column for a reality.
+
+    The last column is the best average over the realities, of the systems that are in each of them.
+    """
+    lines = []
+    for equal in EQUAL:
         for kind in KINDS:
-            one = found[reality, "ten evaluations", kind]
-            leads = [place for place in one.unbeaten if place < len(ROWS) - 1]
-            best = one.cells[leads[0]]
-            told.append(
-                f"{kind.words}: {ROWS[leads[0]].name}, {best.mean:.2f} ({best.lower:.2f} to {best.upper:.2f}) of "
-                f"direct; {len(leads)} of {len(ROWS) - 1} systems are not shown to be worse than another"
-            )
-        yield f"**{TITLES[reality].capitalize()}**: {'. '.join(told)}."
-    alone = [found[reality, "ten evaluations", KINDS[0]] for reality in _realities(found)]
-    means = {
-        row.name: sum(each.cells[place].mean for each in alone) / len(alone)
-        for place, row in enumerate(ROWS[:-1])
-        if all(place in each.cells for each in alone)
-    }
-    best_five = sorted(means, key=lambda name: -means[name])[:5]
-    leading = listed([f"{name} ({means[name]:.2f})" for name in best_five])
-    yield f"**On average over these realities**, transferred alone, these lead: {leading}."
+            ones = [found[each, equal, kind] for each in _realities(found)]
+            means = [{place: cell.mean for place, cell in one.cells.items() if place in _systems()} for one in ones]
+            everywhere = set.intersection(*map(set, means))
+            average = {place: sum(each[place] for each in means) / len(means) for place in everywhere}
+            lines.append([f"{equal}, {IN_SHORT[kind]}", *map(_leader, means), _leader(average)])
+    return table(["equal", *(TITLES[each] for each in _realities(found)), "on average"], lines)
+
+
+def _leader(means: Mapping[int, float]) -> str:
+    best = max(means, key=lambda place: means[place])
+    return f"{ROWS[best].name} {100 * means[best]:.0f}"
+
+
+def undecided(found: Columns) -> str:
+    """Return how many systems no other is shown to be better than, at ten evaluations, in words."""
+    told = []
+    for reality in _realities(found):
+        ones = [found[reality, "ten evaluations", kind] for kind in KINDS]
+        left = [sum(place in _systems() for place in one.unbeaten) for one in ones]
+        told.append(f"{left[0]} and {left[1]} {TITLES[reality]}")
+    return listed(told)
 
 
 def main() -> None:

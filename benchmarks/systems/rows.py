@@ -83,7 +83,12 @@ ROWS = [
     Row("weighted sum", PAPER, _lean("weighted"), "lean"),
     Row("interleaved evolution", PAPER, "interleaved", "turns"),
     Row("estimation–exploration", CITED, "estimation_exploration", "climbers"),
-    Row("the same, of disagreement", CITED, {"name": "estimation_exploration", "preset": "bongard_2005"}, "climbers"),
+    Row(
+        "estimation–exploration, disagreement",
+        CITED,
+        {"name": "estimation_exploration", "preset": "bongard_2005"},
+        "climbers",
+    ),
     Row("Back-to-Reality", CITED, "back_to_reality", "absolute"),
     Row("surrogate of reality", CITED, "surrogate", "cited"),
     Row("fit unless near", CITED, _lean("fit_unless_near"), "lean"),
@@ -98,7 +103,7 @@ ROWS = [
     Row("BayRn", LATER, "bayrn", "later"),
     Row("domain randomization", UNTUNED, "domain_randomization", "untuned"),
     Row(
-        "the same, fewer rollouts",
+        "domain randomization, fewer rollouts",
         UNTUNED,
         {"name": "domain_randomization", "options": {"equal_rollouts": True}},
         "untuned",
