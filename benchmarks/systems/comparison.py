@@ -36,9 +36,9 @@ machine at 1 an hour; 7,000 rollouts are what systems take that tune nothing."""
 
 TITLES = {
     "inside": "inside",
-    "inside-noisy": "inside, noise",
+    "inside-noisy": "inside with noise",
     "outside": "outside",
-    "outside-noisy": "outside, noise",
+    "outside-noisy": "outside with noise",
 }
 WIDTH_IN = 9.0
 HEIGHT = 4.6
