@@ -6,9 +6,9 @@ from itertools import product
 import numpy as np
 import scipy
 
-from gaplab.schemas.replays import Framing, Orientation, Position, RobotShapes, Shape, ShapeKind, ShapeRole
+from gaplab.schemas.replays import Framing, Orientation, Position, RobotShapes, Shape, ShapeRole
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.world.kinematics import TOUCHING_M, body_poses, clearances_m, rotated
+from gaplab.services.world.kinematics import TOUCHING_M, body_poses, chain, clearances_m, rotated
 from gaplab.services.world.world import Box, Capsule, Cylinder, Hull, Part, Vector, World
 from gaplab.services.world.world import Shape as Solid
 
@@ -43,14 +43,10 @@ def feet_of(world: World) -> tuple[int, ...]:
     The base is not a foot. If only one body of a robot that moves would be left, as in a snake, all bodies that collide
     are feet; of more than `MOST_FEET`, some are taken at equal distances in the list of bodies.
     """
-    names = [body.name for body in world.bodies]
-    parents = {names.index(joint.child): names.index(joint.parent) for joint in world.joints}
     touching = [place for place, body in enumerate(world.bodies) if place and body.touches]
-    carrying: set[int] = set()
-    for place in touching:
-        while (place := parents.get(place, 0)) and place not in carrying:
-            carrying.add(place)
-    outer = [place for place in touching if place not in carrying]
+    carriers = (number for place in touching for number in chain(world, world.bodies[place].name))
+    carrying = {world.joints[number].parent for number in carriers}
+    outer = [place for place in touching if world.bodies[place].name not in carrying]
     feet = outer if len(outer) > 1 or world.fixed else touching
     chosen = np.linspace(0, len(feet) - 1, min(len(feet), MOST_FEET)).round().astype(int)
     return tuple(feet[place] for place in chosen)
@@ -137,12 +133,11 @@ def _outline(shape: Shape) -> FloatArray:
 
 
 def _shape(place: int, part: Part, role: ShapeRole) -> Shape:
-    kind, size = _kind_and_size(part.shape)
     vertices, faces = _rounded_hull(part.shape) if isinstance(part.shape, Hull) else ((), ())
     return Shape(
         body=place,
-        kind=kind,
-        size_m=size,
+        kind=part.shape.kind,
+        size_m=_size_of(part.shape),
         position_m=part.center_m,
         orientation=part.turn,
         role=role,
@@ -151,18 +146,16 @@ def _shape(place: int, part: Part, role: ShapeRole) -> Shape:
     )
 
 
-def _kind_and_size(solid: Solid) -> tuple[ShapeKind, tuple[float, ...]]:
+def _size_of(solid: Solid) -> tuple[float, ...]:
     match solid:
         case Box():
-            return "box", solid.size_m
-        case Capsule():
-            return "capsule", (solid.radius_m, solid.length_m)
-        case Cylinder():
-            return "cylinder", (solid.radius_m, solid.length_m)
+            return solid.size_m
+        case Capsule() | Cylinder():
+            return solid.radius_m, solid.length_m
         case Hull():
-            return "hull", ()
+            return ()
         case _:
-            return "sphere", (solid.radius_m,)
+            return (solid.radius_m,)
 
 
 def _rounded_hull(hull: Hull) -> tuple[tuple[Vector, ...], tuple[Face, ...]]:
