@@ -64,15 +64,9 @@ def samples() -> tuple[Sample, ...]:
 
 
 def tuned(
-    plugin: Plugin, physics: Physics, ensemble: int = 1, seed: int = 0, evaluations: int = EVALUATIONS
+    tuner: Tuner, physics: Physics, ensemble: int = 1, seed: int = 0, evaluations: int = EVALUATIONS
 ) -> Sequence[Simulator]:
-    """Return the simulators that a new tuner finds."""
-    return _tuned(plugin(), physics, ensemble, seed, evaluations)
-
-
-def _tuned(
-    tuner: Tuner, physics: Physics, ensemble: int, seed: int, evaluations: int = EVALUATIONS
-) -> Sequence[Simulator]:
+    """Return the simulators that a tuner finds."""
     misfit = _misfit(physics)
     optimizer = SteadyState().diverse(ensemble) if ensemble > 1 else SteadyState()
     rng = np.random.default_rng(seed)
@@ -95,7 +89,7 @@ def _misfit(physics: Physics) -> Misfit:
 
 def finds_the_simulator(plugin: Plugin) -> None:
     """Finds the simulator where readings say enough."""
-    found = tuned(plugin, Physics())[0]
+    found = tuned(plugin(), Physics())[0]
     away = np.abs(found.parameters - TRUTH) / SPACE.extent
     assert away.max() < 0.15, f"it finds {found.parameters.tolist()}; the truth is {TRUTH.tolist()}"
 
@@ -103,7 +97,7 @@ def finds_the_simulator(plugin: Plugin) -> None:
 def returns_as_many_as_wanted(plugin: Plugin) -> None:
     """Returns one simulator or an ensemble, within the bounds."""
     for ensemble in (1, 7):
-        found = np.array([each.parameters for each in tuned(plugin, Physics(), ensemble)])
+        found = np.array([each.parameters for each in tuned(plugin(), Physics(), ensemble)])
         assert found.shape == (ensemble, 2), f"of {ensemble} simulators it returns an array of shape {found.shape}"
         inside = (SPACE.lower <= found) & (found <= SPACE.upper)
         assert inside.all(), "it returns simulators outside the bounds"
@@ -111,7 +105,7 @@ def returns_as_many_as_wanted(plugin: Plugin) -> None:
 
 def states_the_discrepancy_of_each(plugin: Plugin) -> None:
     """Returns each simulator with its own discrepancy."""
-    found = tuned(plugin, Physics(), 7)
+    found = tuned(plugin(), Physics(), 7)
     own = _misfit(Physics()).of(np.array([each.parameters for each in found]))
     stated = np.array([each.squared_error for each in found])
     assert np.allclose(own, stated), "its simulators have the discrepancy of others"
@@ -120,7 +114,7 @@ def states_the_discrepancy_of_each(plugin: Plugin) -> None:
 def returns_its_best_first(plugin: Plugin) -> None:
     """Returns its best estimate first: of seven simulators, one whose discrepancy is at most their median."""
     for seed in range(3):
-        errors = [each.squared_error for each in tuned(plugin, Physics(), 7, seed)]
+        errors = [each.squared_error for each in tuned(plugin(), Physics(), 7, seed)]
         best = errors[0] <= np.median(errors) + TOLERANCE
         assert best, (
             f"of seven simulators the first has the discrepancy {errors[0]:.3g}; median: {np.median(errors):.3g}"
@@ -131,7 +125,7 @@ def keeps_to_its_budget(plugin: Plugin) -> None:
     """Evaluates no more simulators than it may, within the bounds, also with the smallest budget that it permits."""
     for evaluations in (plugin().least_evaluations(SteadyState(), 7), EVALUATIONS):
         physics = Physics()
-        tuned(plugin, physics, 7, evaluations=evaluations)
+        tuned(plugin(), physics, 7, evaluations=evaluations)
         permitted = evaluations * len(samples())
         assert physics.rollouts <= permitted, f"it takes {physics.rollouts} rollouts; permitted: {permitted}"
         asked = np.vstack(physics.asked)
@@ -156,7 +150,7 @@ def repeats_itself(plugin: Plugin) -> None:
 
 
 def _numbers(tuner: Tuner, seed: int) -> FloatArray:
-    found = _tuned(tuner, Physics(), 7, seed)
+    found = tuned(tuner, Physics(), 7, seed)
     arrays = [array for each in found for array in (each.parameters, each.interval) if array is not None]
     scalars = [number for each in found for number in (each.squared_error, each.weight) if number is not None]
     return np.concatenate([*map(np.ravel, arrays), scalars])
@@ -164,14 +158,14 @@ def _numbers(tuner: Tuner, seed: int) -> FloatArray:
 
 def copes_with_failed_physics(plugin: Plugin) -> None:
     """Copes with simulators whose physics fails."""
-    found = tuned(plugin, Physics(fails_above=0.8), 3)
+    found = tuned(plugin(), Physics(fails_above=0.8), 3)
     assert np.isfinite(found[0].squared_error), "its best simulator is one whose physics fails"
-    assert len(tuned(plugin, Physics(fails_above=-1.0), 3)) == 3, "it returns too few where all physics fails"
+    assert len(tuned(plugin(), Physics(fails_above=-1.0), 3)) == 3, "it returns too few where all physics fails"
 
 
 def states_intervals_around_its_best(plugin: Plugin) -> None:
     """States intervals and weights that mean something, if it states any."""
-    found = tuned(plugin, Physics(), 7)
+    found = tuned(plugin(), Physics(), 7)
     for each in found:
         if each.interval is not None:
             assert each.interval.shape == (2, 2), f"its interval has the shape {each.interval.shape}; permitted: (p, 2)"

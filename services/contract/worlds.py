@@ -123,13 +123,14 @@ OF_NO_FIELD = ("origin", "edits")
 """Places of a world in which `World.edited` remembers what was edited."""
 
 
-def subject(tunable: Tunable) -> World:
-    """Return the first robot that has what a tunable edits."""
+def subject(plugin: type[Tunable]) -> tuple[Tunable, World]:
+    """Return a new tunable, and the first robot that has what it edits."""
+    tunable = plugin()
     world = next((world for world in _worlds() if tunable.lack(world) is None), None)
     if world is None:
         lack, _ = tunable.lack(Quadruped().world) or ("", ())
         raise AssertionError(f"neither an arm nor {', '.join(robots)} has what it edits: {lack}")
-    return world
+    return tunable, world
 
 
 def _worlds() -> Iterator[World]:
@@ -142,8 +143,7 @@ def _worlds() -> Iterator[World]:
 
 def reads_back_what_it_wrote(plugin: type[Tunable]) -> None:
     """Reads back the value that it wrote; if it is relative, the value that changes nothing."""
-    tunable = plugin()
-    world = subject(tunable)
+    tunable, world = subject(plugin)
     value = tunable.lower + 0.6 * (tunable.upper - tunable.lower)
     expected = tunable.read(world) if tunable.relative else value
     read = tunable.read(tunable.edit(world, value))
@@ -152,8 +152,7 @@ def reads_back_what_it_wrote(plugin: type[Tunable]) -> None:
 
 def changes_nothing_by_the_value_that_it_reads(plugin: type[Tunable]) -> None:
     """Changes nothing if it writes the value that it reads."""
-    tunable = plugin()
-    world = subject(tunable)
+    tunable, world = subject(plugin)
     assert tunable.edit(world, tunable.read(world)) == world, (
         f"it reads {tunable.read(world)}, and writing that changes it"
     )
@@ -161,8 +160,7 @@ def changes_nothing_by_the_value_that_it_reads(plugin: type[Tunable]) -> None:
 
 def edits_its_field_alone(plugin: type[Tunable]) -> None:
     """Edits the field of the world that it declares, and no other but those of `also`."""
-    tunable = plugin()
-    world = subject(tunable)
+    tunable, world = subject(plugin)
     before = flattened(asdict(world))
     after = flattened(asdict(tunable.edit(world, _another(tunable, tunable.read(world)))))
     places = [place for place in before | after if place.split(".")[0] not in OF_NO_FIELD]
@@ -174,8 +172,7 @@ def edits_its_field_alone(plugin: type[Tunable]) -> None:
 
 def leaves_the_given_world(plugin: type[Tunable]) -> None:
     """Leaves the world that it was given unchanged."""
-    tunable = plugin()
-    world = subject(tunable)
+    tunable, world = subject(plugin)
     same = deepcopy(world)
     tunable.edit(world, _another(tunable, tunable.read(world)))
     assert world == same, "it changes the given world; return a copy by dataclasses.replace"
@@ -183,8 +180,7 @@ def leaves_the_given_world(plugin: type[Tunable]) -> None:
 
 def is_built_as_it_says(plugin: type[Tunable]) -> None:
     """Edits a world that engines would build as it is, if they set nothing in place."""
-    tunable = plugin()
-    world = subject(tunable)
+    tunable, world = subject(plugin)
     edited = tunable.edit(world, _another(tunable, tunable.read(world)))
     assert edited.built(frozenset()) == edited.kind, "an engine would build another world; use World.edited, or replace"
 
