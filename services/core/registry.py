@@ -40,12 +40,14 @@ class Plugin:
         Options: frozen model whose fields all have defaults.
         presets: options under a name, like those that its source published, from which a spec may choose. Those under
             the name of a budget, as `as_published` or `lean`, are set by that budget too.
+        catalogued: names of its attributes that the catalogue shows.
     """
 
     name: ClassVar[str]
     source: ClassVar[str] = "gaplab"
     Options: ClassVar[type[Frozen]] = NoOptions
     presets: ClassVar[Presets] = {}
+    catalogued: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, options: Frozen | None = None) -> None:
         self.options = options if options is not None else self.Options()
@@ -71,7 +73,7 @@ class Plugin:
     @classmethod
     def details(cls) -> dict[str, Any]:
         """Return further details for the catalogue, as JSON."""
-        return {}
+        return {name: getattr(cls, name) for name in cls.catalogued}
 
 
 P = TypeVar("P", bound=Plugin)

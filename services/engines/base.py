@@ -145,6 +145,7 @@ class Engine(Plugin):
     batch: ClassVar[int] = 1
     usual_rollout_s: ClassVar[float] = 0.02
     repeatable: ClassVar[bool] = False
+    catalogued = ("closes_loops", "tells_joints", "sets_starts")
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
@@ -208,8 +209,7 @@ class Engine(Plugin):
     @classmethod
     def details(cls) -> dict[str, Any]:
         """Return the World fields that the engine honours, and what else it can do, for the catalogue."""
-        able = {name: getattr(cls, name) for name in ("closes_loops", "tells_joints", "sets_starts")}
-        return {"honours": sorted(cls.honours), **able}
+        return {"honours": sorted(cls.honours), **super().details()}
 
 
 WARM_SCENES = 4

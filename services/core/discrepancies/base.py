@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from math import sqrt
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from gaplab.services.core.arrays import FloatArray, Outcomes
 from gaplab.services.core.registry import Plugin
@@ -19,6 +19,7 @@ class Discrepancy(Plugin):
 
     senses: ClassVar[bool] = False
     squares: ClassVar[bool] = False
+    catalogued = ("senses", "squares")
     error_text: ClassVar[str] = "root mean square difference between fitness in simulation and in reality"
 
     @abstractmethod
@@ -58,8 +59,3 @@ class Discrepancy(Plugin):
     def least_error(self, fitness_error: float) -> float:
         """Return the error below which simulators are equally good, given one of fitness; of readings, their noise."""
         return 1.0 if self.senses else fitness_error
-
-    @classmethod
-    def details(cls) -> dict[str, Any]:
-        """Return whether it compares readings, and whether it is a sum of squares, for the catalogue."""
-        return {"senses": cls.senses, "squares": cls.squares}

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from numpy.random import Generator
 
@@ -44,6 +44,7 @@ class Tuner(Plugin):
 
     needs_squares: ClassVar[bool] = False
     intervals: ClassVar[bool] = False
+    catalogued = ("needs_squares", "intervals")
 
     @abstractmethod
     def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
@@ -56,8 +57,3 @@ class Tuner(Plugin):
     def divisor(self, samples: int) -> int:  # noqa: ARG002 - for those that need it
         """Return by what `simulator_evaluations` is divided for a tuning on so many samples; by default 1."""
         return 1
-
-    @classmethod
-    def details(cls) -> dict[str, Any]:
-        """Return whether it needs a sum of squares, and whether it gives intervals, for the catalogue."""
-        return {"needs_squares": cls.needs_squares, "intervals": cls.intervals}

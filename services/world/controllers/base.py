@@ -1,7 +1,7 @@
 """The contract of a controller: genomes, and how each drives the actuators of a robot."""
 
 from abc import abstractmethod
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from gaplab.services.core.arrays import FloatArray, Genome
 from gaplab.services.core.registry import Plugin
@@ -20,6 +20,7 @@ class Controller(Plugin):
     """
 
     loops: ClassVar[bool] = False
+    catalogued = ("loops",)
     space: Space
     known: Genome
 
@@ -35,8 +36,3 @@ class Controller(Plugin):
     @abstractmethod
     def motion(self, genome: Genome) -> Motion | Loop:
         """Return the motion that the genome `(g,)` describes."""
-
-    @classmethod
-    def details(cls) -> dict[str, Any]:
-        """Return whether it observes while it acts, for the catalogue."""
-        return {"loops": cls.loops}
