@@ -14,6 +14,12 @@ from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Search, Untuned
 from gaplab.services.core.types import Belief
 
+EQUAL_ROLLOUTS = Field(
+    default=False,
+    description="divide the evaluations by the simulators, so that the search costs no more rollouts than one in a "
+    "single simulator; gaplab's default: no",
+)
+
 
 class DomainRandomizationOptions(Frozen):
     """Options of the strategy `domain_randomization`."""
@@ -21,14 +27,26 @@ class DomainRandomizationOptions(Frozen):
     simulators: Annotated[int, Field(strict=True, ge=1, le=1_000)] = Field(
         default=20, description="random simulators in which every controller is evaluated; gaplab's default"
     )
-    equal_rollouts: bool = Field(
-        default=False,
-        description="divide the evaluations by the simulators, so that the search costs no more rollouts than one in a "
-        "single simulator; gaplab's default: no",
-    )
+    equal_rollouts: bool = EQUAL_ROLLOUTS
 
 
-class DomainRandomization(Untuned):
+class Drawn(Untuned):
+    """A strategy whose options say in how many simulators it evaluates each controller, and at what cost."""
+
+    options: "DomainRandomizationOptions | NoiseEnvelopeOptions"
+
+    @property
+    def ensemble(self) -> int:
+        """Return the number of simulators."""
+        return self.options.simulators
+
+    @property
+    def equal_rollouts(self) -> bool:
+        """Return whether the evaluations are divided by the simulators."""
+        return self.options.equal_rollouts
+
+
+class DomainRandomization(Drawn):
     """The controller with the highest mean fitness in random simulators: no samples, no tuning.
 
     The simulators are drawn once from the bounds of the tunables, and stay the same during the search.
@@ -38,16 +56,6 @@ class DomainRandomization(Untuned):
     source = "Tobin et al. 2017; the number of simulators is gaplab's"
     Options = DomainRandomizationOptions
     options: DomainRandomizationOptions
-
-    @property
-    def ensemble(self) -> int:
-        """Return the number of random simulators."""
-        return self.options.simulators
-
-    @property
-    def equal_rollouts(self) -> bool:
-        """Return whether the evaluations are divided by the simulators."""
-        return self.options.equal_rollouts
 
     def transfer(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the controller with the highest mean fitness found; failed physics in one simulator rules it out."""
@@ -89,14 +97,10 @@ class NoiseEnvelopeOptions(Frozen):
         default=1.0,
         description="standard deviations to subtract, if `fitness` is mean_minus_deviation; gaplab's default",
     )
-    equal_rollouts: bool = Field(
-        default=False,
-        description="divide the evaluations by the simulators, so that the search costs no more rollouts than one in a "
-        "single simulator; gaplab's default: no",
-    )
+    equal_rollouts: bool = EQUAL_ROLLOUTS
 
 
-class NoiseEnvelope(Untuned):
+class NoiseEnvelope(Drawn):
     """The controller that is fit in every draw of a noisy simulator: no samples, no tuning.
 
     *Base* aspects vary a little around the middle of their bounds, which says nothing about reality. *Implementation*
@@ -107,16 +111,6 @@ class NoiseEnvelope(Untuned):
     source = "Jakobi, Husbands and Harvey 1995; Jakobi 1997; the numbers are gaplab's"
     Options = NoiseEnvelopeOptions
     options: NoiseEnvelopeOptions
-
-    @property
-    def ensemble(self) -> int:
-        """Return the number of draws."""
-        return self.options.simulators
-
-    @property
-    def equal_rollouts(self) -> bool:
-        """Return whether the evaluations are divided by the draws."""
-        return self.options.equal_rollouts
 
     @property
     def named_tunables(self) -> tuple[str, ...]:
