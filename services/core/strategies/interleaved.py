@@ -7,16 +7,15 @@ from numpy.random import Generator
 from pydantic import Field
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
-from gaplab.services.core.scoring import weighted_deviation, weighted_mean, weights_of
-from gaplab.services.core.strategies.base import Diverse, DiverseOptions, Search, Weight
+from gaplab.services.core.scoring import weighted_mean, weights_of
+from gaplab.services.core.strategies.base import Diverse, Search
+from gaplab.services.core.strategies.paper import SimulatedFitAndInformativeOptions
 from gaplab.services.core.types import Belief
 
 
-class InterleavedOptions(DiverseOptions):
+class InterleavedOptions(SimulatedFitAndInformativeOptions):
     """Options of the strategy `interleaved`."""
 
-    fit_weight: Weight = Field(default=1.0, description="weight of the mean simulated fitness")
-    informative_weight: Weight = Field(default=1.0, description="weight of the standard deviation of simulated fitness")
     best: Annotated[int, Field(strict=True, ge=1, le=1_000)] = Field(
         default=10,
         description="best controllers, whose simulated fitness says which simulators are similar; gaplab's default",
@@ -58,8 +57,7 @@ class Interleaved(Diverse):
             if not weights:
                 accurate = weights_of(belief.simulators, options.floor(belief))
                 weights.append(shared(accurate, fitnesses, options.best, options.alike * scale))
-            fit = options.fit_weight * weighted_mean(fitnesses, weights[0])
-            return fit + options.informative_weight * weighted_deviation(fitnesses, weights[0])
+            return options.score(fitnesses, weights[0])
 
         return search(score, parameters=belief.parameters, start=belief.members)
 

@@ -114,6 +114,11 @@ class SimulatedFitAndInformativeOptions(DiverseOptions):
     fit_weight: Weight = Field(default=1.0, description="weight of the mean simulated fitness")
     informative_weight: Weight = Field(default=1.0, description="weight of the standard deviation of simulated fitness")
 
+    def score(self, fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
+        """Return the sum of weighted mean and weighted deviation of fitnesses `(n, m)`, given weights `(m,)`."""
+        fit = self.fit_weight * weighted_mean(fitnesses, weights)
+        return fit + self.informative_weight * weighted_deviation(fitnesses, weights)
+
 
 class SimulatedFitAndInformative(Diverse):
     """The controller with high mean fitness in a diverse ensemble of simulators that disagree on it.
@@ -131,12 +136,7 @@ class SimulatedFitAndInformative(Diverse):
         """Return the controller with the highest sum of weighted mean and weighted deviation found."""
         belief = self.options.weighed(belief)
         weights = weights_of(belief.simulators, self.options.floor(belief))
-
-        def score(_: Genomes, fitnesses: Fitnesses) -> FloatArray:
-            fit = self.options.fit_weight * weighted_mean(fitnesses, weights)
-            return fit + self.options.informative_weight * weighted_deviation(fitnesses, weights)
-
-        return search(score, parameters=belief.parameters)
+        return search(lambda _, fitnesses: self.options.score(fitnesses, weights), parameters=belief.parameters)
 
 
 class SimulatedFitAndUniqueOptions(Frozen):
