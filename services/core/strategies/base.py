@@ -204,11 +204,6 @@ class DiverseOptions(Frozen):
         "when all weigh the same, in all; null: always in all, as in the paper",
     )
 
-    @property
-    def counted(self) -> int:
-        """Return the number of simulators in which a selection searches once they differ in weight."""
-        return min(self.simulators, self.weightiest or self.simulators)
-
     def weighed(self, belief: Belief) -> Belief:
         """Return the belief with the simulators in which a selection searches; of equal weights, the first ones."""
         if self.weightiest is None or not belief.learnable:
@@ -240,4 +235,4 @@ class Diverse(Strategy):
 
     def selection_simulators(self, tunables: int, *, learned: bool) -> int:  # noqa: ARG002 - the port's signature
         """Return the size of the ensemble, or the number of simulators that count once they differ in weight."""
-        return self.options.counted if learned else self.ensemble
+        return min(self.ensemble, self.options.weightiest or self.ensemble) if learned else self.ensemble
