@@ -11,7 +11,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Parameters
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.space import Space
-from gaplab.services.core.tuners.base import Tuner, TuningTask
+from gaplab.services.core.tuners.base import Tuner, TuningTask, equally_probable
 from gaplab.services.core.types import Simulator
 
 WIDER = 2.0
@@ -75,9 +75,8 @@ class AbcSmc(Tuner):
             order = np.argsort(errors, kind="stable")[:stay]
             particles, weights, errors = particles[order], weights[order] / weights[order].sum(), errors[order]
         chosen = rng.choice(len(particles), task.ensemble - 1, p=weights)
-        first = Simulator(particles[0], float(errors[0]), _interval(particles, weights), 1.0 / task.ensemble)
-        ranked = sorted(chosen.tolist())
-        return (first, *(Simulator(particles[i], float(errors[i]), None, 1.0 / task.ensemble) for i in ranked))
+        ranked = [0, *sorted(chosen.tolist())]
+        return equally_probable(particles[ranked], errors[ranked], _interval(particles, weights))
 
 
 def _moved(

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from numpy.random import Generator
 
+from gaplab.services.core.arrays import FloatArray, Parameters
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.space import Space
@@ -57,3 +58,10 @@ class Tuner(Plugin):
     def divisor(self, samples: int) -> int:  # noqa: ARG002 - for those that need it
         """Return by what `simulator_evaluations` is divided for a tuning on so many samples; by default 1."""
         return 1
+
+
+def equally_probable(parameters: Parameters, errors: FloatArray, interval: FloatArray) -> tuple[Simulator, ...]:
+    """Return simulators `(m, p)` with their discrepancies `(m,)`; the first is the estimate, and has the interval."""
+    weight = 1.0 / len(parameters)
+    first, *others = zip(parameters, errors.tolist(), strict=True)
+    return (Simulator(*first, interval, weight), *(Simulator(*each, None, weight) for each in others))

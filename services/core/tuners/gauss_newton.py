@@ -14,7 +14,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.linear_models import PRIOR_VARIANCE, LinearModel, cutter
 from gaplab.services.core.optimizers.base import Optimizer
-from gaplab.services.core.tuners.base import Tuner, TuningTask
+from gaplab.services.core.tuners.base import Tuner, TuningTask, equally_probable
 from gaplab.services.core.types import Simulator
 
 CONFIDENCE = 0.95
@@ -267,8 +267,4 @@ def _simulators(task: TuningTask, estimate: LocalEstimate, rng: Generator) -> tu
     """Return the estimate with its intervals, then draws from its error; each with its discrepancy."""
     drawn = rng.multivariate_normal(estimate.place, estimate.covariance, task.ensemble - 1)
     found = task.space.at(np.clip(np.vstack([estimate.place, drawn]), 0.0, 1.0))
-    errors, weight = task.misfit.of(found), 1.0 / task.ensemble
-    interval = task.space.at(estimate.interval().T).T
-    first = Simulator(found[0], float(errors[0]), interval, weight)
-    others = zip(found[1:], errors[1:], strict=True)
-    return (first, *(Simulator(parameters, float(error), None, weight) for parameters, error in others))
+    return equally_probable(found, task.misfit.of(found), task.space.at(estimate.interval().T).T)

@@ -12,7 +12,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.space import Space
-from gaplab.services.core.tuners.base import Tuner, TuningTask
+from gaplab.services.core.tuners.base import Tuner, TuningTask, equally_probable
 from gaplab.services.core.types import Simulator
 
 FEWEST = 10
@@ -89,10 +89,7 @@ class SimOpt(Tuner):
             drawn = gaussian.draw(min(self.options.draws, left // updates), rng)
             gaussian = self._updated(gaussian, drawn, task.misfit.of(task.space.at(drawn)))
         found = task.space.at(np.vstack([gaussian.mean, gaussian.draw(task.ensemble - 1, rng)]))
-        errors, weight = task.misfit.of(found), 1.0 / task.ensemble
-        first = Simulator(found[0], float(errors[0]), gaussian.interval(task.space), weight)
-        others = zip(found[1:], errors[1:], strict=True)
-        return (first, *(Simulator(parameters, float(error), None, weight) for parameters, error in others))
+        return equally_probable(found, task.misfit.of(found), gaussian.interval(task.space))
 
     def _before(self, task: TuningTask) -> "Gaussian":
         """Return the Gaussian of the tuning before, which its first simulator holds; at first one around the middle."""
