@@ -6,6 +6,7 @@ plain functions on arrays. `callback` compiles them. What MuJoCo's model has no 
 """
 
 from collections.abc import Sequence
+from itertools import chain
 from math import hypot
 from typing import Any, NamedTuple
 
@@ -70,13 +71,8 @@ def settings(
     """Return the settings of a world, as an array for the law; dampers are degrees of freedom with their damping."""
     step, sweeps, ahead = world.time_step_s, max(1, world.solver_iterations), 0 if world.fixed else 1
     counts = (len(servos), len(motors), len(dampers), len(stickers))
-    tables = [
-        *(value for servo in servos for value in servo),
-        *(value for dof, law, rotor in motors for value in (dof, *law, rotor)),
-        *(value for damper in dampers for value in damper),
-        *(value for sticker in stickers for value in sticker),
-    ]
-    return np.array([step, abs(world.gravity_m_s2) * step, sweeps, dofs, ahead, *counts, *tables])
+    rows: list[tuple[float, ...]] = [*servos, *((dof, *law, rotor) for dof, law, rotor in motors), *dampers, *stickers]
+    return np.array([step, abs(world.gravity_m_s2) * step, sweeps, dofs, ahead, *counts, *chain.from_iterable(rows)])
 
 
 SLIDES_M_S = 0.01
