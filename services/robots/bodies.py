@@ -80,6 +80,12 @@ def rotation_of(wxyz: FloatArray) -> Rotation:
     return Rotation.from_quat(np.roll(wxyz, -1))
 
 
+def tensor(moments_kg_m2: FloatArray | Vector, axes: Rotation) -> FloatArray:
+    """Return `(3, 3)`: an inertia in the frame that its axes are in; equal moments have no axes of their own."""
+    turn = axes.as_matrix()
+    return np.asarray(turn @ np.diag(moments_kg_m2) @ turn.T)
+
+
 class Shapes:
     """Shapes of the geoms of a model; the hull of a mesh is computed once, and `planes` are the file's ground."""
 
@@ -263,10 +269,7 @@ class Bodies:
         MuJoCo takes the dimension and the friction of the shape or the ground, whichever has the higher priority, and
         of equal ones the larger. Dimension 1 has no friction.
         """
-        model = self.model
-        geoms = [at for at in range(model.ngeom) if model.body_weldid[model.geom_bodyid[at]] == head]
-        touching = [at for at in geoms if self._shapes.collides(at)]
-        found = {self._shapes.on_the_ground(at) for at in touching}
+        found = {self._shapes.on_the_ground(at) for at in self._geoms(head) if self._shapes.collides(at)}
         if len(found) > 1:
             self._notes.lose(
                 "shapes of different friction on one body, of which the largest counts: {}", self.name(head)
@@ -309,17 +312,20 @@ class Bodies:
             return center, Inertia(vector(model.body_inertia[at]), quaternion(axes))
         mass = sum(each[0] for each in heavy)
         center = np.asarray(sum(each[0] * each[1] for each in heavy) / mass)
-        tensor = np.zeros((3, 3))
+        total = np.zeros((3, 3))
         for kg, place, axes, at in heavy:
-            to, turn = place - center, axes.as_matrix()
-            tensor += turn @ np.diag(model.body_inertia[at]) @ turn.T + kg * (to @ to * np.eye(3) - np.outer(to, to))
-        moments, turn = np.linalg.eigh(tensor)
+            to = place - center
+            total += tensor(model.body_inertia[at], axes) + kg * (to @ to * np.eye(3) - np.outer(to, to))
+        moments, turn = np.linalg.eigh(total)
         turn[:, 2] *= np.sign(np.linalg.det(turn))
         return center, Inertia(vector(moments), quaternion(Rotation.from_matrix(turn)))
 
-    def _parts(self, head: int) -> Iterator[Part]:
+    def _geoms(self, head: int) -> list[int]:
         model = self.model
-        geoms = [at for at in range(model.ngeom) if model.body_weldid[model.geom_bodyid[at]] == head]
+        return [at for at in range(model.ngeom) if model.body_weldid[model.geom_bodyid[at]] == head]
+
+    def _parts(self, head: int) -> Iterator[Part]:
+        model, geoms = self.model, self._geoms(head)
         touching = [at for at in geoms if self._shapes.collides(at)]
         shown = geoms if self._options.visuals or not touching else touching
         if len(shown) < len(geoms):

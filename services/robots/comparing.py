@@ -17,7 +17,7 @@ from gaplab.services.core.errors import InvalidRobot
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.mujoco.plain import plain_positions
-from gaplab.services.robots.bodies import Bodies, rotation_of
+from gaplab.services.robots.bodies import Bodies, rotation_of, tensor
 from gaplab.services.robots.reading import body_name
 from gaplab.services.world.controllers import controllers
 from gaplab.services.world.motions import Motion
@@ -59,7 +59,8 @@ def changes(before: World, after: World) -> list[Change]:
 def same(first: Any, second: Any) -> bool:  # noqa: ANN401 - any value of a world
     """Return whether two values of a world are equal but for rounding."""
     if isinstance(first, Inertia) and isinstance(second, Inertia):
-        return bool(np.allclose(_tensor(first), _tensor(second), rtol=SAME, atol=SAME * max(first.moments_kg_m2)))
+        one, other = (tensor(each.moments_kg_m2, Rotation.from_quat(each.turn)) for each in (first, second))
+        return bool(np.allclose(one, other, rtol=SAME, atol=SAME * max(first.moments_kg_m2)))
     if is_dataclass(first) and type(first) is type(second):
         return all(same(getattr(first, field.name), getattr(second, field.name)) for field in fields(first))
     if isinstance(first, tuple) and isinstance(second, tuple):
@@ -67,12 +68,6 @@ def same(first: Any, second: Any) -> bool:  # noqa: ANN401 - any value of a worl
     if isinstance(first, float | int) and isinstance(second, float | int):
         return bool(np.isclose(first, second, rtol=SAME, atol=SAME * 1e-3))
     return bool(first == second)
-
-
-def _tensor(inertia: Inertia) -> FloatArray:
-    """Return `(3, 3)`: the inertia in the frame of the body; equal moments have no axes of their own."""
-    turn = Rotation.from_quat(inertia.turn).as_matrix()
-    return np.asarray(turn @ np.diag(inertia.moments_kg_m2) @ turn.T)
 
 
 def _values(world: World) -> Iterator[tuple[Place, Any]]:
@@ -125,12 +120,6 @@ class Inertial:
     mass_kg: float
     moments_kg_m2: FloatArray
     axes: Rotation
-
-    @property
-    def tensor(self) -> FloatArray:
-        """Return `(3, 3)`: the inertia about the centre of mass, in the body's frame."""
-        turn = self.axes.as_matrix()
-        return np.asarray(turn @ np.diag(self.moments_kg_m2) @ turn.T)
 
 
 def inertials(bodies: Bodies, head: int, before: Body, after: Body) -> list[Inertial] | None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gaplab.services.core.errors import InvalidRobot
-from gaplab.services.robots.bodies import joint_name, joint_number
+from gaplab.services.robots.bodies import joint_name, joint_number, tensor
 from gaplab.services.robots.comparing import Change, Inertial
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.reading import Handle
@@ -242,5 +242,5 @@ def _write(inertial: Element, found: Inertial) -> None:
         return
     child(inertial, "mass").set("value", numbers(found.mass_kg))
     origin.set("rpy", "0 0 0")
-    for name, value in zip(_MOMENTS, found.tensor[np.triu_indices(3)], strict=True):
+    for name, value in zip(_MOMENTS, tensor(found.moments_kg_m2, found.axes)[np.triu_indices(3)], strict=True):
         inertia.set(name, numbers(value))
