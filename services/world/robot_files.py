@@ -161,7 +161,16 @@ class RobotFile(NamedFile):
     @classmethod
     def quick_violations(cls, content: Any) -> Iterator[Violation]:  # noqa: ANN401 - any JSON
         """Yield fields that a world has and a file has not, and parts that are too many."""
-        yield from _world_violations(content)
+        world = content.get("world") if isinstance(content, dict) else None
+        if not isinstance(world, dict):
+            return
+        for name in world.keys() & _UNWRITTEN:
+            message = f"{name} is not a field of a robot file: it would say how the world was edited"
+            yield Violation(f"/world/{name}", None, message, "no such field")
+        for name in ("bodies", "joints"):
+            if isinstance(given := world.get(name), list) and len(given) > MOST_BODIES:
+                message = f"{name} must be at most {MOST_BODIES}, not {len(given):,}"
+                yield Violation(f"/world/{name}", len(given), message, f"at most {MOST_BODIES}")
 
     def violations(self) -> Iterator[Violation]:
         """Yield what is inconsistent in its world."""
@@ -181,20 +190,6 @@ class RobotFile(NamedFile):
         """The file as JSON values, without what has its default value."""
         left_out = {"world"} | {name for name in ("source", "comments") if not getattr(self, name)}
         return {**self.model_dump(mode="json", exclude=left_out), "world": _plain(self.world)}
-
-
-def _world_violations(content: Any) -> Iterator[Violation]:  # noqa: ANN401 - any JSON
-    """Yield violations that are found quickly, before every value of a world is checked."""
-    world = content.get("world") if isinstance(content, dict) else None
-    if not isinstance(world, dict):
-        return
-    for name in world.keys() & _UNWRITTEN:
-        message = f"{name} is not a field of a robot file: it would say how the world was edited"
-        yield Violation(f"/world/{name}", None, message, "no such field")
-    for name in ("bodies", "joints"):
-        if isinstance(given := world.get(name), list) and len(given) > MOST_BODIES:
-            message = f"{name} must be at most {MOST_BODIES}, not {len(given):,}"
-            yield Violation(f"/world/{name}", len(given), message, f"at most {MOST_BODIES}")
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - any value of a world
