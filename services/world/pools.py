@@ -16,7 +16,6 @@ from gaplab.schemas.base import Frozen
 from gaplab.schemas.robots import FileKind
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import Violation
-from gaplab.services.world.controllers.parts import follows_angle
 from gaplab.services.world.kinematics import rotated
 from gaplab.services.world.motions import Motion, Start, Trajectory
 from gaplab.services.world.robot_files import NamedFile
@@ -103,7 +102,7 @@ class Pool(NamedFile):
         angles = self._of_joints(start.angles_rad, world, [joint.start for joint in world.joints])
         speeds = self._of_joints(start.speeds_rad_s, world, [0.0] * len(world.joints))
         begun = dict(zip((joint.name for joint in world.joints), angles or (), strict=False))
-        rest = [begun.get(each.name, each.start) if follows_angle(each) else 0.0 for each in world.actuators]
+        rest = [begun.get(each.name, each.start) if each.follows == "position" else 0.0 for each in world.actuators]
         times_s = frozen(recorded.times_s or [0.0])
         targets = np.tile(rest, (len(times_s), 1))
         places = {joint.name: place for place, joint in enumerate(world.actuators)}

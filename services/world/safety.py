@@ -9,7 +9,6 @@ import numpy as np
 
 from gaplab.schemas.measurements import LimitsSpec, Safety
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.world.controllers.parts import follows_angle
 from gaplab.services.world.kinematics import clearances_m, from_start
 from gaplab.services.world.motions import Loop, Motion, Recording
 from gaplab.services.world.world import World
@@ -172,7 +171,7 @@ def _out_of_range(world: World, motion: Motion | Loop, recording: Recording) -> 
         if joint.limits is None:
             continue
         seen = [] if recording.angles_rad is None else [recording.angles_rad[:, place]]
-        if isinstance(motion, Motion) and joint.motor is not None and follows_angle(joint):
+        if isinstance(motion, Motion) and joint.motor is not None and joint.follows == "position":
             seen.append(motion.targets[:, world.actuators.index(joint)])
         (lower, upper), angles = joint.limits, np.concatenate([*seen, [joint.start]])
         farthest = float(angles[np.argmax(np.maximum(lower - angles, angles - upper))])

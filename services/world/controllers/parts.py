@@ -16,7 +16,7 @@ from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.world.kinematics import body_poses, chain, rotated
 from gaplab.services.world.motions import Motion
 from gaplab.services.world.sensing import GROUPS, in_order, listed, names
-from gaplab.services.world.world import Joint, World
+from gaplab.services.world.world import World
 
 Gait: TypeAlias = Literal["trot", "pace", "bound", "walk"]
 
@@ -24,14 +24,9 @@ LEAST_APART_M = 1e-6
 """Places that are closer than this, along an axis, are in the same row."""
 
 
-def follows_angle(joint: Joint) -> bool:
-    """Return whether the targets of a joint's motor are angles, not speeds or torques."""
-    return joint.follows == "position"
-
-
 def middles(world: World) -> FloatArray:
     """Return `(a,)`: the target at which each actuator rests: the start of its joint, or no speed, or no torque."""
-    return frozen([joint.start if follows_angle(joint) else 0.0 for joint in world.actuators])
+    return frozen([joint.start if joint.follows == "position" else 0.0 for joint in world.actuators])
 
 
 def swings(world: World, amplitude: float = 1.0) -> FloatArray:
@@ -130,7 +125,7 @@ class Scaling:
 
     def __init__(self, world: World, senses: Sequence[str]) -> None:
         actuators = world.actuators
-        angles = [(joint.start, joint.swing if follows_angle(joint) and joint.swing else 1.0) for joint in actuators]
+        angles = [(each.start, each.swing if each.follows == "position" and each.swing else 1.0) for each in actuators]
         of_group = {
             "angles": angles,
             "speeds": [(0.0, SPEED_SCALE)] * len(actuators),

@@ -14,7 +14,7 @@ from gaplab.services.core.arrays import FloatArray, Genome, frozen
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.space import Space
 from gaplab.services.world.controllers.base import Controller
-from gaplab.services.world.controllers.parts import Limbs, follows_angle, middles, swings
+from gaplab.services.world.controllers.parts import Limbs, middles, swings
 from gaplab.services.world.kinematics import inverse, rotated
 from gaplab.services.world.motions import Loop, Motion
 from gaplab.services.world.world import World
@@ -169,7 +169,7 @@ class Anticipating(Controller):
         self._pulses = Pulses(world, options.pulse_s, options.amplitude)
         self.space = Space.box([0.0] * self._pulses.genes, [1.0] * self._pulses.genes, self._pulses.wraps)
         self.known = self._pulses.known
-        follows = np.array([follows_angle(joint) for joint in world.actuators])
+        follows = np.array([joint.follows == "position" for joint in world.actuators])
         upward = Limbs.of(world).upward
         upright = np.where(follows & (np.abs(upward) > LEAST_UPRIGHT), np.sign(upward), 0.0)
         self._gains = frozen(options.gain * follows)
