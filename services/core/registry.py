@@ -1,5 +1,6 @@
 """Plug-ins: each module in the package of a kind has one of gaplab's own, and external ones are put beside them."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -204,6 +205,13 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         entry = self[name].describe()
         unstated = name in self.files and entry.source == Plugin.source
         return entry.model_copy(update={"source": _source(self.files[name])}) if unstated else entry
+
+
+def listed(value: object) -> object:
+    """Return the names that an option lists, perhaps as a text, in which commas outside parentheses separate them."""
+    if not isinstance(value, str):
+        return value
+    return [part.strip() for part in re.split(r",(?![^()]*\))", value) if part.strip()]
 
 
 def option_violation(plugin: type[Plugin], error: Mapping[str, Any], pointer: str = "") -> Violation:

@@ -230,11 +230,6 @@ GROUPS: tuple[str, ...] = tuple(_GROUPS)
 """
 
 
-def listed(value: object) -> object:
-    """Return the names of groups that an option lists, perhaps as a text with commas."""
-    return [name.strip() for name in value.split(",") if name.strip()] if isinstance(value, str) else value
-
-
 def in_order(value: tuple[str, ...], groups: Sequence[str], what: str) -> tuple[str, ...]:
     """Return the groups that an option lists, in their order; ValueError if one is unknown."""
     unknown = [name for name in value if name not in groups]

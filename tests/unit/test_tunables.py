@@ -11,8 +11,9 @@ from gaplab.schemas.sensitivity import SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.contract.robots import arm
 from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.registry import listed
 from gaplab.services.core.space import Space
-from gaplab.services.core.strategies.untuned import NoiseEnvelope, NoiseEnvelopeOptions, separated
+from gaplab.services.core.strategies.untuned import NoiseEnvelope, NoiseEnvelopeOptions
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.plugins.external import named_in
 from gaplab.services.specs import resolution
@@ -78,7 +79,7 @@ def test_options_of_a_tunable_become_its_label_and_a_stored_spec_has_no_more_fie
 
 
 def test_labels_are_separated_by_commas_outside_parentheses() -> None:
-    assert separated("mass(trunk, as=value), slope,") == ["mass(trunk, as=value)", "slope"]
+    assert listed("mass(trunk, as=value), slope,") == ["mass(trunk, as=value)", "slope"]
 
 
 def test_a_resolved_spec_has_proper_labels_and_reality_has_the_nominal_values() -> None:

@@ -1,6 +1,5 @@
 """Strategies without samples and tuning: they transfer what works in many simulators, or in spite of noise in them."""
 
-import re
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
@@ -10,6 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
+from gaplab.services.core.registry import listed
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Search, Untuned
 from gaplab.services.core.types import Belief
@@ -65,19 +65,10 @@ class DomainRandomization(Drawn):
 BASE = ("dynamic_friction",)
 
 
-def separated(text: str) -> list[str]:
-    """Return the labels of a text, which commas outside parentheses separate."""
-    return [part.strip() for part in re.split(r",(?![^()]*\))", text) if part.strip()]
-
-
-def _names(value: object) -> object:
-    return separated(value) if isinstance(value, str) else value
-
-
 class NoiseEnvelopeOptions(Frozen):
     """Options of the strategy `noise_envelope`."""
 
-    base: Annotated[tuple[str, ...], BeforeValidator(_names), Field(max_length=100)] = Field(
+    base: Annotated[tuple[str, ...], BeforeValidator(listed), Field(max_length=100)] = Field(
         default=BASE,
         description="tunables that a behaviour should use, by labels like mass(trunk), separated by commas: they "
         "vary little; all others vary over all their bounds; gaplab's: dynamic_friction",

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.registry import listed
 from gaplab.services.world.kinematics import body_poses, chain, rotated
 from gaplab.services.world.motions import Motion
-from gaplab.services.world.sensing import GROUPS, in_order, listed, names
+from gaplab.services.world.sensing import GROUPS, in_order, names
 from gaplab.services.world.world import World
 
 Gait: TypeAlias = Literal["trot", "pace", "bound", "walk"]

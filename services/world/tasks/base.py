@@ -11,10 +11,10 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.core.registry import Plugin
+from gaplab.services.core.registry import Plugin, listed
 from gaplab.services.world.kinematics import product
 from gaplab.services.world.motions import Trajectory
-from gaplab.services.world.sensing import JOINTS, Bearing, Sensors, feet, in_order, listed, observations
+from gaplab.services.world.sensing import JOINTS, Bearing, Sensors, feet, in_order, observations
 from gaplab.services.world.world import UNTURNED, World
 
 
