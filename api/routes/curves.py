@@ -1,6 +1,5 @@
 """Curves and comparisons of experiments, and the settings in which they differ, as JSON, CSV or LaTeX."""
 
-from dataclasses import replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Response
@@ -144,21 +143,17 @@ def compare_experiments(store: StoreDep, query: Asked[ComparisonQuery]) -> tuple
     Each p is given twice: uncorrected, and with Holm's correction over all pairs. `trusted` is the test by which a pair
     is judged: the paired t-test if both experiments draw the same random numbers, else Welch's.
     """
-    try:
-        pairs = compare(
-            store,
-            query.study,
-            from_evaluations=query.from_evaluations,
-            to_evaluations=query.to_evaluations,
-            margin=query.chosen(),
-            intervals=query.intervals,
-            fitness=query.fitness,
-            model=query,
-            at=query.at,
-        )
-    except InvalidSpec as error:
-        renamed = (replace(each, pointer=each.pointer.removesuffix("_evaluations")) for each in error.violations)
-        raise InvalidSpec(renamed) from error
+    pairs = compare(
+        store,
+        query.study,
+        from_evaluations=query.from_evaluations,
+        to_evaluations=query.to_evaluations,
+        margin=query.chosen(),
+        intervals=query.intervals,
+        fitness=query.fitness,
+        model=query,
+        at=query.at,
+    )
     if query.format == "csv":
         return attachment(csv_text(COLUMNS, map(row, pairs)), "text/csv", "gaplab-comparisons.csv")
     if query.format == "latex":

@@ -114,7 +114,7 @@ def _refuse_both(model: CostModel, at: float | None, counts: tuple[int | None, i
         raise InvalidSpec([Violation("at", at, message, "left out, or x=rollouts, time or cost")])
     if model.x != "evaluations" and counts != (None, None):
         message = "experiments are compared after equal numbers of real-world evaluations, or at equal cost"
-        raise InvalidSpec([Violation("from_evaluations", list(counts), message, "left out, or x=evaluations")])
+        raise InvalidSpec([Violation("from", list(counts), message, "left out, or x=evaluations")])
 
 
 def _range(
@@ -129,7 +129,7 @@ def _range(
     first = final if first is None else first
     if not 0 <= first <= final:
         message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
-        raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
+        raise InvalidSpec([Violation("from", first, message, f"0 to {final}")])
     if last is not None:
         _check_the_end(rows, compared, last)
     return first, final
@@ -145,7 +145,7 @@ def _check_the_end(rows: Sequence[ExperimentRow], compared: Sequence[Compared], 
     most = max(1, *counts) - 1 if counts else last
     if last > most:
         message = f"no experiment has {last} real-world evaluations; permitted: 0 to {most}"
-        raise InvalidSpec([Violation("to_evaluations", last, message, f"0 to {most}")])
+        raise InvalidSpec([Violation("to", last, message, f"0 to {most}")])
 
 
 def _compared(row: ExperimentRow, recorded: FloatArray) -> Compared:
