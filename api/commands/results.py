@@ -1,10 +1,9 @@
 """Commands that read results: settings, curves, figures, comparisons, reports and replays."""
 
 from collections.abc import Callable
-from enum import StrEnum
 from math import inf, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from pydantic import ValidationError
@@ -169,15 +168,6 @@ def _named_option(text: str) -> tuple[str, str]:
     return name, value
 
 
-class Format(StrEnum):
-    """Formats of a comparison."""
-
-    TABLE = "table"
-    CSV = "csv"
-    JSON = "json"
-    LATEX = "latex"
-
-
 MarginOption = Annotated[
     str | None,
     typer.Option(
@@ -212,7 +202,9 @@ def compare(  # noqa: PLR0913, PLR0917 - each is an option of the command
             help="compare at equal cost: x=rollouts, time or cost, then its model, like cost_s=90; repeatable",
         ),
     ] = None,
-    format: Annotated[Format, typer.Option(help="format of the output")] = Format.TABLE,  # noqa: A002 - as the API says
+    format: Annotated[  # noqa: A002 - as the API says
+        Literal["table", "csv", "json", "latex"], typer.Option(help="format of the output")
+    ] = "table",
     as_json: AsJson = False,
 ) -> None:
     """Compare every pair of experiments: tests of means, ranks and spreads, intervals, and equivalence.
@@ -223,7 +215,7 @@ def compare(  # noqa: PLR0913, PLR0917 - each is an option of the command
     width, share = _margins(margin)
     costs: dict[str, Any] = dict(map(_named_option, options or []))
     pairs = client.compare(ids, first, last, margin=width, margin_of_direct=share, fitness=fitness, **costs)
-    _PRINTERS[Format.JSON if as_json else format](pairs)
+    _PRINTERS["json" if as_json else format](pairs)
 
 
 def _range(text: str | None) -> tuple[int | None, int | None]:
@@ -262,11 +254,11 @@ def _print_tables(pairs: Comparisons) -> None:
             screen.print(f"! {escape(f'{pair.first_name} - {pair.second_name}: {pair.caution}')}\n")
 
 
-_PRINTERS: dict[Format, Callable[[Comparisons], None]] = {
-    Format.TABLE: _print_tables,
-    Format.CSV: lambda pairs: echo(pairs.csv(), nl=False),
-    Format.JSON: print_json,
-    Format.LATEX: lambda pairs: echo(pairs.latex(), nl=False),
+_PRINTERS: dict[str, Callable[[Comparisons], None]] = {
+    "table": _print_tables,
+    "csv": lambda pairs: echo(pairs.csv(), nl=False),
+    "json": print_json,
+    "latex": lambda pairs: echo(pairs.latex(), nl=False),
 }
 
 
