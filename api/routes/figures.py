@@ -92,16 +92,13 @@ class SimulatorsDrawing(ExperimentDrawing):
     columns: int | None = Field(None, ge=1, le=6, description="most panels in a row")
 
 
-class ReplayDrawing(FigureQuery, ReplayQuery):
+class ReplayDrawing(ExperimentDrawing, ReplayQuery):
     """The controller whose motion to draw, and how."""
 
-    experiment: Id
 
-
-class ToyDrawing(FigureQuery):
+class ToyDrawing(ExperimentDrawing):
     """The iterations to draw, and how."""
 
-    experiment: Id
     repetition: Number = Field(0, description="number of the repetition, from 0")
     iteration: list[Number] = Field([], max_length=12, description="repeat for more panels; left out: the last")
 
@@ -178,9 +175,7 @@ def draw_gait(store: StoreDep, process: RolloutProcessDep, query: Asked[ReplayDr
     return answer(gait_figure(_replay(store, process, query), title=query.title), query)
 
 
-@router.get(
-    "/readings", summary="Draw the readings of sensors", response_model=FigureRead, responses=SENT | documented(409)
-)
+@_figure("/readings", "Draw the readings of sensors", 409)
 def draw_readings(store: StoreDep, process: RolloutProcessDep, query: Asked[ReplayDrawing]) -> Response:
     """Draw what the robot's sensors said in reality, and what they say in a tuned simulator."""
     return answer(readings_figure(_replay(store, process, query), title=query.title), query)
