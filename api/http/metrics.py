@@ -43,8 +43,7 @@ class Metrics:
             registry=self.registry,
             buckets=BUCKETS_S,
         )
-        self.registry.register(_ProcessCollector(store, feed))
-        self.registry.register(_StoreCollector(store))
+        self.registry.register(_Present(store, feed))
 
 
 class RequestCounter:
@@ -55,10 +54,7 @@ class RequestCounter:
         self._metrics = metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request, and count it when its answer begins."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
+        """Serve one request, and count it when its answer begins; what is no request has no answer."""
         began = perf_counter()
 
         async def counted(message: Message) -> None:
@@ -75,29 +71,21 @@ class RequestCounter:
         self._metrics.seconds.labels(method, route).observe(seconds)
 
 
-class _ProcessCollector(Collector):
+class _Present(Collector):
+    """The present streams of this process, and the contents of the database as long as it answers."""
+
     def __init__(self, store: Store, feed: EventFeed) -> None:
         self._store = store
         self._feed = feed
-
-    def collect(self) -> Iterator[Metric]:
-        """Yield the present values."""
-        yield GaugeMetricFamily("gaplab_event_streams", "Open event streams", value=self._feed.open)
-        yield CounterMetricFamily("gaplab_database_errors", "Failed uses of the database", value=self._store.errors)
-        yield CounterMetricFamily("gaplab_database_retries", "Repeated transactions", value=self._store.retries)
-
-
-class _StoreCollector(Collector):
-    """The metrics of the database; while it does not answer, only `gaplab_database_up`."""
-
-    def __init__(self, store: Store) -> None:
-        self._store = store
         self._lock = Lock()
         self._cached: Totals | None = None
         self._read_at = -CACHED_S
 
     def collect(self) -> Iterator[Metric]:
-        """Yield values that are at most a few seconds old."""
+        """Yield the present values; those of the database are at most a few seconds old."""
+        yield GaugeMetricFamily("gaplab_event_streams", "Open event streams", value=self._feed.open)
+        yield CounterMetricFamily("gaplab_database_errors", "Failed uses of the database", value=self._store.errors)
+        yield CounterMetricFamily("gaplab_database_retries", "Repeated transactions", value=self._store.retries)
         stored = self._totals()
         yield GaugeMetricFamily("gaplab_database_up", "Whether the database answers", value=stored is not None)
         if stored is None:
