@@ -63,6 +63,13 @@ class Process:
                 start_new_session=True,
             )
 
+    def receive(self) -> Any:  # noqa: ANN401 - what it sends
+        """Return what it sends next; raise TaskLost if it has ended."""
+        try:
+            return self.connection.recv()
+        except (EOFError, OSError) as error:
+            raise TaskLost(f"the worker was lost: it ended with code {self.end()}") from error
+
     def end(self) -> int:
         """End it at once, and return its exit code."""
         self.idle = False
@@ -81,10 +88,7 @@ class ProcessTask:
 
     def take(self) -> Batch | None:
         """Return the next batch, or None at the end; see `Task`."""
-        try:
-            answer: Batch | PluginDiffers | ClusterUnusable | None = self.process.connection.recv()
-        except (EOFError, OSError) as error:
-            raise TaskLost(f"the worker was lost: it ended with code {self.process.end()}") from error
+        answer: Batch | PluginDiffers | ClusterUnusable | None = self.process.receive()
         if isinstance(answer, tuple):
             return answer
         self.process.idle = True
@@ -188,11 +192,7 @@ def computed(calls: Sequence[Callable[[], T]], processes: int) -> Iterator[tuple
 
 
 def _received(process: Process) -> Any:  # noqa: ANN401 - what the call returns
-    try:
-        result = process.connection.recv()
-    except (EOFError, OSError) as error:
-        raise TaskLost(f"the worker was lost: it ended with code {process.end()}") from error
-    if isinstance(result, PluginBroken):
+    if isinstance(result := process.receive(), PluginBroken):
         raise result
     return result
 
