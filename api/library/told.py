@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from gaplab.api.clients.bodies import readings_of
 from gaplab.api.clients.trace_files import trace_csv
 from gaplab.api.library.robots import invalid
 from gaplab.samples import samples_of
@@ -62,11 +63,7 @@ def measured(fitness: float | Sequence[float | None] | None, readings: Any) -> d
     if not kept:
         return {"failed": "no repeat gave a fitness"}
     found: dict[str, Any] = {"values": [float(values[place]) for place in kept]}
-    return found | ({} if readings is None else {"readings": [_numbers(tables[place]) for place in kept]})
-
-
-def _numbers(table: Any) -> list[list[float | None]]:  # noqa: ANN401 - numbers in whatever holds them
-    return [[None if each is None or isnan(each) else float(each) for each in row] for row in table]
+    return found | ({} if readings is None else {"readings": [readings_of(tables[place]) for place in kept]})
 
 
 def sample_of(
