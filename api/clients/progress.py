@@ -3,6 +3,7 @@
 import math
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -16,6 +17,7 @@ from rich.markup import escape
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from gaplab.api.clients.screen import console
 from gaplab.schemas.curves import Curve, from_before
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead, Progress, RepetitionRead, StudyRead
@@ -87,6 +89,13 @@ class Snapshot(Generic[S]):
 def in_notebook() -> bool:
     """Return whether a Jupyter kernel runs this program."""
     return "IPython" in sys.modules and hasattr(sys.modules["IPython"].get_ipython(), "kernel")
+
+
+def follow(snapshots: Iterable[Snapshot[S]], progress: bool | None) -> S:
+    """Go through snapshots, shown if so told, or by default in a terminal or a notebook; return the last study."""
+    if in_notebook() or sys.stderr.isatty() if progress is None else progress:
+        return show(snapshots, console(stderr=True))
+    return deque(snapshots, maxlen=1).pop().study
 
 
 def show(snapshots: Iterable[Snapshot[S]], console: Console, *, keep: bool = False) -> S:

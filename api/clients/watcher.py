@@ -1,8 +1,6 @@
 """Waiting for studies, with their progress shown."""
 
-import sys
 import time
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -11,9 +9,8 @@ from rich.console import Console
 from gaplab.api.clients.connection import Of
 from gaplab.api.clients.errors import ExperimentFailed, ServiceError, ServiceUnreachable, is_final
 from gaplab.api.clients.objects import Study
-from gaplab.api.clients.progress import RecordProgress, Snapshot, in_notebook, show
+from gaplab.api.clients.progress import RecordProgress, Snapshot, follow, show
 from gaplab.api.clients.results import Results
-from gaplab.api.clients.screen import console
 from gaplab.api.clients.studies import Studies
 from gaplab.schemas.lifecycle import State
 
@@ -45,9 +42,7 @@ class Watcher(Studies, Results):
         """
         every_s = every_s if timeout_s is None else min(every_s, timeout_s)
         snapshots = _within(self.snapshots(of, every_s=every_s, patience_s=patience_s), timeout_s)
-        if progress is None:
-            progress = in_notebook() or sys.stderr.isatty()
-        ended = show(snapshots, console(stderr=True)) if progress else deque(snapshots, maxlen=1).pop().study
+        ended = follow(snapshots, progress)
         if ended.state is not State.COMPLETED:
             raise ExperimentFailed(ended)
         return ended

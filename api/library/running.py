@@ -2,9 +2,7 @@
 
 import json
 import os
-import sys
 import tempfile
-from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cached_property
@@ -16,8 +14,7 @@ from weakref import finalize
 
 from pydantic import TypeAdapter, ValidationError
 
-from gaplab.api.clients.progress import RecordProgress, Snapshot, in_notebook, show
-from gaplab.api.clients.screen import console
+from gaplab.api.clients.progress import RecordProgress, Snapshot, follow
 from gaplab.api.library.robots import with_files
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.records import StudyRead
@@ -260,15 +257,9 @@ _SPEC: TypeAdapter[ExperimentSpec | StudySpec] = TypeAdapter(AnySpec)
 
 def _compute(result: Result, workers: int | None, *, progress: bool | None) -> None:
     """Compute the study of a result until it has ended, or nothing of it can go on."""
-    if progress is None:
-        progress = in_notebook() or sys.stderr.isatty()
     at_once = workers or os.cpu_count() or 1
     with ProcessTasks() as tasks, _supervised(result._store, at_once, tasks) as supervisor:
-        snapshots = _snapshots(result, supervisor)
-        if progress:
-            show(snapshots, console(stderr=True))
-        else:
-            deque(snapshots, maxlen=0)
+        follow(_snapshots(result, supervisor), progress)
 
 
 @contextmanager
