@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.errors import ServiceError
+from gaplab.api.clients.errors import ExperimentFailed, ServiceError
 from gaplab.api.commands import tables
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.process.local_service import start_service
@@ -65,7 +65,8 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     """Run both studies; the folder, created if absent, receives the database, the figures and the service's log.
 
     Raises:
-        CommandError: the service does not start, a study fails, or Ctrl-C interrupts.
+        CommandError: the service does not start, or Ctrl-C interrupts.
+        ExperimentFailed: a study did not complete.
     """
     specs = {name: _spec(specs_from / f"{name}.json") for name in STUDIES}
     folder.mkdir(parents=True, exist_ok=True)
@@ -112,11 +113,9 @@ def _run_study(name: str, spec: dict[str, Any], client: Client, folder: Path, co
         notes = _notes(folder) | {name: {"study": study.id, "spec": spec}}
         (folder / "demo.json").write_text(json.dumps(notes), "utf-8")
         console.print(f"\n[bold]{name}[/]: POST /studies → 202, study {study.id}")
-    client.show(study.id, console, every_s=0.5)
-    study = client.study(study.id)
+    study = client.show(study.id, console, every_s=0.5)
     if study.state is not State.COMPLETED:
-        reasons = sorted({reason for experiment in study.experiments for reason in experiment.reasons})
-        raise CommandError(f"the study {name} ended as {study.state}: {'; '.join(reasons) or 'cancelled'}", Exit.FAILED)
+        raise ExperimentFailed(study)
     console.print(f"{name}: {study.progress.text}")
     _show(name, study, client, folder, console)
 
