@@ -86,7 +86,7 @@ def run(
     given = _read(spec) if isinstance(spec, str | Path) else spec
     if isinstance(given, Path) and begins(given, SQLITE):
         path = given
-    file = _database(Path(path).absolute() if path is not None else temporary())
+    file = database(path)
     with ExitStack() as refused:
         if path is None:
             refused.callback(rmtree, file.parent, ignore_errors=True)
@@ -103,8 +103,9 @@ def run(
     return result
 
 
-def _database(file: Path) -> Path:
-    """Make a database in a file that is absent, and return the file."""
+def database(path: str | Path | None) -> Path:
+    """Return the file of a database, which is made if it is absent; without a path, in a new folder."""
+    file = Path(tempfile.mkdtemp(prefix="gaplab-run-")) / "study.db" if path is None else Path(path).absolute()
     if file.is_dir():
         raise IsADirectoryError(f"path: a database, not the folder {file}")
     if not file.exists():
@@ -212,11 +213,6 @@ def begins(path: Path, mark: bytes) -> bool:
     """Return whether a file begins with these bytes."""
     with path.open("rb") as file:
         return file.read(len(mark)) == mark
-
-
-def temporary() -> Path:
-    """Return the path of a database in a new folder."""
-    return Path(tempfile.mkdtemp(prefix="gaplab-run-")) / "study.db"
 
 
 def study_of(store: Store, file: Path, given: Any) -> str:  # noqa: ANN401 - a spec in any form, or a path

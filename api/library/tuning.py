@@ -16,7 +16,7 @@ from weakref import finalize
 
 from gaplab.api.library.computing import compute
 from gaplab.api.library.robots import AnyRobot, settings, with_files
-from gaplab.api.library.running import SQLITE, Result, begins, study_of, temporary
+from gaplab.api.library.running import SQLITE, Result, begins, database, study_of
 from gaplab.api.library.told import measured, sample_of, samples_in
 from gaplab.api.library.tuned import Genome, TunedSimulator
 from gaplab.schemas.corrections import VoidSpec
@@ -42,7 +42,7 @@ from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.stored_specs import spec_of
 from gaplab.services.store.queries.experiments import get_experiment, repetitions_of
 from gaplab.services.store.queries.logs import logs
-from gaplab.services.store.session import Store, new_database
+from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import url_of
 from gaplab.services.world.robot_library import label_of, robot_file
 
@@ -143,9 +143,7 @@ class Tuning(Result):
 
     def _open_at(self, path: str | Path | None, folder: Path, progress: bool | None) -> None:
         self._folder, self._progress = folder, progress
-        file = temporary() if path is None else Path(path).absolute()
-        if not file.exists():
-            new_database(file)
+        file = database(path)
         super().__init__(Store(url_of(file)), file, "")
         if path is None:
             finalize(self, rmtree, file.parent, ignore_errors=True)
