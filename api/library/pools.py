@@ -17,7 +17,7 @@ from gaplab.schemas.traces import TRACE_COLUMNS, heading_parts
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.csv_tables import Row, Table, finite
-from gaplab.services.world.logs import Trace, read_trace
+from gaplab.services.world.logs import ANGLES, LENGTHS, Trace, read_trace
 from gaplab.services.world.motions import Start
 from gaplab.services.world.pools import DIRECTIONS, PLACES, Channel, Pool, Recorded, said
 from gaplab.services.world.sensing import JOINTS
@@ -44,11 +44,8 @@ _TURNING = "wx", "wy", "wz"
 _BASE = re.compile(rf"({'|'.join((*TRACE_COLUMNS, *_VELOCITIES, *_TURNING))})(?:_(mm|cm|m|rad|deg))?(?:_s)?")
 """A column of the base, whose name may end in its unit."""
 
-_UNITS: Mapping[tuple[str, ...], Mapping[str, float]] = {
-    _VELOCITIES: {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0},
-    _TURNING: {"": 1.0, "rad": 1.0, "deg": 180 / np.pi, "°": 180 / np.pi},
-}
-"""Units of velocities, each per second, with how many of each are one in SI."""
+_UNITS: Mapping[tuple[str, ...], Mapping[str, float]] = {_VELOCITIES: LENGTHS, _TURNING: ANGLES}
+"""Units of velocities, each per second."""
 
 
 @dataclass(frozen=True)

@@ -39,10 +39,11 @@ TICKS = 4096.0
 """Ticks of a turn: the encoders of most hobby servos have 12 bits."""
 
 _TIMES = {"": 1.0, "s": 1.0, "ms": 1000.0}
-_LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0}
-_ANGLES = {"": 1.0, "rad": 1.0, "deg": 180 / np.pi, "°": 180 / np.pi, "ticks": TICKS / 2 / np.pi}
+LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0}
+ANGLES = {"": 1.0, "rad": 1.0, "deg": 180 / np.pi, "°": 180 / np.pi}
+_TURNS = {**ANGLES, "ticks": TICKS / 2 / np.pi}
 _TORQUES = {"": 1.0, "N·m": 1.0, "Nm": 1.0, "N": 1.0, "mN·m": 1000.0}
-_POSE = {"time_s": _TIMES} | dict.fromkeys("xyz", _LENGTHS) | {name: {"": 1.0, "1": 1.0} for name in TRACE_COLUMNS[4:]}
+_POSE = {"time_s": _TIMES} | dict.fromkeys("xyz", LENGTHS) | {name: {"": 1.0, "1": 1.0} for name in TRACE_COLUMNS[4:]}
 """Units that a heading may state, with how many of each are one in SI."""
 
 
@@ -176,7 +177,7 @@ def _units(quantity: str, joint: Joint) -> Mapping[str, float]:
     """Return the units in which a quantity of a joint may be, with how many of each are one in the joint's own."""
     if quantity == "command":
         quantity = {"position": "angle", "velocity": "speed", "torque": "torque"}[joint.follows]
-    own, (low, high) = _LENGTHS if joint.slides else _ANGLES, joint.limits or (0.0, 0.0)
+    own, (low, high) = LENGTHS if joint.slides else _TURNS, joint.limits or (0.0, 0.0)
     if low < high:
         own = {**own, "%": 100.0 / (high - low), "±%": 200.0 / (high - low)}
     speeds = {f"{unit}/s" if unit else "": share for unit, share in own.items()}
