@@ -117,15 +117,11 @@ def lines_of(problem: Problem) -> list[str]:
 
 
 def error_of(answer: httpx2.Response) -> ServiceError:
-    """Return the error for an answer that is not a success."""
-    after = answer.headers.get("retry-after", "")
-    return ServiceError(problem_of(answer), float(after) if after.isdecimal() else None)
-
-
-def problem_of(answer: httpx2.Response) -> Problem:
-    """Return the problem in an answer; an answer without one does not come from this service."""
+    """Return the error for an answer that is not a success; one without a problem does not come from this service."""
     try:
-        return Problem.model_validate_json(answer.content)
+        problem = Problem.model_validate_json(answer.content)
     except ValidationError:
         detail = f"{answer.url} answers {answer.status_code} without a problem document; is it a gaplab service?"
-        return Problem(type="about:blank", title="Not understood", status=answer.status_code, detail=detail)
+        problem = Problem(type="about:blank", title="Not understood", status=answer.status_code, detail=detail)
+    after = answer.headers.get("retry-after", "")
+    return ServiceError(problem, float(after) if after.isdecimal() else None)
