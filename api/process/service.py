@@ -6,7 +6,7 @@ The supervisor that runs them is a separate process. The two meet only in the da
 import logging
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from gaplab.api.process.child_process import end, start
 from gaplab.api.process.errors import CommandError
@@ -47,10 +47,7 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     warn_of_readers(settings.database_url)
     url = address(settings.host, settings.port)
     log.info("gaplab serves on %s (/docs documents the API; Ctrl-C ends the service)", url)
-    if not workers:
-        serve_api(settings, listener, limits=limits, notify=notify)
-        return
-    with _kept_supervisor(settings) as supervisor:
+    with _kept_supervisor(settings) if workers else nullcontext() as supervisor:
         serve_api(settings, listener, supervisor, limits=limits, notify=notify)
 
 
