@@ -54,7 +54,8 @@ class Assets(StaticFiles):
 
     def _is_versioned(self, scope: Scope) -> bool:
         named = scope.get("path_params", {}).get("version")
-        return b"v=" in scope["query_string"] or (named is not None and named == _version_of_now(str(self.directory)))
+        now = int(time.monotonic())
+        return b"v=" in scope["query_string"] or (named is not None and named == _version_in(str(self.directory), now))
 
 
 def version_of(folder: str | PathLike[str] | None) -> str:
@@ -64,13 +65,9 @@ def version_of(folder: str | PathLike[str] | None) -> str:
     return blake2b(repr(facts).encode(), digest_size=6).hexdigest()
 
 
-def _version_of_now(folder: str) -> str:
-    """Return the version of a folder as of up to a second ago: a page asks for a hundred of its files at once."""
-    return _version_in(folder, int(time.monotonic()))
-
-
 @lru_cache(maxsize=4)
 def _version_in(folder: str, second: int) -> str:  # noqa: ARG001 - the key of a version that is young enough
+    """Return the version of a folder as of up to a second ago: a page asks for a hundred of its files at once."""
     return version_of(folder)
 
 
