@@ -6,15 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from gaplab.api.clients.confirmation import NotSubmitted
-from gaplab.api.clients.errors import (
-    ExperimentFailed,
-    ExtraMissing,
-    ServiceError,
-    ServiceUnreachable,
-    WrongSuffix,
-    lines_of,
-)
+from gaplab.api.clients.errors import ServiceError, lines_of
 
 # the order of the commands in `gaplab --help`, and of its groups
 # isort: off
@@ -24,9 +16,8 @@ from gaplab.api.commands import bench, archives, plugins, robots, pools, tokens 
 # isort: on
 from gaplab.api.commands.app import OTHERS, Answer, AsJson, command
 from gaplab.api.commands.app import app as app
-from gaplab.api.commands.exit_codes import CommandError, Exit, code_of
+from gaplab.api.commands.exit_codes import TOLD, Exit, code_of
 from gaplab.api.commands.json_output import echo
-from gaplab.services.core.errors import GaplabError
 from gaplab.services.plugins.threads import leave_threads
 
 
@@ -51,23 +42,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         leave_threads()
     try:
         app(arguments, prog_name="gaplab")
-    except NotSubmitted as error:
-        _exit([str(error)], Exit.INTERRUPTED)
-    except (ServiceError, ServiceUnreachable, CommandError, GaplabError) as error:
-        _exit(lines_of(error.problem) if isinstance(error, ServiceError) else [str(error)], code_of(error))
-    except WrongSuffix as error:
-        _exit([str(error)], Exit.USAGE)
-    except (ExperimentFailed, ExtraMissing, ValueError) as error:
-        _exit([str(error)], Exit.FAILED)
-    except OSError as error:
-        _exit([f"{error.filename}: {error.strerror}" if error.filename else str(error)], Exit.FILE)
+    except TOLD as error:
+        for line in _lines(error):
+            printable = line.encode("utf-8", "backslashreplace").decode()  # names of files need not be Unicode
+            echo(f"gaplab: {printable}", err=True)
+        sys.exit(code_of(error))
 
 
-def _exit(lines: list[str], code: int) -> None:
-    for line in lines:
-        printable = line.encode("utf-8", "backslashreplace").decode()  # names of files need not be Unicode
-        echo(f"gaplab: {printable}", err=True)
-    sys.exit(code)
+def _lines(error: Exception) -> list[str]:
+    if isinstance(error, ServiceError):
+        return lines_of(error.problem)
+    return [f"{error.filename}: {error.strerror}" if isinstance(error, OSError) and error.filename else str(error)]
 
 
 if __name__ == "__main__":

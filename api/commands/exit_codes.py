@@ -3,7 +3,8 @@
 from enum import IntEnum
 from typing import Self
 
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.clients.confirmation import NotSubmitted
+from gaplab.api.clients.errors import ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable, WrongSuffix
 from gaplab.api.process.errors import CommandError as CommandError
 from gaplab.services.core.errors import GaplabError, InvalidArchive, InvalidSpec, NotFound
 
@@ -39,15 +40,26 @@ BY_STATUS = (
     | dict.fromkeys((413, 415, 422, 428), Exit.INVALID)
 )
 
-BY_ERROR = {NotFound: Exit.NOT_FOUND, InvalidSpec: Exit.INVALID, InvalidArchive: Exit.INVALID}
+BY_ERROR: dict[type[Exception], Exit] = {
+    NotSubmitted: Exit.INTERRUPTED,
+    ServiceUnreachable: Exit.UNREACHABLE,
+    NotFound: Exit.NOT_FOUND,
+    InvalidSpec: Exit.INVALID,
+    InvalidArchive: Exit.INVALID,
+    WrongSuffix: Exit.USAGE,
+    **dict.fromkeys((GaplabError, ExperimentFailed, ExtraMissing, ValueError), Exit.FAILED),
+    OSError: Exit.FILE,
+}
+"""The first kind that an error is of has its code."""
+
+TOLD: tuple[type[Exception], ...] = (ServiceError, CommandError, *BY_ERROR)
+"""Errors that end a command with a sentence; any other is a mistake of gaplab."""
 
 
-def code_of(error: ServiceError | ServiceUnreachable | CommandError | GaplabError) -> int:
+def code_of(error: Exception) -> int:
     """Return the exit code for an error of the service, or of what a command does without it."""
     if isinstance(error, CommandError):
         return error.code
-    if isinstance(error, ServiceUnreachable):
-        return Exit.UNREACHABLE
-    if isinstance(error, GaplabError):
-        return next((code for kind, code in BY_ERROR.items() if isinstance(error, kind)), Exit.FAILED)
-    return BY_STATUS.get(error.problem.status, Exit.FAILED)
+    if isinstance(error, ServiceError):
+        return BY_STATUS.get(error.problem.status, Exit.FAILED)
+    return next(code for kind, code in BY_ERROR.items() if isinstance(error, kind))
