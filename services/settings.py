@@ -3,10 +3,9 @@
 import os
 import shlex
 from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, Field, PositiveInt, ValidationError
-from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveInt, ValidationError
 
 _ADDRESS = r"^https?://[^/\s]+\S*$"
 
@@ -26,22 +25,12 @@ class InvalidSetting(ValueError):
         super().__init__(f"{variable} {reason}")
 
 
-class _Environment(BaseSettings):
-    """Values that `from_environment` reads; the constructor does not read the environment."""
+class _Environment(BaseModel):
+    """Values that `from_environment` reads; the variable of each is its name after `prefix`, in upper case."""
 
-    model_config = SettingsConfigDict(frozen=True, extra="forbid", env_prefix="GAPLAB_", env_ignore_empty=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
 
-    @classmethod
-    def settings_customise_sources(
-        cls,
-        settings_cls: type[BaseSettings],  # noqa: ARG003 - the base's signature
-        init_settings: PydanticBaseSettingsSource,
-        env_settings: PydanticBaseSettingsSource,  # noqa: ARG003
-        dotenv_settings: PydanticBaseSettingsSource,  # noqa: ARG003
-        file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
-    ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """Return only the constructor's arguments as a source of values."""
-        return (init_settings,)
+    prefix: ClassVar[str] = "GAPLAB_"
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ) -> Self:
@@ -50,17 +39,22 @@ class _Environment(BaseSettings):
         Raises:
             InvalidSetting: a value is not permitted; the message names its variable.
         """
-        source = EnvSettingsSource(cls)
-        source.env_vars = {name.lower(): value for name, value in environment.items() if value}
+        given = {name.upper(): value for name, value in environment.items() if value}
+        known: dict[str, Any] = {name: given.get(cls.variable_of(name)) for name in cls.model_fields}
         try:
-            return cls(**source())
+            return cls(**{name: value for name, value in known.items() if value is not None})
         except ValidationError as error:
             (first, *_) = error.errors()
-            variable = f"{cls.model_config['env_prefix']}{first['loc'][0]}".upper()
-            raise InvalidSetting(variable, cls._expectation(first["loc"][0], first["input"])) from error
+            name = str(first["loc"][0])
+            raise InvalidSetting(cls.variable_of(name), cls._expectation(name, first["input"])) from error
 
     @classmethod
-    def _expectation(cls, name: int | str, given: object) -> str:  # noqa: ARG003 - for subclasses
+    def variable_of(cls, name: str) -> str:
+        """Return the environment variable of a field."""
+        return f"{cls.prefix}{name}".upper()
+
+    @classmethod
+    def _expectation(cls, name: str, given: object) -> str:  # noqa: ARG003 - for subclasses
         """Return what is wrong with a value, and what is permitted."""
         return f"is {given!r}; it must be a whole number of at least 1"
 
@@ -103,7 +97,7 @@ class Settings(_Environment):
         return self.model_copy(update=given)
 
     @classmethod
-    def _expectation(cls, name: int | str, given: object) -> str:
+    def _expectation(cls, name: str, given: object) -> str:
         """Return what is wrong with a value, and what is permitted."""
         if name == "url":
             return f"is {given!r}; it must be an http or https address, like http://127.0.0.1:8000"
@@ -131,7 +125,7 @@ class Limits(_Environment):
         unnamed_attachment_bytes: bytes of all files beside measurements that no answer names.
     """
 
-    model_config = SettingsConfigDict(env_prefix="GAPLAB_MAX_")
+    prefix: ClassVar[str] = "GAPLAB_MAX_"
 
     body_bytes: PositiveInt = 1_000_000
     iterations: PositiveInt = 1_000
@@ -165,7 +159,7 @@ class Notify(_Environment):
             `GAPLAB_NOTIFY_HOSTS`; none.
     """
 
-    model_config = SettingsConfigDict(env_prefix="GAPLAB_NOTIFY_")
+    prefix: ClassVar[str] = "GAPLAB_NOTIFY_"
 
     url: Annotated[str | None, Field(pattern=_ADDRESS, repr=False)] = None
     command: Annotated[Annotated[str, AfterValidator(_command_line)] | None, Field(repr=False)] = None
@@ -173,7 +167,7 @@ class Notify(_Environment):
     hosts: Annotated[str, Field(pattern=r"^[A-Za-z0-9.:,\[\]\s-]*$")] = ""
 
     @classmethod
-    def _expectation(cls, name: int | str, given: object) -> str:
+    def _expectation(cls, name: str, given: object) -> str:
         """Return what is permitted, without the value, which may be secret."""
         if name == "command":
             return "is not a command line: it must name a program, and close its quotes"
@@ -200,6 +194,5 @@ def own_address(host: str, port: int) -> str:
     return address(_WITHIN.get(host, host), port)
 
 
-def variable_of(limit: str) -> str:
-    """Return the environment variable that sets the limit."""
-    return f"GAPLAB_MAX_{limit.upper()}"
+variable_of = Limits.variable_of
+"""Returns the environment variable that sets a limit."""

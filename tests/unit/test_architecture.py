@@ -80,7 +80,7 @@ ARROWS = {
     },
     "services": (
         ("schemas", "services.core", "services.findings", "services.plugins", "services.store"),
-        {"pydantic", "pydantic_settings", "sqlalchemy"},
+        {"pydantic", "sqlalchemy"},
     ),
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
     "api/http": (("schemas", "services", "api.http"), WEB | {"fastapi_offline"}),
