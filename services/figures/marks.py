@@ -272,6 +272,13 @@ class FigureDefinition:
         """The marks that are drawn in shades."""
         return [mark for mark in self.marks if isinstance(mark, Points | Polylines) and mark.shades]
 
+    @property
+    def shade_limits(self) -> tuple[float, float]:
+        """The numbers of the lightest and the darkest shade, which differ; 0 and 1 without any."""
+        values = [shade for mark in self.shaded for shade in mark.shades] or [0.0]
+        least, most = min(values), max(values)
+        return least, most if most > least else least + 1
+
     def with_axis(self, which: str, **changes: Any) -> "FigureDefinition":  # noqa: ANN401 - fields of an axis
         """Return the figure with another `label` or other `limits` of its axis x or y.
 

@@ -18,7 +18,6 @@ from gaplab.services.figures.matplotlib.page_layout import (
     add_surroundings,
     draw_bar_of_shades,
     printable,
-    shades_of,
     width_in,
 )
 from gaplab.services.figures.style import INK
@@ -148,7 +147,7 @@ def _draw(figure: FigureDefinition, index: int, axes: "Axes") -> None:
     _set_up(axes, panel.x, panel.y, labelled=not figure.share_x or index + figure.columns >= len(figure.panels))
     if panel.title:
         axes.set_title(printable(panel.title), loc="left")
-    draw_marks(panel, axes, shades_of(figure))
+    draw_marks(panel, axes, figure.shade_limits)
 
 
 def _square(canvas: "Canvas", rows: int) -> float:

@@ -181,14 +181,6 @@ def _legend(canvas: "Canvas", names: list[str], layout: PageLayout, bottom: floa
     legend.set_in_layout(False)
 
 
-def shades_of(figure: FigureDefinition) -> tuple[float, float]:
-    """Return the numbers of the lightest and the darkest shade."""
-    values = [value for points in figure.shaded for value in points.shades]
-    if not values:
-        return 0.0, 1.0
-    return min(values), max(values) if max(values) > min(values) else min(values) + 1
-
-
 def draw_bar_of_shades(canvas: "Canvas", figure: FigureDefinition) -> None:
     """Draw the colour bar of the shades beside the panels, if there are any."""
     from matplotlib.ticker import MaxNLocator

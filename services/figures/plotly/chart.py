@@ -89,7 +89,7 @@ def _layout(figure: FigureDefinition) -> dict[str, Any]:
         layout |= _axes(figure, index)
         layout["annotations"] += _annotations(panel, _suffix(index))
     if figure.shaded:
-        layout["coloraxis"] = _shades(figure.shaded)
+        layout["coloraxis"] = _shades(figure)
     if figure.empty:
         layout["annotations"].append(
             _annotation(figure.nothing) | {"xref": "paper", "yref": "paper", "x": 0.5, "y": 0.5}
@@ -175,17 +175,16 @@ def _arrow(arrow: Arrow) -> dict[str, Any]:
     return {"text": "", "showarrow": True} | ends | look | ({"name": "ink"} if arrow.style.ink else {})
 
 
-def _shades(shaded: list[Points | Polylines]) -> dict[str, Any]:
-    values = [each for points in shaded for each in points.shades]
-    last = len(SHADES) - 1
-    whole = all(each == int(each) for each in values)
-    ticks = {"dtick": max(1, round((max(values) - min(values)) / 5))} if whole else {}
+def _shades(figure: FigureDefinition) -> dict[str, Any]:
+    (least, most), last = figure.shade_limits, len(SHADES) - 1
+    whole = all(each == int(each) for mark in figure.shaded for each in mark.shades)
+    ticks = {"dtick": max(1, round((most - least) / 5))} if whole else {}
     return {
         "colorscale": [[round(at / last, 4), color] for at, color in enumerate(SHADES)],
-        "cmin": min(values),
-        "cmax": max(values) if max(values) > min(values) else min(values) + 1,
+        "cmin": least,
+        "cmax": most,
         "colorbar": {
-            "title": {"text": text(shaded[0].shades_label), "side": "right"},
+            "title": {"text": text(figure.shaded[0].shades_label), "side": "right"},
             "thickness": 10,
             "outlinewidth": 0,
             **ticks,
