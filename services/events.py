@@ -13,7 +13,7 @@ from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.services.core.errors import Conflict
 from gaplab.services.findings.event_sentences import event_sentence
 from gaplab.services.store.models import DeletionRow, EventCounterRow, EventRow, ExperimentRow
-from gaplab.services.store.queries.experiments import members, was_deleted
+from gaplab.services.store.queries.experiments import members
 from gaplab.services.store.session import Session, snapshot
 from gaplab.services.store.statements import storable
 
@@ -66,7 +66,7 @@ def check(session: Session, wanted: WantedEvents, after: int = 0) -> None:
             f"an earlier backup: continue after {newest}, or begin with 0"
         )
         raise Conflict(msg)
-    if wanted.study is not None and not was_deleted(session, wanted.study):
+    if wanted.study is not None and session.get(DeletionRow, storable(wanted.study)) is None:
         members(session, wanted.study)
 
 

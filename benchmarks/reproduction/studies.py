@@ -169,7 +169,7 @@ def _arms(store: Store, reads: Sequence[ExperimentRead]) -> list[Arm]:
     ids, arms = [read.id for read in reads], []
     tuned = {id_: found(store, id_) for id_ in ids}
     with store.reading() as session:
-        rows = experiments.get_experiments(session, ids)
+        rows = experiments.meant(session, ids)
         work, fitness = work_of(session, ids), {kind: values_of(session, rows, kind) for kind in Fitness}
         samples = {id_: np.full_like(each, np.nan) for id_, each in fitness[Fitness.RECORDED].items()}
         for id_, number, iteration, value in results.measured_fitness(session, ids, MeasurementKind.SAMPLE):

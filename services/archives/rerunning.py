@@ -286,7 +286,7 @@ def _pool(cores: int | None, plugins: Mapping[str, str]) -> ProcessPoolExecutor:
 
 def _recorded(session: Session, checked: CheckedArchive, part: Part) -> Iterator[Recorded]:
     until = inf if part.minutes is None else time() + 60.0 * part.minutes
-    rows = experiments.get_experiments(session, list(checked.experiments))
+    rows = experiments.meant(session, list(checked.experiments))
     chosen = [(row, part.repetitions(row, experiments.repetitions_of(session, row.id))) for row in rows]
     if not any(repetitions for _, repetitions in chosen):
         names = ", ".join(row.name for row in rows)

@@ -198,17 +198,6 @@ def meant(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
     return tuple({each.id: each for some in found for each in some}.values())
 
 
-def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
-    """Return the experiments with these ids, which exist, in the order of the ids."""
-    found = {row.id: row for row in session.scalars(select(ExperimentRow).where(ExperimentRow.id.in_(ids)))}
-    return tuple(found[each] for each in ids)
-
-
-def was_deleted(session: Session, id_: str) -> bool:
-    """Return whether a study or an experiment with this id was deleted."""
-    return session.get(DeletionRow, storable(id_)) is not None
-
-
 def experiments_of(session: Session, studies: Sequence[str]) -> tuple[ExperimentRow, ...]:
     """Return the experiments of these studies, by study and position."""
     row = ExperimentRow
