@@ -4,7 +4,7 @@ import logging
 import os
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from pathlib import Path
 from threading import Lock
 from time import monotonic
@@ -97,49 +97,43 @@ def refuse_damaged(file: Path) -> None:
         raise StoreDamaged(f"the database {file} is damaged ({found}): {HINT}")
 
 
-@contextmanager
-def in_use(file: Path | None) -> Iterator[None]:
+def in_use(file: Path | None) -> AbstractContextManager[None]:
     """Mark the database as used by a service for as long as the context lasts, so that no restore replaces it.
 
     Raises:
         StoreUnavailable: a restore replaces it right now, or its lock cannot be opened.
     """
-    with _locked(file, exclusive=False) as held:
-        if not held:
-            raise StoreUnavailable(f"the database {file} is being restored: start again when that is done")
-        yield
+    return _locked(file, f"the database {file} is being restored: start again when that is done")
 
 
-@contextmanager
-def unused(file: Path) -> Iterator[None]:
+def unused(file: Path) -> AbstractContextManager[None]:
     """Keep services from the database for as long as the context lasts.
 
     Raises:
         StoreUnavailable: a service runs on it, or its lock cannot be opened.
     """
-    with _locked(file, exclusive=True) as held:
-        if not held:
-            raise StoreUnavailable(f"a service runs on the database {file}: end it first")
-        yield
+    return _locked(file, f"a service runs on the database {file}: end it first", exclusive=True)
 
 
 @contextmanager
-def _locked(file: Path | None, *, exclusive: bool) -> Iterator[bool]:
+def _locked(file: Path | None, otherwise: str, *, exclusive: bool = False) -> Iterator[None]:
     """Hold a lock on a file beside the database; the kernel drops it when the process ends, however that happens.
 
     The database itself must not be opened for it: closing it again would drop SQLite's own locks.
+
+    Raises:
+        StoreUnavailable: another process holds it; the message is `otherwise`.
     """
     descriptor = _lock_file(file)
     if descriptor is None:
-        yield True
+        yield
         return
     try:
-        fcntl.flock(descriptor, (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH) | fcntl.LOCK_NB)
-        held = True
-    except OSError:
-        held = False
-    try:
-        yield held
+        try:
+            fcntl.flock(descriptor, (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH) | fcntl.LOCK_NB)
+        except OSError as error:
+            raise StoreUnavailable(otherwise) from error
+        yield
     finally:
         os.close(descriptor)
 
