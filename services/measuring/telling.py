@@ -145,4 +145,4 @@ def _add(
     steps.append(session, repetition, TimedStep(selected, 0.0), "")
     claim = Claim(repetition.id, repetition.epoch, experiment.id, repetition.number, spec)
     wanted = Requested(place_of(selected) + 1, iteration, MeasurementKind.SAMPLE, genome)
-    return requests.insert(session, {claim: wanted})[claim]
+    return requests.insert(session, claim, wanted)

@@ -24,19 +24,19 @@ from gaplab.services.store.session import Session
 from gaplab.services.store.statements import storable
 
 
-def wait(session: Session, asked: Mapping[Claim, Requested]) -> frozenset[Claim]:
-    """End the leases of running repetitions that request a measurement, and return them.
+def wait(session: Session, asked: Mapping[Claim, Requested]) -> None:
+    """End the leases of running repetitions that request a measurement.
 
     A measurement of the same controller in the same repetition is not asked for twice: its answer is recorded at once.
     So is the failure of a controller that is refused, because it is expected to exceed the limits of the robot.
     """
-    for claim, request in requests.insert(session, asked).items():
+    requested = {claim: requests.insert(session, claim, wanted) for claim, wanted in asked.items()}
+    for claim, request in requested.items():
         waits = Change(State.WAITING, Ending.WAITING, values={"owner": None})
         end_repetitions(session, RepetitionRow.id == claim.id, waits)
         answer = requests.counted_answer(session, request) or refuse(session, claim, request)
         if answer is not None:
             record_answer(session, request, answer)
-    return frozenset(asked)
 
 
 def record_answer(session: Session, request: RequestRow, answer: AnswerRow) -> None:
@@ -95,8 +95,7 @@ def refuse(session: Session, claim: Claim, request: RequestRow) -> AnswerRow | N
         at=moment(session),
     )
     session.add(refused)
-    request.state, request.ended_at = RequestState.FAILED, moment(session)
-    session.flush()
+    requests.become(session, request, RequestState.FAILED, ended_at=moment(session))
     body = {"iteration": request.iteration, "request": request.id, "reason": reason}
     note(session, EventKind.REFUSED, claim.experiment_id, claim.number, **body)
     return refused

@@ -245,8 +245,8 @@ def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -
         handed_back = Change(State.QUEUED, Ending.HANDED_BACK, values={"owner": None})
         _LEASES.end(session, row.id.in_(leaving), handed_back)
     asking = {claim: item for claim, item in asked.items() if claim.id not in leaving}
-    waiting = wait(session, asking) if asking else ()
-    return tuple(claim for claim in held if claim.id not in leaving and claim not in waiting)
+    wait(session, asking)
+    return tuple(claim for claim in held if claim.id not in leaving and claim not in asking)
 
 
 def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, State]:

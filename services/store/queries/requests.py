@@ -8,7 +8,7 @@ However the name of a bench is spaced and capitalised, it is one bench, and spel
 """
 
 import json
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 from sqlalchemy import ColumnElement, Text, case, cast, func, select, union_all, update
@@ -86,18 +86,15 @@ MOST_UNANSWERED = 5
 """Takes in a row without an answer, after which a request is not offered until a person opens it again."""
 
 
-def insert(session: Session, asked: Mapping[Claim, Requested]) -> dict[Claim, RequestRow]:
-    """Store a request for each claim; the same request is stored once, even if it is asked for again.
+def insert(session: Session, claim: Claim, wanted: Requested) -> RequestRow:
+    """Store a request of a claim, once even if it is asked for again.
 
     If an earlier request of the repetition for the same controller has an answer that counts, this one refers to it.
     """
-    found = {}
-    for claim, wanted in asked.items():
-        same = requests_of(session, claim.id, of_controller(wanted.genome.tolist()))
-        open_ = [row for row in same if row.place == wanted.place and row.state in PENDING]
-        answered = [row for row in same if row.state in ANSWERED and counted_answer(session, row) is not None]
-        found[claim] = open_[0] if open_ else _new(session, claim, wanted, answered[0] if answered else None)
-    return found
+    same = requests_of(session, claim.id, of_controller(wanted.genome.tolist()))
+    open_ = [row for row in same if row.place == wanted.place and row.state in PENDING]
+    answered = [row for row in same if row.state in ANSWERED and counted_answer(session, row) is not None]
+    return open_[0] if open_ else _new(session, claim, wanted, answered[0] if answered else None)
 
 
 def _new(session: Session, claim: Claim, wanted: Requested, same: RequestRow | None) -> RequestRow:
