@@ -14,7 +14,7 @@ from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected,
 from gaplab.services.experiments import lifecycle, listing, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.running import execution
-from gaplab.services.running.execution import Claim
+from gaplab.services.store.lease import Claim
 from gaplab.services.store.session import Store
 
 AWKWARD = (0.1 + 0.2, 1e-320, -1.7976931348623157e308, 2.0**-1074, 1 / 3, 5e-324, -0.0, 123456789.12345679)

@@ -16,7 +16,7 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.experiments import lifecycle, submission
 from gaplab.services.running import execution
-from gaplab.services.running.execution import TimedStep
+from gaplab.services.store.lease import TimedStep
 from gaplab.services.store.session import Store
 
 STEP_S = 36.0

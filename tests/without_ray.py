@@ -11,8 +11,8 @@ from sqlalchemy import select
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.running import execution
-from gaplab.services.running.execution import Claim
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.lease import Claim
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.session import Store
 from gaplab.workers.process_tasks import NoChecks

@@ -9,6 +9,7 @@ from time import monotonic
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.lease_ends import Silences
 from gaplab.services.running import execution
+from gaplab.services.running.leases import STALE_AFTER_S
 from gaplab.services.specs.blame import describe
 from gaplab.services.specs.resolution import hardware_of
 from gaplab.services.store.database_errors import StoreUnavailable
@@ -44,7 +45,7 @@ class Repetitions:
         tasks: Tasks,
         checkpoint_s: float = CHECKPOINT_S,
         patience: Patience | None = None,
-        lease_s: float = execution.STALE_AFTER_S,
+        lease_s: float = STALE_AFTER_S,
     ) -> None:
         self.runs: list[Run] = []
         self._store = store

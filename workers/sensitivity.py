@@ -14,7 +14,7 @@ from gaplab.services.findings.sensitivity import Effort
 from gaplab.services.findings.sensitivity import check as check_tunables
 from gaplab.services.plugins.folders import PluginDiffers
 from gaplab.services.running import sensitivity
-from gaplab.services.running.execution import STALE_AFTER_S
+from gaplab.services.running.leases import STALE_AFTER_S
 from gaplab.services.running.sensitivity import CheckClaim
 from gaplab.services.specs.assembly import subject
 from gaplab.services.specs.blame import describe

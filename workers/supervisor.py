@@ -17,6 +17,7 @@ from time import monotonic, sleep
 from gaplab.services.experiments.lease_ends import Silences
 from gaplab.services.measuring.taking import open_again
 from gaplab.services.running import execution, supervisors
+from gaplab.services.running.leases import STALE_AFTER_S
 from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.database_errors import StoreChanged, StoreUnavailable
 from gaplab.services.store.session import Store
@@ -76,7 +77,7 @@ class Supervisor:
         tasks: Tasks,
         *,
         checkpoint_s: float = CHECKPOINT_S,
-        lease_s: float = execution.STALE_AFTER_S,
+        lease_s: float = STALE_AFTER_S,
         patience: Patience | None = None,
     ) -> None:
         self._store = store

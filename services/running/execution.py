@@ -22,16 +22,10 @@ from gaplab.services.experiments.states import settle
 from gaplab.services.measuring.waiting import wait
 from gaplab.services.running import provenance
 from gaplab.services.running.leases import MAX_LOSSES, Leases
-from gaplab.services.running.leases import STALE_AFTER_S as STALE_AFTER_S
 from gaplab.services.running.turns import FREE_HARDWARE, ahead, next_repetitions
 from gaplab.services.running.versions import provenance as present_provenance
 from gaplab.services.store.clock import now
-from gaplab.services.store.lease import Checkpoint as Checkpoint
-from gaplab.services.store.lease import Claim as Claim
-from gaplab.services.store.lease import Delivered as Delivered
-from gaplab.services.store.lease import Failure as Failure
-from gaplab.services.store.lease import Requested as Requested
-from gaplab.services.store.lease import TimedStep as TimedStep
+from gaplab.services.store.lease import Claim, Delivered, Failure, Requested, TimedStep
 from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import attempts, checkpoints, files, steps
 from gaplab.services.store.queries.experiments import lock

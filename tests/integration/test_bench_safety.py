@@ -17,7 +17,7 @@ from gaplab.services.experiments.limits import FREELY
 from gaplab.services.measuring import answering, corrections, taking
 from gaplab.services.measuring.taking import RequestFilter
 from gaplab.services.running import execution
-from gaplab.services.store.lease import Claim, Requested
+from gaplab.services.store.lease import Claim, Requested, TimedStep
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from tests.archiving import exported, imported
@@ -41,7 +41,7 @@ def ask(store: Store, **told: Any) -> Claim:
     (claim,) = execution.claim(store, "here", 1)
     steps: list[Step] = [Tuned(0, (Simulator(frozen([1.0, 0.8])),)), Transferred(0, GENOME, 0.4, Cost())]
     requested = Requested(2, 0, MeasurementKind.PROBE, GENOME, **told)
-    execution.record_all(store, [(claim, [*(execution.TimedStep(step, 0.0) for step in steps), requested])])
+    execution.record_all(store, [(claim, [*(TimedStep(step, 0.0) for step in steps), requested])])
     return claim
 
 
@@ -49,7 +49,7 @@ def ask_again(store: Store) -> None:
     """Let a supervisor select the same controller as the sample of iteration 1."""
     (claim,) = execution.claim(store, "here", 1)
     requested = Requested(4, 1, MeasurementKind.SAMPLE, GENOME, safety(BEYOND))
-    execution.record_all(store, [(claim, [execution.TimedStep(Selected(1, GENOME), 0.0), requested])])
+    execution.record_all(store, [(claim, [TimedStep(Selected(1, GENOME), 0.0), requested])])
 
 
 def requests_of(store: Store, experiment: str) -> Any:

@@ -16,10 +16,9 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import reading
 from gaplab.services.experiments.lifecycle import ask
 from gaplab.services.running import execution
-from gaplab.services.running.execution import Checkpoint
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.lease import Failure, Pulse
+from gaplab.services.store.lease import Checkpoint, Failure, Pulse, TimedStep
 from gaplab.services.store.models import CheckpointRow
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import StepRecorder, recorded
@@ -102,7 +101,7 @@ def test_a_repetition_that_nobody_wants_ends() -> None:
 
 
 def part(step: Any, number: Any, answers: Any = b"answers", seconds: Any = 2.0) -> Any:
-    return execution.Checkpoint(step, number, answers, seconds)
+    return Checkpoint(step, number, answers, seconds)
 
 
 def checkpoints_left(store: Store) -> Any:
@@ -116,7 +115,7 @@ def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store: 
     (claim,) = execution.claim(store, "me", 1)
     first = next(some_log())
 
-    assert execution.record_all(store, [(claim, [execution.TimedStep(first, 1.0), part(1, 0, b"a\0b"), part(1, 1)])])
+    assert execution.record_all(store, [(claim, [TimedStep(first, 1.0), part(1, 0, b"a\0b"), part(1, 1)])])
     assert execution.record_all(store, [(claim, [part(1, 2, b"")])])
     execution.release(store, claim, "killed")
 
@@ -140,7 +139,7 @@ def test_checkpoints_are_gone_once_their_step_is_recorded(store: Store) -> None:
     submit_one(store, toy())
     claims = execution.claim(store, "me", 2)
     execution.record_all(store, [(claim, [part(0, 0), part(0, 1)]) for claim in claims])
-    first, second, *_ = [execution.TimedStep(each, 0.5) for each in some_log()]
+    first, second, *_ = [TimedStep(each, 0.5) for each in some_log()]
 
     execution.record_all(store, [(claims[0], [first, part(1, 0), second])])
     execution.record_all(store, [(claims[0], [part(0, 1), part(1, 0)])])

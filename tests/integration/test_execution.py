@@ -16,7 +16,7 @@ from gaplab.services.experiments import checks, reading
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.lease import Failure
+from gaplab.services.store.lease import Failure, TimedStep
 from gaplab.services.store.session import Store
 from gaplab.services.store.texts import LONGEST_REASON
 from tests.experiments import cancel, listed, run, same, some_log, submit_one, toy
@@ -103,7 +103,7 @@ def test_a_step_that_would_leave_a_hole_is_refused(store: Store) -> None:
 
 
 def timed(steps: Any) -> Any:
-    return [execution.TimedStep(each, 0.5) for each in steps]
+    return [TimedStep(each, 0.5) for each in steps]
 
 
 def by_experiment(claims: Any, *ids: Any) -> Any:

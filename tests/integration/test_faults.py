@@ -26,12 +26,11 @@ from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, lease_ends, lifecycle, reading, submission
 from gaplab.services.experiments.lease_ends import Silences
 from gaplab.services.running import execution, sensitivity
-from gaplab.services.running.execution import Failure
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.clock import moment
-from gaplab.services.store.lease import Claim, Pulse, TimedStep
+from gaplab.services.store.lease import Claim, Failure, Pulse, TimedStep
 from gaplab.services.store.models import EventRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.queries.logs import logs

@@ -26,8 +26,8 @@ from gaplab.services.experiments import editing, lifecycle, listing, reading, su
 from gaplab.services.experiments.editing import Deleter, render
 from gaplab.services.experiments.lifecycle import extend
 from gaplab.services.running import execution
-from gaplab.services.running.execution import Failure
 from gaplab.services.store.clock import moment
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import Base, RepetitionRow, ViewRow
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, some_log, submit_one, toy

@@ -11,9 +11,8 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.running import execution
-from gaplab.services.running.execution import TimedStep
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.lease import Failure
+from gaplab.services.store.lease import Failure, TimedStep
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store

@@ -10,9 +10,9 @@ import ray
 
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.lease import Claim, TimedStep
 from gaplab.workers import ray_tasks
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.pool import Pool, SharedCall, sizes

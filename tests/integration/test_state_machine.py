@@ -21,10 +21,9 @@ from gaplab.services.core.errors import Conflict, InvalidSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import lifecycle
 from gaplab.services.running import execution
-from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.services.store.lease import Failure
+from gaplab.services.store.lease import Claim, Failure, TimedStep
 from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store

@@ -15,9 +15,8 @@ from gaplab.services.core.types import Probed
 from gaplab.services.experiments import lifecycle, listing, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.running import execution
-from gaplab.services.running.execution import Claim
 from gaplab.services.specs.resolution import resolve
-from gaplab.services.store.lease import Failure
+from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, listed, run, some_log, submit_one, toy
 

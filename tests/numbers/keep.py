@@ -18,9 +18,8 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import submission
 from gaplab.services.results import curves
 from gaplab.services.running import execution
-from gaplab.services.running.execution import Checkpoint, TimedStep
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.lease import Pulse
+from gaplab.services.store.lease import Checkpoint, Pulse, TimedStep
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
 from tests.experiments import submit_one
