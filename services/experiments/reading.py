@@ -6,22 +6,12 @@ Use cases raise NotFound if nothing has the id.
 from collections.abc import Sequence
 
 from gaplab.schemas.differences import SpecDiff
-from gaplab.schemas.records import (
-    AttemptRead,
-    ExperimentRead,
-    MeasurementKind,
-    Page,
-    RepetitionRead,
-    SampleRead,
-    SimulatorRead,
-    StudyRead,
-)
+from gaplab.schemas.records import AttemptRead, ExperimentRead, RepetitionRead, StudyRead
 from gaplab.schemas.spec import SpecRead
 from gaplab.services.experiments.views import hidden, view, view_experiments, view_repetition
 from gaplab.services.specs.differences import SpecColumn, differences
 from gaplab.services.specs.stored_specs import without_truth
 from gaplab.services.specs.submitted import part_of, to_submit_again, without_parameters
-from gaplab.services.store.cursor import next_cursor
 from gaplab.services.store.queries import attempts, results
 from gaplab.services.store.queries.experiments import get_experiment, members, repetitions_of
 from gaplab.services.store.session import Session, Store, snapshot
@@ -58,48 +48,8 @@ def list_repetitions(session: Session, experiment_id: str) -> tuple[RepetitionRe
     return tuple(view_repetition(row, secret=secret) for row in repetitions_of(session, experiment_id))
 
 
-@snapshot
-def list_samples(
-    session: Session,
-    experiment_id: str,
-    *,
-    repetition: int | None = None,
-    kind: MeasurementKind | None = None,
-    limit: int = 1000,
-    cursor: str | None = None,
-) -> Page[SampleRead]:
-    """Return a page of real-world evaluations, by repetition and in the order of the log.
-
-    Raises:
-        InvalidSpec: the cursor is invalid, or of another list.
-    """
-    get_experiment(session, experiment_id)
-    rows = results.page_of_samples(
-        session, experiment_id, repetition=repetition, kind=kind, limit=limit + 1, cursor=cursor
-    )
-    return Page(items=rows[:limit], next=next_cursor(rows, limit, results.cursor_of))
-
-
-@snapshot
-def list_simulators(
-    session: Session,
-    experiment_id: str,
-    *,
-    repetition: int | None = None,
-    iteration: int | None = None,
-    limit: int = 1000,
-    cursor: str | None = None,
-) -> Page[SimulatorRead]:
-    """Return a page of tuned simulators, by repetition, iteration and rank.
-
-    Raises:
-        InvalidSpec: the cursor is invalid, or of another list.
-    """
-    row = get_experiment(session, experiment_id)
-    rows = results.page_of_simulators(
-        session, row, repetition=repetition, iteration=iteration, limit=limit + 1, cursor=cursor
-    )
-    return Page(items=rows[:limit], next=next_cursor(rows, limit, results.cursor_of))
+list_samples = snapshot(results.page_of_samples)
+list_simulators = snapshot(results.page_of_simulators)
 
 
 @snapshot

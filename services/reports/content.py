@@ -155,15 +155,13 @@ def _again(store: Store, id_: str, experiments: Sequence[str]) -> tuple[SpecRead
 
 def _outcome(session: Session, experiment_id: str) -> Outcome:
     row = rows.get_experiment(session, experiment_id)
-    seen = stored.page_of_samples(session, row.id, repetition=None, kind=None, limit=MOST_ROWS, cursor=None)
-    measured = tuple(sample for sample in seen if sample.fitness is not None)
+    seen = stored.page_of_samples(session, row.id, limit=MOST_ROWS)
+    measured = tuple(sample for sample in seen.items if sample.fitness is not None)
     best = max(measured, key=lambda sample: -inf if sample.fitness is None else sample.fitness, default=None)
     repetition = best.repetition if best else 0
-    tuned = (
-        stored.page_of_simulators(session, row, repetition=repetition, iteration=None, limit=MOST_ROWS, cursor=None)
-        if row.tunes
-        else ()
-    )
+    tuned: tuple[SimulatorRead, ...] = ()
+    if row.tunes:
+        tuned = stored.page_of_simulators(session, row.id, repetition=repetition, limit=MOST_ROWS).items
     last = max((simulator.iteration for simulator in tuned), default=0)
     samples = tunings.measured(session, row).tuned_until(repetition, last) if tuned else 0
     return Outcome(measured, best, tuple(each for each in tuned if each.iteration == last), samples)

@@ -72,11 +72,11 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
         raise InvalidSpec([Violation("experiment", row.id, message, "an experiment with the robot 'toy_function'")])
     _refuse_outside("repetition", [repetition], row.spec["repetitions"])
     _refuse_outside("iteration", iterations, row.iterations)
-    measured = results.page_of_samples(session, row.id, repetition=repetition, kind=None, limit=MOST_ROWS, cursor=None)
+    measured = results.page_of_samples(session, row.id, repetition=repetition, limit=MOST_ROWS).items
     earlier = samples_of(spec)[: row.known]
     taken = [each for each in measured if each.kind is MeasurementKind.SAMPLE]
-    page = results.page_of_simulators(session, row, repetition=repetition, iteration=None, limit=MOST_ROWS, cursor=None)
-    simulators = () if is_direct(spec) else page
+    page = results.page_of_simulators(session, row.id, repetition=repetition, limit=MOST_ROWS)
+    simulators = () if is_direct(spec) else page.items
     wanted = iterations or [max((each.iteration for each in simulators), default=0)]
     return _Stored(
         row=row,

@@ -122,9 +122,8 @@ def test_a_strategy_that_tunes_nothing_has_no_misfit_and_no_tuned_simulators(sto
     assert tuned_simulators(store, untuned).simulators == ()
     with store.reading() as session:
         row = experiments.get_experiment(session, untuned)
-        whole: Any = {"repetition": None, "iteration": None, "limit": 99, "cursor": None}
         assert not tuned_samples(session, row)
-        assert {each.error for each in page_of_simulators(session, row, **whole)} == {None}
+        assert {each.error for each in page_of_simulators(session, untuned).items} == {None}
 
 
 def test_nothing_of_reality_is_shown(store: Store) -> None:

@@ -9,14 +9,21 @@ from sqlalchemy import ColumnElement, Select, bindparam, case, func, select, tup
 from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.lifecycle import PENDING, State
-from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
+from gaplab.schemas.records import MeasurementKind, Page, SampleRead, SimulatorRead
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.repeats import standard_error
 from gaplab.services.specs.stored_specs import discrepancy_of
-from gaplab.services.store.cursor import decode, encode, key_of
+from gaplab.services.store.cursor import decode, encode, key_of, next_cursor
 from gaplab.services.store.models import LOG, ExperimentRow, RepetitionRow, StepKind, StepRow
-from gaplab.services.store.queries.experiments import MEASURED, in_log, of_experiments, same_log, steps_of
+from gaplab.services.store.queries.experiments import (
+    MEASURED,
+    get_experiment,
+    in_log,
+    of_experiments,
+    same_log,
+    steps_of,
+)
 from gaplab.services.store.queries.logs import simulator_of
 from gaplab.services.store.queries.tunings import intervals, measured, per_sample
 
@@ -26,22 +33,24 @@ _ASKED = RepetitionRow.experiment_id.in_(bindparam("experiments", expanding=True
 
 def page_of_samples(
     session: Session,
-    experiment: str,
+    experiment_id: str,
     *,
-    repetition: int | None,
-    kind: MeasurementKind | None,
-    limit: int,
-    cursor: str | None,
-) -> tuple[SampleRead, ...]:
-    """Return up to `limit` real-world evaluations of an experiment, by repetition in the order of the log.
+    repetition: int | None = None,
+    kind: MeasurementKind | None = None,
+    limit: int = 1000,
+    cursor: str | None = None,
+) -> Page[SampleRead]:
+    """Return a page of real-world evaluations of an experiment, by repetition and in the order of the log.
 
     Raises:
-        InvalidSpec: the cursor is invalid.
+        NotFound: the experiment does not exist.
+        InvalidSpec: the cursor is invalid, or of another list.
     """
+    get_experiment(session, experiment_id)
     row, run, transferred = StepRow, RepetitionRow, aliased(StepRow)
     key, turn = (run.number, row.iteration), case((row.kind == StepKind.MEASURED, 0), else_=1)
     columns = row.kind, row.iteration, row.fitness, row.measured_by, row.at, row.body
-    query = of_experiments(row, [experiment], run.number, transferred.body, *columns).where(
+    query = of_experiments(row, [experiment_id], run.number, transferred.body, *columns).where(
         row.branch == LOG,
         row.measured_by.is_not(None),
         row.kind.in_(MEASURED.values() if kind is None else [MEASURED[kind]]),
@@ -52,8 +61,9 @@ def page_of_samples(
         query = query.where(run.number == repetition)
     if cursor is not None:
         query = query.where(tuple_(*key, turn) > decode(cursor, (*key, turn)))
-    found = session.execute(query.order_by(*key, turn).limit(limit))
-    return tuple(_sample(number, evolved, step) for number, evolved, *step in found)
+    found = session.execute(query.order_by(*key, turn).limit(limit + 1))
+    rows = tuple(_sample(number, evolved, step) for number, evolved, *step in found)
+    return Page(items=rows[:limit], next=next_cursor(rows, limit, _cursor_of))
 
 
 def _sample(repetition: int, evolved: Mapping[str, Any] | None, step: Sequence[Any]) -> SampleRead:
@@ -75,18 +85,20 @@ def _sample(repetition: int, evolved: Mapping[str, Any] | None, step: Sequence[A
 
 def page_of_simulators(
     session: Session,
-    experiment: ExperimentRow,
+    experiment_id: str,
     *,
-    repetition: int | None,
-    iteration: int | None,
-    limit: int,
-    cursor: str | None,
-) -> tuple[SimulatorRead, ...]:
-    """Return up to `limit` simulators of an experiment, by repetition, iteration and rank.
+    repetition: int | None = None,
+    iteration: int | None = None,
+    limit: int = 1000,
+    cursor: str | None = None,
+) -> Page[SimulatorRead]:
+    """Return a page of tuned simulators of an experiment, by repetition, iteration and rank.
 
     Raises:
-        InvalidSpec: the cursor is invalid.
+        NotFound: the experiment does not exist.
+        InvalidSpec: the cursor is invalid, or of another list.
     """
+    experiment = get_experiment(session, experiment_id)
     row, key = StepRow, (RepetitionRow.number, StepRow.iteration)
     query = steps_of([experiment.id], StepKind.TUNED, *key, row.body)
     for column, wanted in zip(key, (repetition, iteration), strict=True):
@@ -102,10 +114,11 @@ def page_of_simulators(
             for rank, packed in enumerate(body["simulators"])
             if (number, at, rank) > last
         )
-        return tuple(
+        rows = tuple(
             _simulator((number, at, rank), packed, tunables, tuned.tuned_until(number, at), discrepancy)
-            for number, at, rank, packed in islice(members, limit)
+            for number, at, rank, packed in islice(members, limit + 1)
         )
+    return Page(items=rows[:limit], next=next_cursor(rows, limit, _cursor_of))
 
 
 def _simulator(
@@ -130,7 +143,7 @@ def _simulator(
     )
 
 
-def cursor_of(row: SampleRead | SimulatorRead) -> str:
+def _cursor_of(row: SampleRead | SimulatorRead) -> str:
     """Return the cursor of the page that begins after the row."""
     if isinstance(row, SimulatorRead):
         return encode(row.repetition, row.iteration, row.rank)
