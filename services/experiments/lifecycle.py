@@ -5,6 +5,7 @@ the id.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 from sqlalchemy import update
 
@@ -35,21 +36,21 @@ from gaplab.services.store.queries.progress import tallies
 from gaplab.services.store.queries.requests import withdraw
 from gaplab.services.store.session import Session, transaction
 
-_EVENTS = {
-    Verb.PAUSE: EventKind.PAUSING,
-    Verb.RESUME: EventKind.RESUMED,
-    Verb.STOP: EventKind.STOPPING,
-    Verb.CANCEL: EventKind.CANCELLED,
-    Verb.RETRY: EventKind.RETRIED,
-}
+class _Meaning(NamedTuple):
+    """What a verb does: its participle, its event, and the state that it requests; None if that follows."""
 
-_PARTICIPLES = {
-    Verb.PAUSE: "paused",
-    Verb.RESUME: "resumed",
-    Verb.STOP: "stopped",
-    Verb.CANCEL: "cancelled",
-    Verb.EXTEND: "extended",
-    Verb.RETRY: "retried",
+    participle: str
+    event: EventKind
+    requested: Callable[[ExperimentRow], State | None]
+
+
+_MEANINGS = {
+    Verb.PAUSE: _Meaning("paused", EventKind.PAUSING, lambda _: State.PAUSING),
+    Verb.RESUME: _Meaning("resumed", EventKind.RESUMED, lambda row: State.RUNNING if row.running else State.QUEUED),
+    Verb.STOP: _Meaning("stopped", EventKind.STOPPING, lambda _: State.STOPPING),
+    Verb.CANCEL: _Meaning("cancelled", EventKind.CANCELLED, lambda _: State.CANCELLED),
+    Verb.EXTEND: _Meaning("extended", EventKind.EXTENDED, lambda _: State.QUEUED),
+    Verb.RETRY: _Meaning("retried", EventKind.RETRIED, lambda row: State.QUEUED if row.state.ended else None),
 }
 
 
@@ -110,13 +111,13 @@ def members_permitting(session: Session, id_: str, verb: Verb) -> tuple[Members,
             if not set(PERMITTED[other]).isdisjoint(states) and (other is not Verb.RETRY or failed)
         ]
         permitted = f"permitted: {', '.join(able) or 'nothing'}"
-        raise Conflict(f"{found} is {' and '.join(states)} and cannot be {_PARTICIPLES[verb]}; {permitted}")
+        raise Conflict(f"{found} is {' and '.join(states)} and cannot be {_MEANINGS[verb].participle}; {permitted}")
     return found, permitting
 
 
 def _obey(session: Session, experiment: ExperimentRow, verb: Verb) -> None:
     row = RepetitionRow
-    note(session, _EVENTS[verb], experiment.id)
+    note(session, _MEANINGS[verb].event, experiment.id)
     session.execute(update(ExperimentRow).where(ExperimentRow.id == experiment.id).values(paused_because=None))
     if verb is Verb.CANCEL:
         _end_repetitions(session, experiment.id)
@@ -128,7 +129,7 @@ def _obey(session: Session, experiment: ExperimentRow, verb: Verb) -> None:
         failed = (row.experiment_id == experiment.id) & (row.state == State.FAILED)
         # Before, a failure left the number of its deleted checkpoints.
         move(session, row, failed, State.QUEUED, losses=0, checkpoints=0, error=None, hidden_error=None)
-    settle(session, [experiment.id], _REQUESTED[verb](experiment))
+    settle(session, [experiment.id], _MEANINGS[verb].requested(experiment))
     session.refresh(experiment)
     if verb is Verb.CANCEL:
         cancel_unneeded(session, experiment.sensitivity_id)
@@ -140,15 +141,6 @@ def _end_repetitions(session: Session, experiment: str) -> None:
     attempts.end(session, cancelled, Ending.CANCELLED)
     checkpoints.forget(session, cancelled)
     withdraw(session, RequestRow.repetition_id.in_(cancelled))
-
-
-_REQUESTED: dict[Verb, Callable[[ExperimentRow], State | None]] = {
-    Verb.PAUSE: lambda _: State.PAUSING,
-    Verb.RESUME: lambda experiment: State.RUNNING if experiment.running else State.QUEUED,
-    Verb.STOP: lambda _: State.STOPPING,
-    Verb.CANCEL: lambda _: State.CANCELLED,
-    Verb.RETRY: lambda experiment: State.QUEUED if experiment.state.ended else None,
-}
 
 
 @transaction
