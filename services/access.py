@@ -73,11 +73,16 @@ class NewToken:
         return f"NewToken(token={self.token!r})"
 
 
-def create_token(store: Store, role: Role, name: str | None = None) -> NewToken:
+@transaction
+def create_token(session: Session, role: Role, name: str | None = None) -> NewToken:
     """Create a token; its secret cannot be read again."""
-    secret = token_hex(32)
-    token = store.write(_insert, name or role.value, role, _digest(secret))
-    return NewToken(token, f"gaplab_{token.id}_{secret}")
+    id_, secret = new_id(), token_hex(32)
+    row = TokenRow(
+        id=id_, name=storable(name or role.value), role=role, digest=_digest(secret), created_at=moment(session)
+    )
+    session.add(row)
+    session.flush()
+    return NewToken(_view(row), f"gaplab_{id_}_{secret}")
 
 
 @snapshot
@@ -161,13 +166,6 @@ def _known(store: Store, shown: str) -> Caller:
     if token.last_used_at is None or present - token.last_used_at > NOTED_EVERY:
         store.write_at_once(_note_use, token.id)  # the note of its use is welcome, but no reason to wait or to refuse
     return Caller(token.id, token.role)
-
-
-def _insert(session: Session, name: str, role: Role, digest: str) -> TokenRead:
-    row = TokenRow(id=new_id(), name=storable(name), role=role, digest=digest, created_at=moment(session))
-    session.add(row)
-    session.flush()
-    return _view(row)
 
 
 def _note_use(session: Session, token_id: str) -> None:
