@@ -36,6 +36,7 @@ from gaplab.services.store.queries.progress import tallies
 from gaplab.services.store.queries.requests import withdraw
 from gaplab.services.store.session import Session, transaction
 
+
 class _Meaning(NamedTuple):
     """What a verb does: its participle, its event, and the state that it requests; None if that follows."""
 

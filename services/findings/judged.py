@@ -104,8 +104,7 @@ class Judged:
 
 def recorded_of(curve: Curve) -> FloatArray:
     """Return the recorded fitness of a curve, `(repetitions, counts)`; nan is a missing value."""
-    rows = [[np.nan if value is None else value for value in point.values] for point in curve.points]
-    return np.array(rows, dtype=float).T if rows else np.empty((0, 0))
+    return np.array([point.values for point in curve.points], dtype=float).T if curve.points else np.empty((0, 0))
 
 
 def judged_curves(

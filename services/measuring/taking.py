@@ -18,7 +18,7 @@ from gaplab.services.experiments.limits import Admission
 from gaplab.services.measuring.doubts import doubt_others
 from gaplab.services.measuring.views import view_requests
 from gaplab.services.store.clock import moment
-from gaplab.services.store.cursor import decode, encode
+from gaplab.services.store.cursor import decode, encode, next_cursor
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.queries.experiments import get_experiment
@@ -80,9 +80,8 @@ def list_requests(
     if cursor is not None:
         conditions.append(tuple_(*key) > decode(cursor, key, bound))
     rows = requests.oldest(session, conditions, limit + 1, requests.PENDING if wanted.pending else None)
-    shown = rows[:limit]
-    following = encode(shown[-1].created_at, shown[-1].id, bound_to=bound) if len(rows) > limit else None
-    return Page[RequestRead](items=view_requests(session, shown), next=following)
+    following = next_cursor(rows, limit, lambda last: encode(last.created_at, last.id, bound_to=bound))
+    return Page[RequestRead](items=view_requests(session, rows[:limit]), next=following)
 
 
 @snapshot

@@ -69,8 +69,8 @@ def measurements(facts: Facts, outcome: Outcome) -> Grid:
         (
             f"{each.repetition}, {each.iteration}",
             each.kind.value,
-            number(each.fitness) or MISSING,
-            number(each.standard_error, 2) or MISSING,
+            number(each.fitness),
+            number(each.standard_error, 2),
             each.measured_by,
             f"{each.measured_at:%Y-%m-%d %H:%M}",
         )

@@ -216,8 +216,7 @@ def _readings(sample: SampleRead, home: _Home) -> list[float | None]:
     size = home.robot.sensors.size
     if sample.readings is None or len(sample.readings) != size:
         return [None] * size
-    told = home.robot.sensors.values(frozen([float("nan") if each is None else each for each in sample.readings]))
-    return [None if value != value else value for value in told.ravel().tolist()]  # noqa: PLR0124 - nan
+    return [known(value) for value in home.robot.sensors.values(frozen(sample.readings)).ravel()]
 
 
 def _simulator(home: _Home) -> dict[str, Any]:

@@ -103,7 +103,7 @@ FIELDS: Fields = {
     "id": Field("id of the study, or of one of its experiments", fields.TEXT, _id),
     "name": fields.text(_S.name, "name of the study"),
     "note": fields.text(_S.notes, "notes of the study"),
-    "tag": fields.tags(lambda has: has(_S.tags), "a tag of the study"),
+    "tag": fields.tags(_S.tags, "a tag of the study"),
     "state": fields.state(study_is, "state of the study"),
     **OF_EXPERIMENTS,
     "created": fields.moment(_S.created_at, "time of its submission"),

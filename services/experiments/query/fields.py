@@ -58,15 +58,15 @@ def text(column: Column, meaning: str) -> Field:
     return Field(meaning, TEXT, meets)
 
 
-def tags(has: Callable[[Callable[[Column], Condition]], Condition], meaning: str) -> Field:
-    """Return the field of tags; `has` makes a condition on a column of tags a condition on the record."""
+def tags(column: Column, meaning: str) -> Field:
+    """Return the field of packed tags; `none` asks for what has none."""
 
     def meets(operator: str, value: Value) -> Condition:
-        wanted = storable(value.text.lower())
         if asks_for_missing(operator, value):
-            return not_(has(lambda column: column.is_not(None)))
+            return column.is_(None)
+        wanted = storable(value.text.lower())
         packed = wanted if operator == "~" else f" {wanted} "
-        return has(lambda column: and_(column.is_not(None), column.contains(packed, autoescape=True)))
+        return and_(column.is_not(None), column.contains(packed, autoescape=True))
 
     return Field(meaning, TEXT, meets)
 

@@ -186,7 +186,7 @@ def _members(body: Mapping[str, Any]) -> Genomes:
 
 
 def _vector(body: Mapping[str, Any], name: str) -> FloatArray:
-    return frozen([_or(nan, each) for each in body[name]]) if name in body else NO_READINGS
+    return frozen(body[name]) if name in body else NO_READINGS
 
 
 def _or(missing: float, value: float | None) -> float:
