@@ -10,6 +10,7 @@ from math import ceil, floor, fsum
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Progress, TimeLeft
+from gaplab.services.findings.wording import many
 from gaplab.services.store.queries.progress import Tally
 
 KNOWN_AFTER_S = 10.0
@@ -73,7 +74,7 @@ def progress_of(tally: Tally) -> Progress:
 def caveat_of(state: State, tally: Tally) -> str | None:
     """Return what the state of an experiment does not say: it was stopped early, or repetitions failed."""
     failed = tally.failed if state is not State.FAILED else 0
-    parts = [f"{failed} of {_many(tally.repetitions, 'repetition')} failed"] if failed else []
+    parts = [f"{failed} of {many(tally.repetitions, 'repetition')} failed"] if failed else []
     if state is State.COMPLETED and tally.stopped:
         parts.append(f"stopped early, {_done(tally)}")
     return "; ".join(parts) or None
@@ -86,7 +87,7 @@ def caveat_of_several(state: State, members: Mapping[State, int], stopped: int, 
     parts = [f"{count} {what}" for what, count in counts.items() if count]
     if not parts:
         return None
-    (first, *others), total = parts, _many(sum(members.values()), "experiment")
+    (first, *others), total = parts, many(sum(members.values()), "experiment")
     count, what = first.split(" ", 1)
     told = ", ".join([f"{count} of {total} {what}", *others])
     return f"{told}; {_done(tally)}" if state.ended else told
@@ -113,7 +114,7 @@ def _text(tally: Tally) -> str:
     iterations = f"{tally.counted_iterations_done:,} of {tally.counted_iterations:,} iterations"
     now = [f"{each.kind} {each.iteration}: {100 * each.rollouts // each.budget} %" for each in tally.steps]
     parts = [
-        f"{tally.completed:,} of {_many(tally.repetitions, 'repetition')}{failed}",
+        f"{tally.completed:,} of {many(tally.repetitions, 'repetition')}{failed}",
         *([iterations] if tally.counted_iterations else []),
         f"{tally.rollouts_done:,} of {tally.rollouts:,} rollouts{saved}{physics}",
         *now[:MOST_STEPS],
@@ -124,7 +125,3 @@ def _text(tally: Tally) -> str:
 
 def _done(tally: Tally) -> str:
     return f"{floor(100 * _share(tally))} % done"
-
-
-def _many(count: int, what: str) -> str:
-    return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"

@@ -178,7 +178,9 @@ def _compared(
         groups |= _sizes(*both(first, second)) | {"sizes": f"{len(both(first, second)[0])}"}
     lower, upper = difference_interval(first, second, paired=shared)
     groups["difference_text"] += bracketed(lower, upper)
-    pooled = _pooled(over.pooled(one), over.pooled(other)) if over.first < over.last else None
+    pooled = None
+    if over.first < over.last:
+        pooled = Pooled(caution=sentences.POOLED, **_groups(over.pooled(one), over.pooled(other)))
     streams = sentences.streams((one.seed, one.strategy), (other.seed, other.strategy))
     return Comparison(
         first=one.id,
@@ -203,10 +205,6 @@ def _compared(
         summary_second=summaries[1],
         pooled=pooled,
     )
-
-
-def _pooled(first: FloatArray, second: FloatArray) -> Pooled:
-    return Pooled(caution=sentences.POOLED, **_groups(first, second))
 
 
 def _groups(first: FloatArray, second: FloatArray) -> dict[str, Any]:

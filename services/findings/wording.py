@@ -68,7 +68,7 @@ def share(value: float | None) -> str:
 
 def many(count: int, noun: str) -> str:
     """Return `1 repetition` or `3 repetitions`."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:

@@ -218,16 +218,15 @@ def _rewrite_records(session: Session, repetition: RepetitionRow) -> None:
 
 
 def go_on(session: Session, repetition: RepetitionRow, *, closed: bool) -> None:
-    """Queue a repetition that had ended or waits for nothing, if steps were closed; and bring its experiment back."""
+    """Queue a repetition that had ended or waits for nothing, if steps were closed; and bring its experiment back.
+
+    It waits for nothing if its request was withdrawn, as it followed from a corrected sample.
+    """
     session.refresh(repetition)
-    if (repetition.state is State.COMPLETED and closed) or _waits_for_nothing(session, repetition):
+    waits_for_nothing = repetition.state is State.WAITING and not requests.pending(session, repetition.id)
+    if (repetition.state is State.COMPLETED and closed) or waits_for_nothing:
         move(session, RepetitionRow, RepetitionRow.id == repetition.id, State.QUEUED, losses=0)
     _settle(session, repetition)
-
-
-def _waits_for_nothing(session: Session, repetition: RepetitionRow) -> bool:
-    """Return whether the request that a repetition waited for was withdrawn, as it followed from a corrected sample."""
-    return repetition.state is State.WAITING and not requests.pending(session, repetition.id)
 
 
 def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) -> None:

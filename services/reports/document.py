@@ -34,7 +34,7 @@ def report_of(facts: Facts) -> Report:
         *([Section("Measurements", _measurements(facts, outcome))] if outcome and outcome.measured else []),
         Section("Cost", (tables.cost(facts),)),
         Section("Settings", _settings(facts)),
-        Section("Provenance", _provenance(facts)),
+        Section("Provenance", tables.provenance(facts) or (Paragraph(NO_VERSIONS),)),
         Section("How to reproduce it", tuple(reproduction(facts))),
     ]
     return Report(
@@ -159,10 +159,7 @@ def _settings(facts: Facts) -> tuple[Block, ...]:
     return (*notes, *tables.differing(facts), tables.settings(facts))
 
 
-def _provenance(facts: Facts) -> tuple[Block, ...]:
-    found = tables.provenance(facts)
-    return found or (Paragraph("The versions of what computed it are not stored."),)
-
+NO_VERSIONS = "The versions of what computed it are not stored."
 
 ONE = "Save the spec below as spec.json and submit it: gaplab submit spec.json --watch"
 EACH = "Save each spec below as a file and submit it: gaplab submit spec.json --watch"

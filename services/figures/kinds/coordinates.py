@@ -45,15 +45,14 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class _Scaled:
-    """A coordinate between 0 and 1: the height of each line, and the labels of the axis by height."""
+    """A coordinate between 0 and 1: the height of each line, and the labels of the axis by height.
+
+    Labels are numbers at the ends of the axis, or words beside their heights.
+    """
 
     heights: tuple[Number, ...]
     ticks: tuple[tuple[float, str], ...]
     words: bool = False
-
-    def labels(self, place: float) -> list[Label]:
-        """Return the labels of the axis at a place on x: numbers at its ends, words beside their heights."""
-        return [Label(text, place, height, beside=self.words) for height, text in self.ticks]
 
 
 def coordinates_figure(
@@ -77,7 +76,11 @@ def coordinates_figure(
     marks: list[Mark] = [Polylines("", places, rows, tuple(shades[:shown]), shades_label, tuple(hover[:shown]))]
     ends = [(place, end) for place in places for end in (0.0, 1.0, None)]
     marks.append(Line("", tuple(p for p, _ in ends), tuple(end for _, end in ends), markers=False))
-    marks += [label for place, axis in zip(places, scaled, strict=True) for label in axis.labels(place)]
+    marks += [
+        Label(text, place, height, beside=axis.words)
+        for place, axis in zip(places, scaled, strict=True)
+        for height, text in axis.ticks
+    ]
     ticks = tuple((place, printable(axis.label, LONGEST)) for place, axis in zip(places, coordinates, strict=True))
     frame = Axis("", (-0.4, max(1.0, len(coordinates) - 1) + 0.6), ticks=ticks)
     return FigureDefinition(
