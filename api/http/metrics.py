@@ -54,7 +54,7 @@ class RequestCounter:
         self._metrics = metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request, and count it when its answer begins; what is no request has no answer."""
+        """Serve one request, and count it when its answer begins; what is not a request has no answer."""
         began = perf_counter()
 
         async def counted(message: Message) -> None:
