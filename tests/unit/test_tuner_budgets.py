@@ -76,7 +76,7 @@ def test_rounds_that_fit_have_the_numbers_of_before() -> None:
     """Four rounds of 15, as `evaluations // rounds` says."""
     physics = Physics()
 
-    tuned(AbcSmc, physics, evaluations=60)
+    tuned(AbcSmc(), physics, evaluations=60)
 
     assert [len(asked) for asked in physics.asked] == [15] * 4
 
