@@ -184,12 +184,12 @@ def reopen(
     return Answer(found, f"Request {found.id} is {found.state.value}.")
 
 
-def pair(text: str) -> tuple[str, str]:
-    """Return name and value of `NAME=VALUE`; a BadParameter if it is not that."""
-    joint, equals, column = text.partition("=")
-    if not (joint and equals):
-        raise typer.BadParameter(f"{text!r} is not JOINT=COLUMN, like 'elbow=Elbow [deg]'", param_hint="--map")
-    return joint.strip(), column.strip()
+def pair(text: str, option: str = "--map", form: str = "JOINT=COLUMN, like 'elbow=Elbow [deg]'") -> tuple[str, str]:
+    """Return name and value of `NAME=VALUE`; a BadParameter that says the form if it is not that."""
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise typer.BadParameter(f"{text!r} is not {form}", param_hint=option)
+    return name.strip(), value.strip()
 
 
 def _given(**details: str | None) -> Details:

@@ -60,7 +60,7 @@ def import_(  # noqa: PLR0913, PLR0917 - each is an option of the command
         columns=dict(pair(each) for each in columns or ()),
         recording=recording,
         sensors=[each.strip() for each in sensors.split(",")],
-        noises=dict(pair(each) for each in noises or ()),
+        noises=dict(pair(each, "--noise", "NAME=NUMBER, like angle=0.002") for each in noises or ()),
         seconds=seconds,
         every_s=every,
         confirmed=confirmed,

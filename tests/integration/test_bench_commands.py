@@ -246,6 +246,8 @@ def test_encoders_of_an_arm_answer_a_request(sqlite_store: Store, gaplab: Gaplab
     assert "the motion begins at 3.000 s (match 1.00)" in answered.out
     assert "is stored: counted" in answered.out
     assert "is not JOINT=COLUMN" in gaplab("traces", request.id, str(file), "--map", "Pan").err
+    named = "--robot", "arm", "--name", "runs", "--noise", "angle"
+    assert "--noise: 'angle' is not NAME=NUMBER" in gaplab("pool", "import", str(file), *named).err
     (found,) = taking.list_requests(sqlite_store, taking.RequestFilter(pending=False)).items
     fitness = float(robot.fitness(recorded.trajectory))
     assert found.answers[0].values == pytest.approx((fitness,), abs=1e-3)
